@@ -1,0 +1,71 @@
+//! What the railway reports and what it was told: the entries of every recording.
+
+use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::Length;
+
+/// One entry of a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// When the host saw or sent it.
+    pub time: Timestamp,
+    /// What it was.
+    pub kind: EventKind,
+}
+
+/// What can stand in a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EventKind {
+    /// A trackside contact was reported as closed.
+    Sensor(Report),
+    /// A throttle step was commanded.
+    Speed {
+        /// The train that was told.
+        train: TrainId,
+        /// The step it was told.
+        step: SpeedStep,
+    },
+    /// The train was told to turn around.
+    Reverse {
+        /// The train that was told.
+        train: TrainId,
+    },
+    /// A turnout was thrown.
+    Turnout {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// `true` for the diverging leg.
+        curved: bool,
+    },
+    /// A person measured where and when the train came to rest.
+    Stopped {
+        /// The train that stopped.
+        train: TrainId,
+        /// The contact from which the tape was laid.
+        landmark: SensorId,
+        /// How far past it the train's pickup came to rest.
+        offset: Length,
+    },
+}
+
+/// A contact that was seen closed, and what is known of the time at which it closed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    /// The contact.
+    pub sensor: SensorId,
+    /// The interval of the poll that reported it, from the reading before to the reading that saw it closed,
+    /// where the host recorded it; the contact closed within this span before the reading.
+    pub poll_interval: Option<TimeSpan>,
+}
+
+/// From which side a speed was reached; the same throttle step reached from above is faster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum Approach {
+    /// From a lower step or from rest.
+    Below,
+    /// From a higher step.
+    Above,
+    /// The recording begins with the train already running.
+    Unknown,
+}

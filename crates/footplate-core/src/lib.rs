@@ -1,0 +1,32 @@
+//! Everything Footplate knows about how trains move, as functions of what went in.
+//!
+//! No std, no input or output, no clock, no randomness: time is an argument, and the same input gives the
+//! same bytes on every machine. Layers from top to bottom; a module imports only from rows below its own,
+//! or from its own folder (checked by `tests/architecture.rs`):
+//!
+//! ```text
+//! estimation     what the next report will be, learnt from the last
+//! calibration    speeds, laws of speed change, stops, edge lengths: numbers with uncertainty
+//! kinematics  latency  track
+//! event
+//! units  time  ids  linalg  estimate
+//! ```
+//!
+//! The journey of one sensor report is traced through the files in `ARCHITECTURE.md`.
+#![no_std]
+
+extern crate alloc;
+#[cfg(test)]
+extern crate std;
+
+mod estimate;
+mod event;
+mod ids;
+mod time;
+mod units;
+
+pub use estimate::Estimate;
+pub use event::{Approach, Event, EventKind, Report};
+pub use ids::{EdgeId, NodeId, RunId, SensorId, SpeedStep, TrainId, TurnoutId};
+pub use time::{TimeSpan, Timestamp};
+pub use units::{Acceleration, Jerk, Length, Ratio, Speed};

@@ -1,0 +1,1 @@
+//! A seeded world of trains, track and sensors, whose truth only scorers see.

@@ -1,0 +1,1 @@
+//! Layouts, calibrations and recordings on disk, and reading them back.

@@ -1,0 +1,3 @@
+//! The program: the only clock, sockets and threads.
+
+fn main() {}
