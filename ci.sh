@@ -1,0 +1,167 @@
+#!/usr/bin/env bash
+# Everything that has to hold before a change lands. At home and on a server it is the same command:
+#
+#   ./ci.sh               every step below, in this order
+#   ./ci.sh lint test     only these
+#
+#   lint         formatting, and clippy without a warning
+#   test         unit, behaviour, property and documentation tests
+#   bare-metal   core and wire link into a program that has no std
+#   docs         rustdoc without a warning
+#   examples     the numbered examples print what is committed in testdata/examples
+#
+# And one that changes files, never part of "every step":
+#
+#   expected     refreshes the committed outputs; read the diff and explain it in the commit
+#
+# Needs Rust. On Debian it installs what else is missing. Tests on real recordings run when FOOTPLATE_DATA names
+# their folder, or when they are found beside the checkout in ../shared/data.
+set -euo pipefail
+shopt -s inherit_errexit
+cd "$(dirname "${BASH_SOURCE[0]}")"
+export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+
+readonly ALL_STEPS=(lint test bare-metal docs examples)
+readonly EXAMPLE_FOLDERS=(crates/*/examples)
+readonly EXPECTED_EXAMPLES=testdata/examples
+readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
+
+if [[ -z ${FOOTPLATE_DATA:-} && -d ../shared/data ]]; then
+  FOOTPLATE_DATA="$(cd ../shared/data && pwd)"
+  export FOOTPLATE_DATA
+fi
+
+# ---- what the machine needs ---------------------------------------------------------------------------------
+
+# Installs the Debian package $2 when the command $1 is missing.
+need() {
+  command -v "$1" >/dev/null && return
+  local -a as_root=()
+  [[ $EUID -eq 0 ]] || as_root=(sudo)
+  "${as_root[@]}" apt-get update -qq
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y "$2"
+}
+
+need_compiler() {
+  if ! command -v cargo >/dev/null; then
+    echo "ci.sh: no cargo on the PATH; install Rust first (https://rustup.rs)" >&2
+    return 1
+  fi
+  need cc build-essential # SQLite is compiled from source
+}
+
+need_nextest() {
+  need_compiler
+  command -v cargo-nextest >/dev/null || cargo install cargo-nextest --locked
+}
+
+# ---- the steps ----------------------------------------------------------------------------------------------
+
+step_lint() {
+  need_compiler
+  cargo fmt --check
+  cargo clippy --workspace --all-targets --quiet -- -D warnings
+}
+
+step_test() {
+  need_nextest
+  cargo nextest run --workspace
+  cargo test --doc --workspace --quiet
+}
+
+# Only a std in the tree can bring a second panic handler, and then rustc refuses the crate: no other target
+# than the host's has to be installed for the proof.
+step_bare-metal() {
+  need_compiler
+  cargo build --quiet --locked --manifest-path bare-metal/Cargo.toml --target-dir "$TARGET/bare-metal"
+  echo "footplate-core and footplate-wire link without std"
+}
+
+step_docs() {
+  need_compiler
+  RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+}
+
+# Calls $1 with the crate's name, the example's name and its source for each numbered example.
+each_example() {
+  local folder source
+  for folder in "${EXAMPLE_FOLDERS[@]}"; do
+    for source in "$folder"/[0-9][0-9]_*.rs; do
+      [[ -e $source ]] || continue
+      "$1" "$(basename "$(dirname "$folder")")" "$(basename "$source" .rs)" "$source"
+    done
+  done
+}
+
+# In the profile of the tests, which has them built already.
+run_example() {
+  cargo run --quiet --profile test -p "$1" --example "$2"
+}
+
+check_example() {
+  local expected="$EXPECTED_EXAMPLES/$2.txt"
+  if ! run_example "$@" | diff --unified --label "$expected" --label "printed by $3" "$expected" -; then
+    echo "$3 no longer prints what is committed; if the new output is right: ./ci.sh expected"
+    return 1
+  fi
+  echo "$2 prints what is committed"
+}
+
+step_examples() {
+  need_compiler
+  each_example check_example
+}
+
+refresh_example() {
+  run_example "$@" >"$TARGET/$2.txt"
+  mv "$TARGET/$2.txt" "$EXPECTED_EXAMPLES/$2.txt"
+}
+
+step_expected() {
+  need_compiler
+  each_example refresh_example
+  git status --short -- testdata
+}
+
+# ---- running them -------------------------------------------------------------------------------------------
+
+declare -a summary=()
+current=""
+step_started=0
+
+print_summary() {
+  local status=$? line
+  echo
+  echo "ci.sh: $(IFS=' '; echo "${steps[*]}")"
+  for line in ${summary[@]+"${summary[@]}"}; do echo "  $line"; done
+  if [[ -n $current ]]; then
+    printf '  %-12s %4d s  failed\n' "$current" "$((SECONDS - step_started))"
+  fi
+  echo "  recordings   ${FOOTPLATE_DATA:-none; tests on real recordings were left out}"
+  if [[ $status -eq 0 ]]; then
+    echo "ci.sh: all passed in $SECONDS s"
+  else
+    echo "ci.sh: stopped at $current after $SECONDS s"
+  fi
+}
+
+steps=("$@")
+if [[ ${#steps[@]} -eq 0 || ${steps[*]} == all ]]; then
+  steps=("${ALL_STEPS[@]}")
+fi
+for step in "${steps[@]}"; do
+  if ! declare -F "step_$step" >/dev/null; then
+    echo "ci.sh: no step is called '$step'; there are: all ${ALL_STEPS[*]} expected" >&2
+    exit 2
+  fi
+done
+
+trap print_summary EXIT
+for step in "${steps[@]}"; do
+  current=$step
+  step_started=$SECONDS
+  echo "---- $step"
+  "step_$step"
+  summary+=("$(printf '%-12s %4d s  passed' "$step" "$((SECONDS - step_started))")")
+  current=""
+done
