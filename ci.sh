@@ -7,7 +7,7 @@
 #   lint         formatting, and clippy without a warning
 #   test         unit, behaviour, property and documentation tests
 #   bare-metal   core and wire link into a program that has no std
-#   docs         rustdoc without a warning
+#   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
 #   examples     the numbered examples print what is committed in testdata/examples
 #
 # And one that changes files, never part of "every step":
@@ -52,6 +52,7 @@ need_compiler() {
 
 need_nextest() {
   need_compiler
+  need git git # the architecture test asks git which files belong to the project
   command -v cargo-nextest >/dev/null || cargo install cargo-nextest --locked
 }
 
@@ -78,8 +79,9 @@ step_bare-metal() {
 }
 
 step_docs() {
-  need_compiler
+  need_nextest
   RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+  cargo nextest run -p footplate-core --test architecture -E 'test(/^links::/)'
 }
 
 # Calls $1 with the crate's name, the example's name and its source for each numbered example.

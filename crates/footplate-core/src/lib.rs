@@ -2,7 +2,7 @@
 //!
 //! No std, no input or output, no clock, no randomness: time is an argument, and the same input gives the
 //! same bytes on every machine. Layers from top to bottom; a module imports only from rows below its own,
-//! or from its own folder (checked by `tests/architecture.rs`):
+//! or from its own folder (checked by `tests/architecture/`):
 //!
 //! ```text
 //! estimation     what the next report will be, learnt from the last

@@ -1,0 +1,148 @@
+//! Documentation that points at things that exist: relative links, headings, and paths named in passing.
+
+use std::collections::BTreeSet;
+
+use pulldown_cmark::{Event, Parser, Tag, TagEnd};
+
+use crate::project::{Fault, TextFile, assert_none, exists, paths, text_files};
+
+const READING_ORDER: &str = "docs/README.md";
+
+/// What one page points at, and which places in it can be pointed at.
+#[derive(Default)]
+struct Page {
+    links: Vec<Pointer>,
+    code_spans: Vec<Pointer>,
+    anchors: BTreeSet<String>,
+}
+
+struct Pointer {
+    line: usize,
+    target: String,
+}
+
+impl Page {
+    fn read(text: &str) -> Self {
+        let mut page = Self::default();
+        let mut heading: Option<String> = None;
+        for (event, range) in Parser::new(text).into_offset_iter() {
+            let line = text.get(..range.start).map_or(1, |before| before.lines().count().max(1));
+            match event {
+                Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => {
+                    page.links.push(Pointer { line, target: dest_url.to_string() });
+                }
+                Event::Start(Tag::Heading { .. }) => heading = Some(String::new()),
+                Event::End(TagEnd::Heading(_)) => page.anchors.extend(heading.take().map(|h| anchor(&h))),
+                Event::Text(words) => heading.iter_mut().for_each(|h| h.push_str(&words)),
+                Event::Code(words) => {
+                    heading.iter_mut().for_each(|h| h.push_str(&words));
+                    page.code_spans.push(Pointer { line, target: words.to_string() });
+                }
+                _ => {}
+            }
+        }
+        page
+    }
+}
+
+/// The name by which a heading can be linked to: lower case, no punctuation, hyphens for spaces.
+fn anchor(heading: &str) -> String {
+    let kept = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// The path from the top that a link on a page leads to, or `None` above the top.
+fn follow(page: &str, link: &str) -> Option<String> {
+    let mut parts: Vec<&str> = page.split('/').collect();
+    parts.pop();
+    for part in link.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => {
+                parts.pop()?;
+            }
+            name => parts.push(name),
+        }
+    }
+    Some(parts.join("/"))
+}
+
+fn pages() -> Vec<TextFile> {
+    text_files(&[".md"])
+}
+
+fn link_objection(pages: &[TextFile], page: &str, link: &str) -> Option<String> {
+    if link.contains("://") || link.starts_with("mailto:") {
+        return None;
+    }
+    let (file, heading) = link.split_once('#').map_or((link, None), |(file, heading)| (file, Some(heading)));
+    let target = if file.is_empty() { Some(page.to_string()) } else { follow(page, file) };
+    let Some(target) = target.filter(|target| exists(target)) else {
+        return Some(format!("links to {link}, which is not there"));
+    };
+    let heading = heading?;
+    let led_to = pages.iter().find(|file| file.path == target);
+    let found = led_to.is_some_and(|file| Page::read(&file.text).anchors.contains(heading));
+    (!found).then(|| format!("links to {link}, and {target} has no such heading"))
+}
+
+#[test]
+fn every_relative_link_leads_somewhere() {
+    let all = pages();
+    let mut faults = Vec::new();
+    for file in &all {
+        for link in Page::read(&file.text).links {
+            if let Some(what) = link_objection(&all, &file.path, &link.target) {
+                faults.push(Fault { path: file.path.clone(), line: link.line, what });
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn every_path_named_in_passing_exists() {
+    let folders: BTreeSet<String> =
+        paths().iter().filter_map(|path| Some(path.split_once('/')?.0.to_string())).collect();
+    let mut faults = Vec::new();
+    // What a change log tells of may be gone by now.
+    for file in pages().into_iter().filter(|file| file.path != "CHANGELOG.md") {
+        for span in Page::read(&file.text).code_spans {
+            let is_path = span.target.split_once('/').is_some_and(|(first, _)| folders.contains(first));
+            if is_path && !span.target.contains(['*', '{', '…', ' ', '<']) && !exists(&span.target) {
+                let what = format!("names {}, which is not there", span.target);
+                faults.push(Fault { path: file.path.clone(), line: span.line, what });
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn every_page_has_its_place_in_the_reading_order() {
+    let all = pages();
+    let order = all.iter().find(|file| file.path == READING_ORDER).expect("docs should have a reading order");
+    let listed: BTreeSet<String> =
+        Page::read(&order.text).links.iter().filter_map(|link| follow(READING_ORDER, &link.target)).collect();
+    let lost = all.iter().filter(|file| file.path.starts_with("docs/") && file.path != READING_ORDER);
+    let lost = lost.filter(|file| !listed.contains(&file.path)).map(|file| Fault {
+        path: file.path.clone(),
+        line: 1,
+        what: format!("is not linked from {READING_ORDER}"),
+    });
+    assert_none(&lost.collect::<Vec<_>>());
+}
+
+#[test]
+fn a_dead_link_and_a_missing_heading_are_noticed() {
+    assert_eq!(follow("docs/guides/start.md", "../glossary.md").as_deref(), Some("docs/glossary.md"));
+    assert_eq!(follow("README.md", "../elsewhere.md"), None);
+    assert_eq!(anchor("Why `f64`, and not decimals?"), "why-f64-and-not-decimals");
+
+    let page = Page::read("# One\n\nSee [two](two.md) and `crates/none.rs`.\n\n```\n[no](link.md)\n```\n");
+    assert_eq!(page.links.iter().map(|l| (l.line, l.target.as_str())).collect::<Vec<_>>(), [(3, "two.md")]);
+    assert_eq!(page.code_spans.len(), 1);
+    assert!(page.anchors.contains("one"));
+    assert!(link_objection(&[], "README.md", "no-such-page.md").is_some());
+    assert!(link_objection(&[], "README.md", "https://example.org").is_none());
+}

@@ -1,0 +1,80 @@
+//! The files of the project, as git knows them.
+
+use std::fmt::{Display, Write as _};
+use std::path::Path;
+use std::process::Command;
+
+use crate::source::Source;
+
+/// A text file of the project.
+pub(crate) struct TextFile {
+    /// Its path from the top of the project, with `/` between folders.
+    pub(crate) path: String,
+    pub(crate) text: String,
+}
+
+/// One broken promise.
+pub(crate) struct Fault {
+    pub(crate) path: String,
+    /// Counted from 1.
+    pub(crate) line: usize,
+    pub(crate) what: String,
+}
+
+impl Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}: {}", self.path, self.line, self.what)
+    }
+}
+
+/// Fails with everything that was found.
+pub(crate) fn assert_none(faults: &[Fault]) {
+    let mut list = String::new();
+    for fault in faults {
+        let _ = writeln!(list, "  {fault}");
+    }
+    assert!(faults.is_empty(), "{} to mend:\n{list}", faults.len());
+}
+
+/// Every file that is tracked, or new and not ignored, by its path from the top of the project, sorted.
+pub(crate) fn paths() -> Vec<String> {
+    let list = Command::new("git")
+        // A server may check a project out as one user and test it as another.
+        .args(["-c", "safe.directory=*", "-C", top()])
+        .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
+        .output()
+        .expect("git should be installed: it knows which files belong to the project");
+    assert!(list.status.success(), "git ls-files failed: {}", String::from_utf8_lossy(&list.stderr));
+    let names = String::from_utf8(list.stdout).expect("file names should be UTF-8");
+    let mut paths: Vec<String> =
+        names.split_terminator('\0').map(String::from).filter(|p| exists(p)).collect();
+    paths.sort();
+    paths.dedup();
+    paths
+}
+
+/// Every text file with one of these endings, or of any ending when there are none.
+pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
+    let wanted = |path: &str| endings.is_empty() || endings.iter().any(|ending| path.ends_with(ending));
+    let read = |path: String| {
+        let bytes = std::fs::read(Path::new(top()).join(&path)).expect("a listed file should be readable");
+        // What is no UTF-8 is no text.
+        String::from_utf8(bytes).ok().map(|text| TextFile { path, text })
+    };
+    paths().into_iter().filter(|path| wanted(path)).filter_map(read).collect()
+}
+
+/// The Rust sources below a folder, which ends in `/`.
+pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
+    let below = text_files(&[".rs"]).into_iter().filter(|file| file.path.starts_with(folder));
+    below.map(|file| Source::read(&file.path, &file.text)).collect()
+}
+
+/// Whether a file or folder of this path from the top is there.
+pub(crate) fn exists(path: &str) -> bool {
+    Path::new(top()).join(path).exists()
+}
+
+fn top() -> &'static str {
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+}

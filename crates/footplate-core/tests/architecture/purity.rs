@@ -1,0 +1,93 @@
+//! What is absent from core and wire on purpose: std, clocks, randomness, and dependencies.
+
+use crate::project::{Fault, TextFile, assert_none, sources_below, text_files};
+use crate::source::Source;
+
+const PURE: [&str; 2] = ["crates/footplate-core/src/", "crates/footplate-wire/src/"];
+
+/// First segments of paths that bring the world in, and what to do instead.
+const WORLD: [(&str, &str); 5] = [
+    ("std", "take it from core or alloc; input and output belong in the program"),
+    ("rand", "draw random numbers in the simulator"),
+    ("rand_core", "draw random numbers in the simulator"),
+    ("rand_chacha", "draw random numbers in the simulator"),
+    ("rand_distr", "draw random numbers in the simulator"),
+];
+
+/// What each pure crate may depend on.
+const DEPENDENCIES: [(&str, &[&str]); 2] = [
+    // Elementary functions, and derives for the crates that write files.
+    ("crates/footplate-core/Cargo.toml", &["libm", "serde"]),
+    ("crates/footplate-wire/Cargo.toml", &["footplate-core"]),
+];
+
+fn worldly_paths(source: &Source) -> impl Iterator<Item = Fault> {
+    source.named.iter().filter_map(|named| {
+        let first = named.segments.first()?;
+        let (_, instead) = WORLD.iter().find(|(name, _)| name == first)?;
+        let what = format!("uses {}; {instead}", named.segments.join("::"));
+        Some(Fault { path: source.path.clone(), line: named.line, what })
+    })
+}
+
+/// The names under `[dependencies]`, with their lines.
+fn dependencies(manifest: &TextFile) -> Vec<(usize, &str)> {
+    let lines = manifest.text.lines().enumerate().skip_while(|(_, line)| *line != "[dependencies]").skip(1);
+    let section = lines.take_while(|(_, line)| !line.starts_with('['));
+    let entries = section.filter(|(_, line)| line.starts_with(|c: char| c.is_ascii_alphabetic()));
+    entries.filter_map(|(at, line)| Some((at + 1, line.split(['.', ' ', '=']).next()?))).collect()
+}
+
+#[test]
+fn core_and_wire_know_no_world() {
+    let faults: Vec<Fault> = PURE
+        .iter()
+        .flat_map(|folder| sources_below(folder))
+        .flat_map(|s| worldly_paths(&s).collect::<Vec<_>>())
+        .collect();
+    assert_none(&faults);
+}
+
+#[test]
+fn core_and_wire_declare_that_they_need_no_std() {
+    let roots = PURE.map(|folder| format!("{folder}lib.rs"));
+    let without =
+        text_files(&[".rs"]).into_iter().filter(|file| roots.contains(&file.path)).filter_map(|file| {
+            let declared = file.text.lines().any(|line| line == "#![no_std]");
+            let what = "says nothing of std; a line #![no_std] would".into();
+            (!declared).then_some(Fault { path: file.path, line: 1, what })
+        });
+    assert_none(&without.collect::<Vec<_>>());
+}
+
+#[test]
+fn core_and_wire_depend_on_what_is_listed_here() {
+    let mut faults = Vec::new();
+    for (path, allowed) in DEPENDENCIES {
+        for manifest in text_files(&[path]) {
+            for (line, name) in dependencies(&manifest) {
+                if !allowed.contains(&name) {
+                    let what = format!("depends on {name}; allowed are {}", allowed.join(", "));
+                    faults.push(Fault { path: path.into(), line, what });
+                }
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn a_clock_a_die_and_a_dependency_are_noticed() {
+    let count = |text| worldly_paths(&Source::read("crates/footplate-core/src/time.rs", text)).count();
+    assert_eq!(count("fn now() { std::time::Instant::now(); }"), 1);
+    assert_eq!(count("use rand::Rng;"), 1);
+    assert_eq!(count("extern crate std;"), 1);
+    assert_eq!(count("use core::fmt::Display;"), 0);
+
+    let manifest = TextFile {
+        path: "Cargo.toml".into(),
+        text: "[dependencies]\nlibm.workspace = true\n# why\nrand = \"1\"\n[lints]\nworkspace = true\n"
+            .into(),
+    };
+    assert_eq!(dependencies(&manifest), [(2, "libm"), (4, "rand")]);
+}
