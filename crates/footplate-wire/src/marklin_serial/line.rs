@@ -1,0 +1,43 @@
+//! How long things take on the serial line of the interface.
+//!
+//! The line is the narrowest place of the whole railway: every command waits for the poll before it, and every
+//! poll for the command before it.
+
+use footplate_core::TimeSpan;
+
+/// The speed of the line (Märklin, instructions of the 6050).
+const BITS_PER_S: i64 = 2400;
+/// One start bit, eight data bits, no parity, two stop bits (same source).
+const BITS_PER_BYTE: i64 = 11;
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// One byte on the line: 11 bits at 2400 baud, 4.583 ms.
+pub const BYTE_TIME: TimeSpan = TimeSpan::from_ns(BITS_PER_BYTE * NS_PER_S / BITS_PER_S);
+
+/// From one byte of a reply to the next: the interface leaves a little more room than the line needs (4.87 ms,
+/// very constant; measured on a 6051 by R. Elder, report on a train controller, Waterloo CS 452).
+pub const REPLY_BYTE_SPACING: TimeSpan = TimeSpan::from_us(4_870);
+
+/// The shortest time a solenoid must be powered to throw its turnout (Waterloo CS 452, lecture 2 of fall 2019).
+pub const SOLENOID_HOLD_SHORTEST: TimeSpan = TimeSpan::from_ms(100);
+
+/// The longest time a solenoid may be powered; forgetting to switch it off burns its coil (same source).
+pub const SOLENOID_HOLD_LONGEST: TimeSpan = TimeSpan::from_ms(500);
+
+/// How long a number of bytes occupies the line when they follow one another without a gap.
+#[must_use]
+pub const fn time_on_line(bytes: u32) -> TimeSpan {
+    TimeSpan::from_ns(BITS_PER_BYTE * NS_PER_S * bytes as i64 / BITS_PER_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_poll_of_five_modules_takes_fifty_milliseconds() {
+        // One byte asks, ten answer: 11 bytes of 11 bits at 2400 baud are 50.417 ms.
+        assert_eq!(time_on_line(11), TimeSpan::from_ns(50_416_666));
+        assert_eq!(time_on_line(1), BYTE_TIME);
+    }
+}

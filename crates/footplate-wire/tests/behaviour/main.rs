@@ -1,0 +1,10 @@
+//! What the codecs promise: the meaning of recorded bytes, round trips, and no panic on any input.
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    reason = "a test may stop at the first surprise"
+)]
+
+mod marklin_serial_round_trip;
+mod marklin_serial_vectors;
