@@ -37,6 +37,10 @@ id!(
     EdgeId(u16)
 );
 id!(
+    /// A stretch of rail, whichever way it is run over: what an edge and its twin share.
+    StretchId(u16)
+);
+id!(
     /// A run: one stretch of a recording in which the clock is continuous and the train is not lifted.
     RunId(u32)
 );

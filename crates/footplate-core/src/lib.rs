@@ -23,10 +23,11 @@ mod estimate;
 mod event;
 mod ids;
 mod time;
+pub mod track;
 mod units;
 
 pub use estimate::Estimate;
 pub use event::{Approach, Event, EventKind, Report};
-pub use ids::{EdgeId, NodeId, RunId, SensorId, SpeedStep, TrainId, TurnoutId};
+pub use ids::{EdgeId, NodeId, RunId, SensorId, SpeedStep, StretchId, TrainId, TurnoutId};
 pub use time::{TimeSpan, Timestamp};
 pub use units::{Acceleration, Jerk, Length, Ratio, Speed};

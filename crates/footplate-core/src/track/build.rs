@@ -1,0 +1,401 @@
+//! From a plan to a layout: every entry is checked, and the first that is wrong is named.
+
+use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::ids::{EdgeId, NodeId, TurnoutId};
+use crate::track::hop::Hops;
+use crate::track::{
+    Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind, Place,
+    Ways,
+};
+use crate::units::Length;
+
+/// Nodes and edges are numbered by `u16`, two to a place and two to a stretch.
+const MAX_PAIRS: usize = 1 << (u16::BITS - 1);
+
+impl Layout {
+    /// Checks a plan and makes the tables.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, in the order survey, places, stretches, rail ends without a stretch,
+    /// pairs, loops.
+    pub fn build(plan: &LayoutPlan) -> Result<Self, LayoutError> {
+        let uncertainty = plan.survey.uncertainty;
+        if !is_plausible(uncertainty) {
+            return Err(LayoutError::IllegalUncertainty { found: uncertainty });
+        }
+        let places = place_nodes(&plan.places)?;
+        let (nodes, edges) = join(plan, &places)?;
+        for (pair, turnouts) in plan.never_both_curved.iter().enumerate() {
+            let [one, other] = *turnouts;
+            let unknown = turnouts.iter().find(|turnout| !places.turnouts.contains_key(turnout));
+            if let Some(&turnout) = unknown.or((one == other).then_some(&one)) {
+                return Err(LayoutError::IllegalPair { pair, turnout });
+            }
+        }
+        let mut layout = Self {
+            name: plan.name.clone(),
+            survey: plan.survey.clone(),
+            nodes,
+            edges,
+            names: places.names,
+            sensors: places.sensors,
+            turnouts: places.turnouts,
+            never_both_curved: plan.never_both_curved.clone(),
+            hops: Hops::default(),
+        };
+        let place_and_name = |node: NodeId| (node.pair(), layout.node_name(node).to_owned());
+        if let Some((place, node)) = layout.loop_without_length().map(place_and_name) {
+            return Err(LayoutError::LoopWithoutLength { place, node });
+        }
+        layout.hops = match Hops::of(&layout).map_err(place_and_name) {
+            Ok(hops) => hops,
+            Err((place, node)) => return Err(LayoutError::TooManyWays { place, node }),
+        };
+        Ok(layout)
+    }
+
+    /// A node from which edges of 0 mm lead back to it.
+    fn loop_without_length(&self) -> Option<NodeId> {
+        // Take away, again and again, the nodes that no remaining edge of 0 mm reaches (Kahn, 1962): what
+        // stays lies on a loop or behind one.
+        let spot = |id: EdgeId| self.edge(id).filter(|edge| edge.length == Length::ZERO);
+        let mut reached_by = vec![0_usize; self.nodes.len()];
+        for edge in self.edges.iter().filter(|edge| edge.length == Length::ZERO) {
+            if let Some(count) = reached_by.get_mut(usize::from(edge.to.0)) {
+                *count += 1;
+            }
+        }
+        let counted = self.nodes().zip(&reached_by).map(|((node, _), count)| (node, *count));
+        let mut free: Vec<NodeId> = counted.filter(|(_, count)| *count == 0).map(|(node, _)| node).collect();
+        while let Some(node) = free.pop() {
+            for edge in self.ways(node).edges().filter_map(spot) {
+                if let Some(count) = reached_by.get_mut(usize::from(edge.to.0)) {
+                    *count -= 1;
+                    if *count == 0 {
+                        free.push(edge.to);
+                    }
+                }
+            }
+        }
+        let stays = |node: NodeId| reached_by.get(usize::from(node.0)).is_some_and(|count| *count > 0);
+        let mut node = self.nodes().map(|(node, _)| node).find(|node| stays(*node))?;
+        // Every node that stays is reached from another one: as many steps back as there are nodes end on a loop.
+        for _ in &self.nodes {
+            let mut before = self.ways(node.reverse()).edges().filter_map(spot).map(|edge| edge.to.reverse());
+            node = before.find(|node| stays(*node))?;
+        }
+        Some(node)
+    }
+}
+
+/// Neither undefined nor negative nor beyond belief.
+fn is_plausible(length: Length) -> bool {
+    length >= Length::ZERO && length <= MAX_EDGE_LENGTH
+}
+
+/// The nodes of all places, and who is where.
+#[derive(Default)]
+struct Places {
+    nodes: Vec<(String, NodeKind)>,
+    names: BTreeMap<String, NodeId>,
+    sensors: Vec<Option<NodeId>>,
+    turnouts: BTreeMap<TurnoutId, NodeId>,
+}
+
+fn place_nodes(plan: &[Place]) -> Result<Places, LayoutError> {
+    if plan.len() > MAX_PAIRS {
+        return Err(LayoutError::TooMany { what: "places", found: plan.len(), limit: MAX_PAIRS });
+    }
+    let mut places = Places::default();
+    for (place, entry) in plan.iter().enumerate() {
+        let kinds = match *entry {
+            Place::Sensor { sensors: [one, other], .. } => [NodeKind::Sensor(one), NodeKind::Sensor(other)],
+            Place::Turnout { turnout, .. } => [NodeKind::Branch(turnout), NodeKind::Merge(turnout)],
+            Place::End { .. } => [NodeKind::Enter, NodeKind::Exit],
+        };
+        let first = NodeId::first_of(place);
+        for ((name, kind), node) in entry.names().iter().zip(kinds).zip([first, first.reverse()]) {
+            if !is_legal_name(name) {
+                return Err(LayoutError::IllegalName { place, name: name.clone() });
+            }
+            if places.names.insert(name.clone(), node).is_some() {
+                return Err(LayoutError::DuplicateName { place, name: name.clone() });
+            }
+            places.nodes.push((name.clone(), kind));
+            places.take(place, node, kind)?;
+        }
+    }
+    Ok(places)
+}
+
+impl Places {
+    /// Remembers where a sensor or turnout is, unless it is somewhere else already.
+    fn take(&mut self, place: usize, node: NodeId, kind: NodeKind) -> Result<(), LayoutError> {
+        let name = |node: NodeId| {
+            self.nodes.get(usize::from(node.0)).map_or_else(String::new, |(name, _)| name.clone())
+        };
+        match kind {
+            NodeKind::Sensor(sensor) => {
+                let slot = usize::from(sensor.0);
+                if let Some(Some(first)) = self.sensors.get(slot) {
+                    let (first, second) = (name(*first), name(node));
+                    return Err(LayoutError::SensorPlacedTwice { place, sensor, first, second });
+                }
+                if self.sensors.len() <= slot {
+                    self.sensors.resize(slot + 1, None);
+                }
+                if let Some(known) = self.sensors.get_mut(slot) {
+                    *known = Some(node);
+                }
+            }
+            NodeKind::Branch(turnout) => {
+                if let Some(first) = self.turnouts.get(&turnout) {
+                    let (first, second) = (name(*first), name(node));
+                    return Err(LayoutError::TurnoutPlacedTwice { place, turnout, first, second });
+                }
+                self.turnouts.insert(turnout, node);
+            }
+            NodeKind::Merge(_) | NodeKind::Enter | NodeKind::Exit => {}
+        }
+        Ok(())
+    }
+}
+
+/// Letters, digits, `_` and `.`: no sign, so that `C13-20mm` can only be a landmark, and no space, so that
+/// `BR6 curved` can only be a leg.
+fn is_legal_name(name: &str) -> bool {
+    (1..=MAX_NAME_CHARACTERS).contains(&name.chars().count())
+        && name.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'))
+}
+
+/// Turns every stretch into two edges and checks that each rail end has exactly one.
+fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), LayoutError> {
+    if plan.stretches.len() > MAX_PAIRS {
+        let found = plan.stretches.len();
+        return Err(LayoutError::TooMany { what: "stretches", found, limit: MAX_PAIRS });
+    }
+    let mut edges = Vec::with_capacity(2 * plan.stretches.len());
+    // The edges that leave each node: ahead or straight, and curved.
+    let mut leaving: Vec<[Option<EdgeId>; 2]> = vec![[None; 2]; places.nodes.len()];
+    for (stretch, entry) in plan.stretches.iter().enumerate() {
+        let find = |name: &String| {
+            let unknown = || LayoutError::UnknownNode { stretch, node: name.clone() };
+            places.names.get(name).copied().ok_or_else(unknown)
+        };
+        let (from, to) = (find(&entry.from.node)?, find(&entry.to.node)?);
+        if !is_plausible(entry.length) {
+            return Err(LayoutError::IllegalLength { stretch, found: entry.length });
+        }
+        let there = Edge { from, leg: entry.from.leg, to, length: entry.length };
+        let back = Edge { from: to.reverse(), leg: entry.to.leg, to: from.reverse(), length: entry.length };
+        let first = EdgeId(NodeId::first_of(stretch).0);
+        for (id, edge, named) in [(first, there, &entry.from), (first.twin(), back, &entry.to)] {
+            let node = usize::from(edge.from.0);
+            let Some((name, kind)) = places.nodes.get(node) else { continue };
+            let slot = match (kind, edge.leg) {
+                (NodeKind::Exit, _) => {
+                    return Err(LayoutError::BeyondTrackEnd { stretch, node: named.node.clone() });
+                }
+                (NodeKind::Branch(_), None) => {
+                    return Err(LayoutError::LegMissing { stretch, node: named.node.clone() });
+                }
+                (NodeKind::Branch(_), Some(leg)) => usize::from(leg.is_curved()),
+                (_, Some(leg)) => {
+                    let node = named.node.clone();
+                    return Err(LayoutError::LegWithoutTurnout { stretch, node, leg });
+                }
+                (_, None) => 0,
+            };
+            let Some(taken) = leaving.get_mut(node).and_then(|ways| ways.get_mut(slot)) else { continue };
+            if let Some(first) = taken {
+                let first = usize::from(first.stretch().0);
+                return Err(LayoutError::RailEndTaken { stretch, first, node: name.clone(), leg: edge.leg });
+            }
+            *taken = Some(id);
+            edges.push(edge);
+        }
+    }
+    let nodes = places.nodes.iter().zip(&leaving).zip(0_u16..).map(|(((name, kind), ways), number)| {
+        let open = |leg| LayoutError::RailEndOpen { place: NodeId(number).pair(), node: name.clone(), leg };
+        let ways = match (kind, *ways) {
+            (NodeKind::Exit, _) => Ways::Ended,
+            (NodeKind::Branch(_), [Some(straight), Some(curved)]) => Ways::Legs { straight, curved },
+            (NodeKind::Branch(_), [None, _]) => return Err(open(Some(Leg::Straight))),
+            (NodeKind::Branch(_), [_, None]) => return Err(open(Some(Leg::Curved))),
+            (_, [Some(edge), _]) => Ways::Ahead(edge),
+            (_, [None, _]) => return Err(open(None)),
+        };
+        Ok(Node { name: name.clone(), kind: *kind, ways })
+    });
+    Ok((nodes.collect::<Result<_, _>>()?, edges))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::SensorId;
+    use crate::track::example::{oval_plan, stretch};
+    use crate::track::{PlanEntry, RailEnd, Stretch};
+    use std::format;
+    use std::string::ToString;
+
+    fn refusal(change: impl FnOnce(&mut LayoutPlan)) -> (PlanEntry, String) {
+        let mut plan = oval_plan();
+        change(&mut plan);
+        let error = Layout::build(&plan).unwrap_err();
+        (error.entry(), error.to_string())
+    }
+
+    #[test]
+    fn a_plan_is_refused_with_the_entry_and_the_value_at_fault() {
+        assert_eq!(
+            refusal(|plan| plan.survey.uncertainty = Length::from_mm(-1.0)),
+            (PlanEntry::Survey, "an uncertainty of -1 mm is not between 0 and 100000 mm".into())
+        );
+        for name in ["", "A+1", "two words", "a-name-with-signs", &"x".repeat(MAX_NAME_CHARACTERS + 1)] {
+            let (entry, text) =
+                refusal(|plan| plan.places[1] = Place::End { names: ["X".into(), name.into()] });
+            assert_eq!(entry, PlanEntry::Place(1));
+            assert_eq!(text, format!("the name `{name}` is not 1 to 32 letters, digits, `_` or `.`"));
+        }
+        assert_eq!(
+            refusal(|plan| plan.places.push(Place::End { names: ["X".into(), "A1".into()] })),
+            (PlanEntry::Place(9), "the name `A1` is taken; every node needs its own".into())
+        );
+        assert_eq!(
+            refusal(|plan| plan.places.push(Place::Sensor {
+                names: ["X1".into(), "X2".into()],
+                sensors: [SensorId(40), SensorId(2)]
+            })),
+            (PlanEntry::Place(9), "sensor 2 is placed at `B1` and again at `X2`".into())
+        );
+        assert_eq!(
+            refusal(|plan| plan
+                .places
+                .push(Place::Turnout { names: ["X".into(), "Y".into()], turnout: TurnoutId(1) })),
+            (PlanEntry::Place(9), "turnout 1 is placed at `BR1` and again at `X`".into())
+        );
+    }
+
+    #[test]
+    fn a_stretch_is_refused_with_its_number_and_the_node_at_fault() {
+        let last = PlanEntry::Stretch(9);
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("A1", "Z9", 1.0))),
+            (last, "no sensor, turnout or end is called `Z9`".into())
+        );
+        for (length, text) in [(f64::NAN, "NaN"), (-1.0, "-1"), (185_000.0, "185000"), (f64::INFINITY, "inf")]
+        {
+            assert_eq!(
+                refusal(|plan| plan.stretches[3].length = Length::from_mm(length)),
+                (
+                    PlanEntry::Stretch(3),
+                    format!("a length of {text} mm is not between 0 and 100000 mm (is it in millimetres?)")
+                )
+            );
+        }
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("BR1", "A1", 1.0))),
+            (last, "`BR1` has two legs: write `BR1 straight` or `BR1 curved`".into())
+        );
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("MR1 curved", "A1", 1.0))),
+            (last, "`MR1 curved` names a leg where there is only one way: write `MR1`".into())
+        );
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("EX1", "A1", 1.0))),
+            (last, "the track ends at `EX1`: edges leave an entry and reach an exit".into())
+        );
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("A2", "EN1", 1.0))),
+            (
+                last,
+                "there is an edge from `A2` already; each stretch is written once, in either direction"
+                    .into()
+            )
+        );
+        assert_eq!(
+            refusal(|plan| plan.stretches.push(stretch("D2", "MR2 straight", 100.0))),
+            (
+                last,
+                "there is an edge from `D2` already; each stretch is written once, in either direction"
+                    .into()
+            )
+        );
+        assert_eq!(
+            refusal(|plan| plan.stretches[0] = stretch("A1", "A2", 100.0)),
+            (PlanEntry::Stretch(0), "an edge that leaves `A1` comes back to the same rail end".into())
+        );
+    }
+
+    #[test]
+    fn an_open_rail_end_is_named() {
+        let open = |removed: usize| refusal(|plan| drop(plan.stretches.remove(removed)));
+        assert_eq!(
+            open(1),
+            (
+                PlanEntry::Place(1),
+                "no edge leads on from `B2`: join it to another node, or to an end if the track ends there"
+                    .into()
+            )
+        );
+        let (entry, text) = refusal(|plan| {
+            plan.stretches.truncate(2);
+            plan.places = vec![plan.places[0].clone(), plan.places[1].clone(), plan.places[4].clone()];
+            plan.stretches.push(stretch("B1", "A1", 10.0));
+        });
+        assert_eq!(entry, PlanEntry::Place(2));
+        assert!(text.starts_with("no edge leads on from `BR1 curved`"), "{text}");
+    }
+
+    #[test]
+    fn a_pair_takes_two_turnouts_of_the_layout() {
+        for (pair, turnout) in [([1, 3], 3), ([7, 1], 7), ([2, 2], 2)] {
+            assert_eq!(
+                refusal(|plan| plan.never_both_curved.push(pair.map(TurnoutId))),
+                (
+                    PlanEntry::Pair(0),
+                    format!(
+                        "turnout {turnout} makes no pair: it takes two different turnouts of this layout"
+                    )
+                )
+            );
+        }
+    }
+
+    #[test]
+    fn a_loop_of_no_length_is_refused_and_a_stretch_of_no_length_is_not() {
+        let mut plan = oval_plan();
+        plan.stretches[0].length = Length::ZERO;
+        assert!(Layout::build(&plan).is_ok());
+        for stretch in &mut plan.stretches {
+            stretch.length = Length::ZERO;
+        }
+        let error = Layout::build(&plan).unwrap_err();
+        assert!(matches!(error, LayoutError::LoopWithoutLength { .. }), "{error}");
+    }
+
+    #[test]
+    fn more_places_than_numbers_are_refused() {
+        let (entry, text) = refusal(|plan| {
+            plan.places = vec![Place::End { names: ["a".into(), "b".into()] }; MAX_PAIRS + 1];
+        });
+        assert_eq!(entry, PlanEntry::Plan);
+        assert_eq!(text, "32769 places are more than the 32768 that a layout can number");
+        let (entry, text) = refusal(|plan| {
+            let any = Stretch {
+                from: RailEnd { node: "A1".into(), leg: None },
+                to: RailEnd { node: "A1".into(), leg: None },
+                length: Length::ZERO,
+            };
+            plan.stretches = vec![any; MAX_PAIRS + 1];
+        });
+        assert_eq!(entry, PlanEntry::Plan);
+        assert_eq!(text, "32769 stretches are more than the 32768 that a layout can number");
+    }
+}

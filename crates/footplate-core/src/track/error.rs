@@ -1,0 +1,267 @@
+//! What can be wrong with a layout, and which entry of the plan is to blame.
+
+use alloc::string::String;
+use core::fmt;
+
+use crate::ids::{SensorId, TurnoutId};
+use crate::track::{Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS};
+use crate::units::Length;
+
+/// Why a plan is not a layout. Places, stretches and pairs are counted from 0 in the order of the plan.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum LayoutError {
+    /// More places or stretches than node and edge numbers can name.
+    TooMany {
+        /// `places` or `stretches`.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// The uncertainty of the lengths is not a length.
+    IllegalUncertainty {
+        /// What was given.
+        found: Length,
+    },
+    /// A name that could not be told from a landmark or from other text.
+    IllegalName {
+        /// The place.
+        place: usize,
+        /// Its name.
+        name: String,
+    },
+    /// Two nodes of one name.
+    DuplicateName {
+        /// The later place.
+        place: usize,
+        /// The name.
+        name: String,
+    },
+    /// One sensor at two nodes.
+    SensorPlacedTwice {
+        /// The later place.
+        place: usize,
+        /// The sensor.
+        sensor: SensorId,
+        /// The node that has it.
+        first: String,
+        /// The node that claims it, too.
+        second: String,
+    },
+    /// One turnout at two places.
+    TurnoutPlacedTwice {
+        /// The later place.
+        place: usize,
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The branch that has it.
+        first: String,
+        /// The branch that claims it, too.
+        second: String,
+    },
+    /// A stretch ends at a node that is no place's.
+    UnknownNode {
+        /// The stretch.
+        stretch: usize,
+        /// The name that nothing has.
+        node: String,
+    },
+    /// A stretch joins the legs of a turnout without saying which.
+    LegMissing {
+        /// The stretch.
+        stretch: usize,
+        /// The branch or merge.
+        node: String,
+    },
+    /// A leg where there is only one way.
+    LegWithoutTurnout {
+        /// The stretch.
+        stretch: usize,
+        /// The node.
+        node: String,
+        /// The leg given.
+        leg: Leg,
+    },
+    /// A stretch leaves an exit or reaches an entry.
+    BeyondTrackEnd {
+        /// The stretch.
+        stretch: usize,
+        /// The entry or exit.
+        node: String,
+    },
+    /// A negative, infinite, undefined or absurd length.
+    IllegalLength {
+        /// The stretch.
+        stretch: usize,
+        /// What was given.
+        found: Length,
+    },
+    /// Two stretches, or both ends of one, at one rail end.
+    RailEndTaken {
+        /// The later stretch.
+        stretch: usize,
+        /// The stretch that is there already.
+        first: usize,
+        /// The node by which a train would leave onto both.
+        node: String,
+        /// The leg, at a branch.
+        leg: Option<Leg>,
+    },
+    /// Nothing leads on from a node that is no exit.
+    RailEndOpen {
+        /// The place.
+        place: usize,
+        /// The node.
+        node: String,
+        /// The leg, at a branch.
+        leg: Option<Leg>,
+    },
+    /// A pair that is never both curved names a turnout that is nowhere, or one turnout twice.
+    IllegalPair {
+        /// The pair.
+        pair: usize,
+        /// The turnout.
+        turnout: TurnoutId,
+    },
+    /// A train could go round and round without getting anywhere.
+    LoopWithoutLength {
+        /// A place on the loop.
+        place: usize,
+        /// Its node.
+        node: String,
+    },
+    /// Too many ways from a node to the next sensors to keep in a table.
+    TooManyWays {
+        /// The place.
+        place: usize,
+        /// The node.
+        node: String,
+    },
+}
+
+/// The entry of a plan that an error is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlanEntry {
+    /// The plan as a whole.
+    Plan,
+    /// The uncertainty of its lengths.
+    Survey,
+    /// A place.
+    Place(usize),
+    /// A stretch.
+    Stretch(usize),
+    /// A pair of turnouts that are never both curved.
+    Pair(usize),
+}
+
+impl LayoutError {
+    /// The entry to look at.
+    #[must_use]
+    pub const fn entry(&self) -> PlanEntry {
+        match *self {
+            Self::TooMany { .. } => PlanEntry::Plan,
+            Self::IllegalUncertainty { .. } => PlanEntry::Survey,
+            Self::IllegalName { place, .. }
+            | Self::DuplicateName { place, .. }
+            | Self::SensorPlacedTwice { place, .. }
+            | Self::TurnoutPlacedTwice { place, .. }
+            | Self::RailEndOpen { place, .. }
+            | Self::LoopWithoutLength { place, .. }
+            | Self::TooManyWays { place, .. } => PlanEntry::Place(place),
+            Self::UnknownNode { stretch, .. }
+            | Self::LegMissing { stretch, .. }
+            | Self::LegWithoutTurnout { stretch, .. }
+            | Self::BeyondTrackEnd { stretch, .. }
+            | Self::IllegalLength { stretch, .. }
+            | Self::RailEndTaken { stretch, .. } => PlanEntry::Stretch(stretch),
+            Self::IllegalPair { pair, .. } => PlanEntry::Pair(pair),
+        }
+    }
+}
+
+/// `` `BR6` `` or `` `BR6 curved` ``.
+struct Named<'a>(&'a str, Option<Leg>);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.1 {
+            Some(leg) => write!(f, "`{} {leg}`", self.0),
+            None => write!(f, "`{}`", self.0),
+        }
+    }
+}
+
+impl fmt::Display for LayoutError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooMany { what, found, limit } => {
+                write!(f, "{found} {what} are more than the {limit} that a layout can number")
+            }
+            Self::IllegalUncertainty { found } => write!(
+                f,
+                "an uncertainty of {} mm is not between 0 and {} mm",
+                found.as_mm(),
+                MAX_EDGE_LENGTH.as_mm()
+            ),
+            Self::IllegalName { name, .. } => write!(
+                f,
+                "the name `{}` is not 1 to {MAX_NAME_CHARACTERS} letters, digits, `_` or `.`",
+                name.escape_debug()
+            ),
+            Self::DuplicateName { name, .. } => {
+                write!(f, "the name `{name}` is taken; every node needs its own")
+            }
+            Self::SensorPlacedTwice { sensor, first, second, .. } => {
+                write!(f, "sensor {sensor} is placed at `{first}` and again at `{second}`")
+            }
+            Self::TurnoutPlacedTwice { turnout, first, second, .. } => {
+                write!(f, "turnout {turnout} is placed at `{first}` and again at `{second}`")
+            }
+            Self::UnknownNode { node, .. } => {
+                write!(f, "no sensor, turnout or end is called `{}`", node.escape_debug())
+            }
+            Self::LegMissing { node, .. } => {
+                write!(f, "`{node}` has two legs: write `{node} straight` or `{node} curved`")
+            }
+            Self::LegWithoutTurnout { node, leg, .. } => {
+                write!(f, "`{node} {leg}` names a leg where there is only one way: write `{node}`")
+            }
+            Self::BeyondTrackEnd { node, .. } => {
+                write!(f, "the track ends at `{node}`: edges leave an entry and reach an exit")
+            }
+            Self::IllegalLength { found, .. } => write!(
+                f,
+                "a length of {} mm is not between 0 and {} mm (is it in millimetres?)",
+                found.as_mm(),
+                MAX_EDGE_LENGTH.as_mm()
+            ),
+            Self::RailEndTaken { stretch, first, node, leg } if stretch == first => {
+                write!(f, "an edge that leaves {} comes back to the same rail end", Named(node, *leg))
+            }
+            Self::RailEndTaken { node, leg, .. } => write!(
+                f,
+                "there is an edge from {} already; each stretch is written once, in either direction",
+                Named(node, *leg)
+            ),
+            Self::RailEndOpen { node, leg, .. } => write!(
+                f,
+                "no edge leads on from {}: join it to another node, or to an end if the track ends there",
+                Named(node, *leg)
+            ),
+            Self::IllegalPair { turnout, .. } => {
+                write!(f, "turnout {turnout} makes no pair: it takes two different turnouts of this layout")
+            }
+            Self::LoopWithoutLength { node, .. } => {
+                write!(f, "the edges from `{node}` come back to it after 0 mm: at least one must be longer")
+            }
+            Self::TooManyWays { node, .. } => write!(
+                f,
+                "there are too many ways from `{node}` to the next sensors: put sensors between the turnouts"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LayoutError {}

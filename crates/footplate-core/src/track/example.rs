@@ -1,0 +1,74 @@
+//! A small layout for the tests of this folder: an oval with a passing siding, and a track apart from it.
+//!
+//! ```text
+//!          +-- 200 -- B1 -- 200 --+
+//! A1 -100- 1                      2 -100- D1 --- 500 --- A1        EN1 -30- E1 -40- EX2
+//!          +-- 220 -- C1 -- 150 --+
+//! ```
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+
+use crate::ids::{SensorId, TurnoutId};
+use crate::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey};
+use crate::units::Length;
+
+pub(crate) fn oval() -> Layout {
+    Layout::build(&oval_plan()).unwrap()
+}
+
+pub(crate) fn oval_plan() -> LayoutPlan {
+    let sensor = |name: &str, number| Place::Sensor {
+        names: [format!("{name}1"), format!("{name}2")],
+        sensors: [SensorId(number), SensorId(number + 1)],
+    };
+    LayoutPlan {
+        name: "oval".into(),
+        survey: Survey { uncertainty: Length::from_mm(2.0), origin: "made up".into() },
+        places: vec![
+            sensor("A", 0),
+            sensor("B", 2),
+            sensor("C", 4),
+            sensor("D", 6),
+            turnout(1),
+            turnout(2),
+            sensor("E", 8),
+            end(1),
+            end(2),
+        ],
+        stretches: vec![
+            stretch("A1", "BR1", 100.0),
+            stretch("BR1 straight", "B1", 200.0),
+            stretch("BR1 curved", "C1", 220.0),
+            stretch("B1", "MR2 straight", 200.0),
+            stretch("C1", "MR2 curved", 150.0),
+            stretch("MR2", "D1", 100.0),
+            stretch("D1", "A1", 500.0),
+            stretch("EN1", "E1", 30.0),
+            stretch("E1", "EX2", 40.0),
+        ],
+        never_both_curved: vec![],
+    }
+}
+
+pub(crate) fn turnout(number: u16) -> Place {
+    Place::Turnout { names: [format!("BR{number}"), format!("MR{number}")], turnout: TurnoutId(number) }
+}
+
+pub(crate) fn end(number: u16) -> Place {
+    Place::End { names: [format!("EN{number}"), format!("EX{number}")] }
+}
+
+pub(crate) fn stretch(from: &str, to: &str, mm: f64) -> Stretch {
+    Stretch { from: rail_end(from), to: rail_end(to), length: Length::from_mm(mm) }
+}
+
+fn rail_end(text: &str) -> RailEnd {
+    let (node, leg) = match text.split_once(' ') {
+        Some((node, "straight")) => (node, Some(Leg::Straight)),
+        Some((node, "curved")) => (node, Some(Leg::Curved)),
+        _ => (text, None),
+    };
+    RailEnd { node: String::from(node), leg }
+}

@@ -1,0 +1,298 @@
+//! The track graph: nodes in pairs, edges in pairs, and what lies ahead of each node.
+//!
+//! The two nodes of a place are numbered 2p and 2p + 1, the two edges of a stretch 2s and 2s + 1. So the
+//! reverse of a node and the twin of an edge are one bit away, and exist by construction. Edges may be 0 mm
+//! long: nothing here divides by a length.
+
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
+use crate::track::hop::Hops;
+use crate::track::{Leg, Survey};
+use crate::units::Length;
+
+impl NodeId {
+    /// The node of the same place in the opposite direction of travel.
+    #[inline]
+    #[must_use]
+    pub const fn reverse(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+
+    pub(crate) const fn first_of(pair: usize) -> Self {
+        Self(2 * pair as u16)
+    }
+
+    pub(crate) const fn pair(self) -> usize {
+        self.0 as usize / 2
+    }
+}
+
+impl EdgeId {
+    /// The edge over the same rails in the opposite direction.
+    #[inline]
+    #[must_use]
+    pub const fn twin(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+
+    /// The rails themselves, the same for an edge and its twin.
+    #[inline]
+    #[must_use]
+    pub const fn stretch(self) -> StretchId {
+        StretchId(self.0 / 2)
+    }
+}
+
+/// One direction of travel over one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// What people call it.
+    pub name: String,
+    /// What is there.
+    pub kind: NodeKind,
+    /// Where it leads.
+    pub ways: Ways,
+}
+
+/// What is at a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NodeKind {
+    /// A trackside contact.
+    Sensor(SensorId),
+    /// A turnout, met at its toe.
+    Branch(TurnoutId),
+    /// A turnout, met from one of its legs.
+    Merge(TurnoutId),
+    /// The end of a track, on the way in.
+    Enter,
+    /// The end of a track, on the way out.
+    Exit,
+}
+
+/// The edges that leave a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ways {
+    /// One way ahead.
+    Ahead(EdgeId),
+    /// The turnout decides.
+    Legs {
+        /// The way while it lies straight.
+        straight: EdgeId,
+        /// The way while it lies curved.
+        curved: EdgeId,
+    },
+    /// None: the track ends.
+    Ended,
+}
+
+impl Ways {
+    /// The edges, the straight leg before the curved one.
+    pub fn edges(self) -> impl DoubleEndedIterator<Item = EdgeId> {
+        let (first, second) = match self {
+            Self::Ahead(edge) => (Some(edge), None),
+            Self::Legs { straight, curved } => (Some(straight), Some(curved)),
+            Self::Ended => (None, None),
+        };
+        first.into_iter().chain(second)
+    }
+}
+
+/// A stretch of rail, run over in one direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Where it begins.
+    pub from: NodeId,
+    /// The leg by which it leaves, when it begins at a branch.
+    pub leg: Option<Leg>,
+    /// Where it ends.
+    pub to: NodeId,
+    /// Its length, which may be zero.
+    pub length: Length,
+}
+
+/// A checked layout. Ids of another layout, or beyond this one's, name nothing: they give `None` or no ways.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    pub(crate) name: String,
+    pub(crate) survey: Survey,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) names: BTreeMap<String, NodeId>,
+    /// By the sensor's number.
+    pub(crate) sensors: Vec<Option<NodeId>>,
+    /// The branch of each turnout.
+    pub(crate) turnouts: BTreeMap<TurnoutId, NodeId>,
+    pub(crate) never_both_curved: Vec<[TurnoutId; 2]>,
+    pub(crate) hops: Hops,
+}
+
+impl Layout {
+    /// What people call the layout.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How well the lengths are known.
+    #[must_use]
+    pub const fn survey(&self) -> &Survey {
+        &self.survey
+    }
+
+    /// A node.
+    #[inline]
+    #[must_use]
+    pub fn node(&self, node: NodeId) -> Option<&Node> {
+        self.nodes.get(usize::from(node.0))
+    }
+
+    /// All nodes in the order of their numbers.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = (NodeId, &Node)> {
+        self.nodes.iter().enumerate().map(|(number, node)| (NodeId(number as u16), node))
+    }
+
+    /// The name of a node, or `?` for a node of another layout.
+    #[must_use]
+    pub fn node_name(&self, node: NodeId) -> &str {
+        self.node(node).map_or("?", |node| node.name.as_str())
+    }
+
+    /// The node of a name.
+    #[must_use]
+    pub fn node_named(&self, name: &str) -> Option<NodeId> {
+        self.names.get(name).copied()
+    }
+
+    /// The node at which a sensor reports.
+    #[inline]
+    #[must_use]
+    pub fn sensor_node(&self, sensor: SensorId) -> Option<NodeId> {
+        self.sensors.get(usize::from(sensor.0)).copied().flatten()
+    }
+
+    /// The sensor at a node.
+    #[inline]
+    #[must_use]
+    pub fn sensor_at(&self, node: NodeId) -> Option<SensorId> {
+        match self.node(node)?.kind {
+            NodeKind::Sensor(sensor) => Some(sensor),
+            _ => None,
+        }
+    }
+
+    /// The sensor of a name.
+    #[must_use]
+    pub fn sensor_named(&self, name: &str) -> Option<SensorId> {
+        self.sensor_at(self.node_named(name)?)
+    }
+
+    /// The name of a sensor, or `?` for a sensor this layout has not.
+    #[must_use]
+    pub fn sensor_name(&self, sensor: SensorId) -> &str {
+        self.sensor_node(sensor).map_or("?", |node| self.node_name(node))
+    }
+
+    /// All sensors in the order of their numbers.
+    pub fn sensors(&self) -> impl Iterator<Item = (SensorId, NodeId)> {
+        (0..).zip(&self.sensors).filter_map(|(number, node)| Some((SensorId(number), (*node)?)))
+    }
+
+    /// All turnouts in the order of their numbers, with their branches.
+    pub fn turnouts(&self) -> impl ExactSizeIterator<Item = (TurnoutId, NodeId)> {
+        self.turnouts.iter().map(|(turnout, branch)| (*turnout, *branch))
+    }
+
+    /// The branch of a turnout.
+    #[must_use]
+    pub fn branch(&self, turnout: TurnoutId) -> Option<NodeId> {
+        self.turnouts.get(&turnout).copied()
+    }
+
+    /// Pairs of turnouts of which at most one may lie for its curved leg.
+    #[must_use]
+    pub fn never_both_curved(&self) -> &[[TurnoutId; 2]] {
+        &self.never_both_curved
+    }
+
+    /// An edge.
+    #[inline]
+    #[must_use]
+    pub fn edge(&self, edge: EdgeId) -> Option<&Edge> {
+        self.edges.get(usize::from(edge.0))
+    }
+
+    /// All edges in the order of their numbers.
+    pub fn edges(&self) -> impl ExactSizeIterator<Item = (EdgeId, &Edge)> {
+        self.edges.iter().enumerate().map(|(number, edge)| (EdgeId(number as u16), edge))
+    }
+
+    /// How many stretches there are: edges without their twins.
+    #[must_use]
+    pub fn stretch_count(&self) -> usize {
+        self.edges.len() / 2
+    }
+
+    /// The length of all rails.
+    #[must_use]
+    pub fn total_length(&self) -> Length {
+        self.edges.iter().map(|edge| edge.length).sum::<Length>() / 2.0
+    }
+
+    /// The edge from one node to another, if one leads there directly; the shorter one of two legs.
+    #[must_use]
+    pub fn edge_between(&self, from: NodeId, to: NodeId) -> Option<EdgeId> {
+        self.ways(from)
+            .edges()
+            .filter_map(|id| Some((id, self.edge(id)?)))
+            .filter(|(_, edge)| edge.to == to)
+            .min_by(|(_, one), (_, other)| one.length.as_m().total_cmp(&other.length.as_m()))
+            .map(|(id, _)| id)
+    }
+
+    /// The edges that leave a node.
+    #[inline]
+    #[must_use]
+    pub fn ways(&self, node: NodeId) -> Ways {
+        self.node(node).map_or(Ways::Ended, |node| node.ways)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::oval;
+
+    #[test]
+    fn every_node_has_a_reverse_and_every_edge_an_equally_long_twin() {
+        let layout = oval();
+        for (id, _) in layout.nodes() {
+            assert_eq!(id.reverse().reverse(), id);
+            assert!(layout.node(id.reverse()).is_some());
+        }
+        for (id, edge) in layout.edges() {
+            let twin = layout.edge(id.twin()).unwrap();
+            assert_eq!((twin.from, twin.to), (edge.to.reverse(), edge.from.reverse()));
+            assert_eq!(twin.length, edge.length);
+            assert_eq!(id.stretch(), id.twin().stretch());
+            assert!(layout.ways(edge.from).edges().any(|way| way == id));
+        }
+        assert!((layout.total_length().as_mm() - 1_540.0).abs() < 1e-9, "{:?}", layout.total_length());
+    }
+
+    #[test]
+    fn names_and_numbers_lead_to_each_other() {
+        let layout = oval();
+        let node = layout.node_named("B2").unwrap();
+        assert_eq!(layout.sensor_at(node), Some(SensorId(3)));
+        assert_eq!(layout.sensor_node(SensorId(3)), Some(node));
+        assert_eq!(layout.sensor_name(SensorId(3)), "B2");
+        assert_eq!(layout.node_name(layout.branch(TurnoutId(2)).unwrap()), "BR2");
+        assert_eq!(layout.sensor_named("BR2"), None);
+        assert_eq!(layout.node_named("b2"), None);
+        assert_eq!(layout.sensor_name(SensorId(u16::MAX)), "?");
+        assert_eq!(layout.ways(NodeId(u16::MAX)), Ways::Ended);
+    }
+}

@@ -1,0 +1,24 @@
+//! Where trains can go: a layout as a directed graph, and the ways through it.
+//!
+//! Rails have no direction but trains do, so every place on the rails is a pair of nodes, one for each
+//! direction of travel, and every stretch of rail is a pair of edges. A [`LayoutPlan`] says what a file or a
+//! test says, by name; [`Layout::build`] checks it and answers from then on by small integers:
+//! - [`Layout::hops_from`]: which sensors may come next, in nanoseconds, from a table made once;
+//! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent.
+
+mod build;
+mod error;
+#[cfg(test)]
+mod example;
+mod graph;
+mod hop;
+mod plan;
+mod reach;
+mod turnout;
+
+pub use error::{LayoutError, PlanEntry};
+pub use graph::{Edge, Layout, Node, NodeKind, Ways};
+pub use hop::{Hop, HopId};
+pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, RailEnd, Stretch, Survey};
+pub use reach::{MAX_MISSED, Reach, Reaches};
+pub use turnout::{Leg, TurnoutNeed, TurnoutStates};

@@ -1,0 +1,176 @@
+//! Reaches: the sensors that may report next when some on the way stay silent.
+//!
+//! A contact is missed now and then: after C15 comes E11, and D12 between them said nothing. A reach is one to
+//! [`MAX_MISSED`] + 1 hops in a row; all but its last sensor were missed.
+
+use crate::ids::{EdgeId, NodeId, SensorId};
+use crate::track::{HopId, Layout, TurnoutStates};
+use crate::units::Length;
+
+/// Most sensors in a row that can be looked past. With one report in a hundred missed, three in a row are one
+/// in a million: beyond that the train is lost and must be found, not predicted.
+pub const MAX_MISSED: usize = 3;
+
+const MAX_HOPS: usize = MAX_MISSED + 1;
+
+/// A way to a sensor that may report next, past sensors that did not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// The node of the sensor or track end it reaches.
+    pub to: NodeId,
+    /// The sensor there; `None` at the end of a track.
+    pub sensor: Option<SensorId>,
+    /// How far it is.
+    pub length: Length,
+    hops: [HopId; MAX_HOPS],
+    count: u8,
+}
+
+impl Reach {
+    /// Its hops in the order of travel, at least one.
+    #[inline]
+    #[must_use]
+    pub fn hops(&self) -> &[HopId] {
+        self.hops.get(..usize::from(self.count)).unwrap_or_default()
+    }
+
+    /// How many sensors it passes that did not report.
+    #[inline]
+    #[must_use]
+    pub const fn missed(&self) -> usize {
+        (self.count as usize).saturating_sub(1)
+    }
+}
+
+impl Layout {
+    /// Every sensor and track end ahead of a node that a train may reach next, with up to `missed` sensors
+    /// in between that stay silent (at most [`MAX_MISSED`]). Depth first: a sensor comes before those behind
+    /// it. A turnout that a way meets twice may be thrown in between, so each meeting stands for itself.
+    /// Allocates nothing.
+    #[inline]
+    #[must_use]
+    pub fn reaches<'l>(&'l self, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Reaches<'l> {
+        let mut levels = [Level::default(); MAX_HOPS];
+        if let Some(first) = levels.first_mut() {
+            first.open = self.hops.range_from(from);
+        }
+        Reaches { layout: self, turnouts, deepest: missed.min(MAX_MISSED), levels, level: 0 }
+    }
+
+    /// The edges of a reach in the order of travel.
+    pub fn edges_of(&self, reach: Reach) -> impl Iterator<Item = EdgeId> {
+        (0..usize::from(reach.count))
+            .filter_map(move |place| self.hop(*reach.hops.get(place)?))
+            .flat_map(|hop| hop.edges.iter().copied())
+    }
+}
+
+/// The iterator of [`Layout::reaches`].
+#[derive(Debug, Clone)]
+pub struct Reaches<'l> {
+    layout: &'l Layout,
+    turnouts: &'l TurnoutStates,
+    /// The level of the last hop that may be added.
+    deepest: usize,
+    levels: [Level; MAX_HOPS],
+    level: usize,
+}
+
+/// Where the search stands after so many hops.
+#[derive(Debug, Clone, Copy, Default)]
+struct Level {
+    /// The hops still to be tried here, from the first to before the second.
+    open: (u32, u32),
+    /// The way to where they begin.
+    length: Length,
+    /// The hop tried last.
+    last: HopId,
+}
+
+impl Iterator for Reaches<'_> {
+    type Item = Reach;
+
+    #[inline]
+    fn next(&mut self) -> Option<Reach> {
+        loop {
+            let level = self.levels.get_mut(self.level)?;
+            if level.open.0 >= level.open.1 {
+                self.level = self.level.checked_sub(1)?;
+                continue;
+            }
+            level.last = HopId(level.open.0);
+            level.open.0 += 1;
+            let hop = self.layout.hop(level.last)?;
+            if !hop.is_open(self.turnouts) {
+                continue;
+            }
+            let length = level.length + hop.length;
+            let reach = Reach {
+                to: hop.to,
+                sensor: hop.sensor,
+                length,
+                hops: self.levels.map(|level| level.last),
+                count: self.level as u8 + 1,
+            };
+            if self.level < self.deepest && hop.sensor.is_some() {
+                self.level += 1;
+                let next = self.levels.get_mut(self.level)?;
+                *next = Level { open: self.layout.hops.range_from(hop.to), length, last: hop.id };
+            }
+            return Some(reach);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::TurnoutId;
+    use crate::track::Leg;
+    use crate::track::example::oval;
+    use std::format;
+    use std::string::String;
+    use std::vec::Vec;
+
+    fn reaches(from: &str, turnouts: &TurnoutStates, missed: usize) -> Vec<String> {
+        let layout = oval();
+        let from = layout.node_named(from).unwrap();
+        let text = |reach: Reach| {
+            let length: Length =
+                layout.edges_of(reach).filter_map(|edge| layout.edge(edge)).map(|edge| edge.length).sum();
+            assert!((length - reach.length).abs() < Length::from_mm(1e-9));
+            assert_eq!(reach.sensor, layout.sensor_at(reach.to));
+            format!("{} {:.0} past {}", layout.node_name(reach.to), reach.length.as_mm(), reach.missed())
+        };
+        layout.reaches(from, turnouts, missed).map(text).collect()
+    }
+
+    #[test]
+    fn without_missed_sensors_reaches_are_hops() {
+        assert_eq!(reaches("A1", &TurnoutStates::unknown(), 0), ["B1 300 past 0", "C1 320 past 0"]);
+    }
+
+    #[test]
+    fn a_missed_sensor_is_followed_by_those_behind_it() {
+        let curved: TurnoutStates = [(TurnoutId(1), Leg::Curved)].into_iter().collect();
+        assert_eq!(reaches("A1", &curved, 2), ["C1 320 past 0", "D1 570 past 1", "A1 1070 past 2"]);
+        assert_eq!(
+            reaches("A1", &TurnoutStates::unknown(), 1),
+            ["B1 300 past 0", "D1 600 past 1", "C1 320 past 0", "D1 570 past 1"]
+        );
+    }
+
+    #[test]
+    fn the_end_of_the_track_ends_a_reach() {
+        assert_eq!(reaches("EN1", &TurnoutStates::unknown(), 3), ["E1 30 past 0", "EX2 70 past 1"]);
+        assert!(reaches("EX2", &TurnoutStates::unknown(), 3).is_empty());
+    }
+
+    #[test]
+    fn no_more_sensors_are_looked_past_than_the_most() {
+        let straight: TurnoutStates = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
+        let deep = reaches("A1", &straight, usize::MAX);
+        assert_eq!(deep.len(), MAX_MISSED + 1);
+        assert_eq!(deep.last().unwrap(), "B1 1400 past 3");
+    }
+}
