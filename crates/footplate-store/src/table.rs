@@ -1,0 +1,426 @@
+//! The rows of a CSV file, one bounded line at a time, every field with its place.
+//!
+//! Quotes as in RFC 4180, except that a field may not run over several lines: a quote that someone forgot to
+//! close is then found where it is, and a file of any size is read in constant memory. A byte order mark,
+//! CRLF and empty lines are passed over.
+
+use std::fmt;
+use std::io::{self, BufRead, ErrorKind};
+
+use csv_core::{ReadRecordResult, Terminator};
+
+/// The longest line that is read. A row of any recording has some hundred bytes; the limit keeps a file that
+/// is no table at all from filling the memory.
+pub const LONGEST_LINE: usize = 64 * 1024;
+/// How much of a wrong value a message repeats, in characters.
+const LONGEST_SHOWN: usize = 60;
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// Why a table could not be read: where, what stands there and what would be right.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// The file could not be opened or read.
+    #[error("{file}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file has no line at all.
+    #[error("{file}: the file is empty; its first line should name the columns")]
+    Empty {
+        /// The file.
+        file: String,
+    },
+    /// A line longer than [`LONGEST_LINE`].
+    #[error(
+        "{file}, line {line}: the line is longer than {LONGEST_LINE} bytes; is this a CSV file with a row a line?"
+    )]
+    LineTooLong {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+    },
+    /// Bytes that are no UTF-8.
+    #[error("{file}, line {line}: byte {byte} of the line is no UTF-8 text; save the file as UTF-8")]
+    NotText {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The byte in the line, counted from 1.
+        byte: usize,
+    },
+    /// A quote without its partner.
+    #[error("{file}, line {line}: a quote is opened and not closed on the same line")]
+    QuoteNotClosed {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+    },
+    /// A row with too few or too many fields.
+    #[error("{file}, line {line}: {found} fields where the header names {expected} columns")]
+    FieldCount {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// How many fields it has.
+        found: usize,
+        /// How many columns there are.
+        expected: usize,
+    },
+    /// Two columns of one name.
+    #[error("{file}, line {line}: two columns are called `{name}`; give each its own name")]
+    ColumnTwice {
+        /// The file.
+        file: String,
+        /// The line of the header.
+        line: u64,
+        /// The name.
+        name: String,
+    },
+    /// A row of this kind needs a column that the file does not have.
+    #[error("{file}, line {line}: {row} needs the column `{column}`, which the header does not name")]
+    RowNeedsColumn {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// What kind of row it is, with its article.
+        row: &'static str,
+        /// The column.
+        column: &'static str,
+    },
+    /// A field that is not what it should be.
+    #[error("{file}, line {line}, column {number} ({column}): `{value}` should be {expected}")]
+    Field {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column, counted from 1.
+        number: usize,
+        /// The name of the column.
+        column: String,
+        /// What stands there, shortened if long.
+        value: String,
+        /// What would be right.
+        expected: String,
+    },
+}
+
+/// A column of a table that is known to be there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Column(usize);
+
+/// How the last line of a file ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LastLine {
+    /// With an end of line, as it should, or it has not been reached yet.
+    Ended,
+    /// Without one, but with all fields.
+    NotEnded,
+    /// In the middle of its fields.
+    CutOff,
+}
+
+/// A CSV file that is being read.
+pub(crate) struct Table<R> {
+    file: String,
+    input: R,
+    /// The line that was read last, counted from 1.
+    line: u64,
+    columns: Vec<String>,
+    last_line: LastLine,
+    bytes: Vec<u8>,
+    fields: Fields,
+}
+
+impl<R: BufRead> Table<R> {
+    /// Reads the header. `file` is what messages call the file.
+    pub(crate) fn open(file: &str, input: R) -> Result<Self, TableError> {
+        let mut table = Self {
+            file: file.to_owned(),
+            input,
+            line: 0,
+            columns: Vec::new(),
+            last_line: LastLine::Ended,
+            bytes: Vec::new(),
+            fields: Fields::default(),
+        };
+        while table.fields.is_empty() {
+            if matches!(table.read_line()?, Line::None) {
+                return Err(TableError::Empty { file: table.file });
+            }
+            table.split()?;
+        }
+        let mut names: Vec<String> = Vec::with_capacity(table.fields.len());
+        for name in table.fields.iter() {
+            if !name.is_empty() && names.iter().any(|earlier| earlier == name) {
+                return Err(TableError::ColumnTwice {
+                    file: table.file,
+                    line: table.line,
+                    name: shown(name),
+                });
+            }
+            names.push(name.to_owned());
+        }
+        table.columns = names;
+        Ok(table)
+    }
+
+    /// What the columns are called, in order.
+    pub(crate) fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// The column of that name.
+    pub(crate) fn column(&self, name: &str) -> Option<Column> {
+        self.columns.iter().position(|column| column == name).map(Column)
+    }
+
+    /// The columns of these names, if all are there.
+    pub(crate) fn columns_named<const N: usize>(&self, names: [&str; N]) -> Option<[Column; N]> {
+        let columns = names.map(|name| self.column(name));
+        columns.iter().all(Option::is_some).then(|| columns.map(Option::unwrap_or_default))
+    }
+
+    /// The line that was read last, counted from 1.
+    pub(crate) fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// How the file ended, once [`next_row`](Self::next_row) has found its end.
+    pub(crate) fn last_line(&self) -> LastLine {
+        self.last_line
+    }
+
+    /// Says that the last line broke off, after one of its fields turned out to be wrong.
+    pub(crate) fn last_line_is_cut_off(&mut self) {
+        self.last_line = LastLine::CutOff;
+    }
+
+    /// The next row that is not empty. A last line that breaks off before its last field is no row.
+    pub(crate) fn next_row(&mut self) -> Result<Option<Row<'_>>, TableError> {
+        loop {
+            let ended = match self.read_line()? {
+                Line::None => return Ok(None),
+                Line::Ended => true,
+                Line::NotEnded => false,
+            };
+            match self.split().and_then(|()| self.check_count()) {
+                Err(_) if !ended => {
+                    self.last_line = LastLine::CutOff;
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+                Ok(()) if self.fields.is_empty() => {}
+                Ok(()) => {
+                    if !ended {
+                        self.last_line = LastLine::NotEnded;
+                    }
+                    break;
+                }
+            }
+        }
+        Ok(Some(Row { file: &self.file, line: self.line, columns: &self.columns, fields: &self.fields }))
+    }
+
+    fn check_count(&self) -> Result<(), TableError> {
+        let (found, expected) = (self.fields.len(), self.columns.len());
+        if found == expected || found == 0 {
+            return Ok(());
+        }
+        Err(TableError::FieldCount { file: self.file.clone(), line: self.line, found, expected })
+    }
+
+    /// Reads one line into `bytes`, its line feed included or added, and never more than [`LONGEST_LINE`] of it.
+    fn read_line(&mut self) -> Result<Line, TableError> {
+        self.bytes.clear();
+        self.line += 1;
+        loop {
+            let available = match self.input.fill_buf() {
+                Ok(available) => available,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(source) => return Err(TableError::Read { file: self.file.clone(), source }),
+            };
+            if available.is_empty() {
+                if self.bytes.is_empty() {
+                    self.line -= 1;
+                    return Ok(Line::None);
+                }
+                self.bytes.push(b'\n');
+                return Ok(Line::NotEnded);
+            }
+            let end = available.iter().position(|byte| *byte == b'\n');
+            let part = end.map_or(available.len(), |end| end + 1);
+            if self.bytes.len() + part > LONGEST_LINE {
+                return Err(TableError::LineTooLong { file: self.file.clone(), line: self.line });
+            }
+            self.bytes.extend_from_slice(&available[..part]);
+            self.input.consume(part);
+            if end.is_some() {
+                return Ok(Line::Ended);
+            }
+        }
+    }
+
+    /// Splits the line that was read last into `fields`; none if it is empty.
+    fn split(&mut self) -> Result<(), TableError> {
+        let mut line = self.bytes.as_slice();
+        if self.line == 1 {
+            line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
+        }
+        match self.fields.split(line) {
+            Ok(()) => Ok(()),
+            Err(SplitError::NotText { byte }) => {
+                Err(TableError::NotText { file: self.file.clone(), line: self.line, byte })
+            }
+            Err(SplitError::QuoteNotClosed) => {
+                Err(TableError::QuoteNotClosed { file: self.file.clone(), line: self.line })
+            }
+        }
+    }
+}
+
+enum Line {
+    None,
+    Ended,
+    NotEnded,
+}
+
+/// One row of a table.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'t> {
+    file: &'t str,
+    line: u64,
+    columns: &'t [String],
+    fields: &'t Fields,
+}
+
+impl<'t> Row<'t> {
+    /// The line of the file, counted from 1.
+    pub(crate) fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// The text of a field, without the spaces around it.
+    pub(crate) fn text(&self, column: Column) -> &'t str {
+        self.fields.get(column.0)
+    }
+
+    /// What `read` makes of a field, or an error that says what it should be.
+    pub(crate) fn read<T>(
+        &self,
+        column: Column,
+        expected: &str,
+        read: impl FnOnce(&str) -> Option<T>,
+    ) -> Result<T, TableError> {
+        read(self.text(column)).ok_or_else(|| self.wrong(column, expected))
+    }
+
+    /// The error of a field that should be something else.
+    pub(crate) fn wrong(&self, column: Column, expected: impl Into<String>) -> TableError {
+        TableError::Field {
+            file: self.file.to_owned(),
+            line: self.line,
+            number: column.0 + 1,
+            column: self.columns.get(column.0).map_or_else(String::new, |name| shown(name)),
+            value: shown(self.text(column)),
+            expected: expected.into(),
+        }
+    }
+
+    /// A column that rows of this kind cannot do without.
+    pub(crate) fn needs(
+        &self,
+        column: Option<Column>,
+        name: &'static str,
+        row: &'static str,
+    ) -> Result<Column, TableError> {
+        column.ok_or_else(|| self.lacks(name, row))
+    }
+
+    /// The error of a row whose kind needs a column that the file does not have.
+    pub(crate) fn lacks(&self, column: &'static str, row: &'static str) -> TableError {
+        TableError::RowNeedsColumn { file: self.file.to_owned(), line: self.line, row, column }
+    }
+}
+
+/// The fields of one line, unquoted.
+#[derive(Default)]
+struct Fields {
+    text: String,
+    /// Where each field ends in `text`.
+    ends: Vec<usize>,
+    /// Buffers of the parser, kept for the next line.
+    parsed: Vec<u8>,
+}
+
+enum SplitError {
+    NotText { byte: usize },
+    QuoteNotClosed,
+}
+
+impl Fields {
+    /// Splits a line that ends with a line feed.
+    fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
+        self.text.clear();
+        self.ends.clear();
+        let text = std::str::from_utf8(line)
+            .map_err(|error| SplitError::NotText { byte: error.valid_up_to() + 1 })?;
+        if text.trim().is_empty() {
+            return Ok(());
+        }
+        // Unquoting only removes bytes, and a line of n commas has at most n + 1 fields.
+        self.parsed.resize(line.len(), 0);
+        self.ends.resize(line.iter().filter(|byte| **byte == b',').count() + 1, 0);
+        let mut parser = csv_core::ReaderBuilder::new().terminator(Terminator::Any(b'\n')).build();
+        let (result, _, written, fields) = parser.read_record(line, &mut self.parsed, &mut self.ends);
+        self.ends.truncate(fields);
+        if !matches!(result, ReadRecordResult::Record) {
+            return Err(SplitError::QuoteNotClosed);
+        }
+        // Quotes are ASCII: without them the text is still text.
+        self.text.push_str(std::str::from_utf8(&self.parsed[..written]).unwrap_or_default());
+        Ok(())
+    }
+
+    fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    fn get(&self, index: usize) -> &str {
+        let begin = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
+        let end = self.ends.get(index).copied().unwrap_or(begin);
+        self.text.get(begin..end).unwrap_or_default().trim()
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &str> {
+        (0..self.len()).map(|index| self.get(index))
+    }
+}
+
+/// A value as messages repeat it: on one line and not too long.
+pub(crate) fn shown(value: &str) -> String {
+    let mut text: String = value.chars().take(LONGEST_SHOWN).flat_map(char::escape_debug).collect();
+    if value.chars().nth(LONGEST_SHOWN).is_some() {
+        text.push('…');
+    }
+    text
+}
+
+impl<R> fmt::Debug for Table<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Table").field("file", &self.file).field("line", &self.line).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,6 @@
+//! What the store promises, a file a promise.
+
+mod bad_logs;
+mod logs_round_trip;
+mod real_logs;
+mod recordings;
