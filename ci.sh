@@ -66,7 +66,7 @@ step_lint() {
 
 step_test() {
   need_nextest
-  cargo nextest run --workspace
+  cargo nextest run --workspace --no-fail-fast
   cargo test --doc --workspace --quiet
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use pulldown_cmark::{Event, Parser, Tag, TagEnd};
 
-use crate::project::{Fault, TextFile, assert_none, exists, paths, text_files};
+use crate::project::{Fault, TextFile, assert_none, paths, text_files};
 
 const READING_ORDER: &str = "docs/README.md";
 
@@ -67,17 +67,34 @@ fn follow(page: &str, link: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
+/// Everything a link can lead to: the project's files and the folders they are in.
+struct Targets(BTreeSet<String>);
+
+impl Targets {
+    fn read() -> Self {
+        let paths = paths();
+        let ends = |path: &str| path.match_indices('/').map(|(at, _)| at).collect::<Vec<_>>();
+        let folders = paths.iter().flat_map(|path| ends(path).into_iter().filter_map(|end| path.get(..end)));
+        Self(folders.map(String::from).chain(paths.iter().cloned()).collect())
+    }
+
+    /// Whether a file or folder of this path from the top belongs to the project.
+    fn contains(&self, path: &str) -> bool {
+        self.0.contains(path.trim_end_matches('/'))
+    }
+}
+
 fn pages() -> Vec<TextFile> {
     text_files(&[".md"])
 }
 
-fn link_objection(pages: &[TextFile], page: &str, link: &str) -> Option<String> {
+fn link_objection(pages: &[TextFile], targets: &Targets, page: &str, link: &str) -> Option<String> {
     if link.contains("://") || link.starts_with("mailto:") {
         return None;
     }
     let (file, heading) = link.split_once('#').map_or((link, None), |(file, heading)| (file, Some(heading)));
     let target = if file.is_empty() { Some(page.to_string()) } else { follow(page, file) };
-    let Some(target) = target.filter(|target| exists(target)) else {
+    let Some(target) = target.filter(|target| targets.contains(target)) else {
         return Some(format!("links to {link}, which is not there"));
     };
     let heading = heading?;
@@ -88,11 +105,11 @@ fn link_objection(pages: &[TextFile], page: &str, link: &str) -> Option<String> 
 
 #[test]
 fn every_relative_link_leads_somewhere() {
-    let all = pages();
+    let (all, targets) = (pages(), Targets::read());
     let mut faults = Vec::new();
     for file in &all {
         for link in Page::read(&file.text).links {
-            if let Some(what) = link_objection(&all, &file.path, &link.target) {
+            if let Some(what) = link_objection(&all, &targets, &file.path, &link.target) {
                 faults.push(Fault { path: file.path.clone(), line: link.line, what });
             }
         }
@@ -102,14 +119,14 @@ fn every_relative_link_leads_somewhere() {
 
 #[test]
 fn every_path_named_in_passing_exists() {
-    let folders: BTreeSet<String> =
-        paths().iter().filter_map(|path| Some(path.split_once('/')?.0.to_string())).collect();
+    let targets = Targets::read();
     let mut faults = Vec::new();
     // What a change log tells of may be gone by now.
     for file in pages().into_iter().filter(|file| file.path != "CHANGELOG.md") {
         for span in Page::read(&file.text).code_spans {
-            let is_path = span.target.split_once('/').is_some_and(|(first, _)| folders.contains(first));
-            if is_path && !span.target.contains(['*', '{', '…', ' ', '<']) && !exists(&span.target) {
+            let is_path = span.target.split_once('/').is_some_and(|(first, _)| targets.contains(first));
+            if is_path && !span.target.contains(['*', '{', '…', ' ', '<']) && !targets.contains(&span.target)
+            {
                 let what = format!("names {}, which is not there", span.target);
                 faults.push(Fault { path: file.path.clone(), line: span.line, what });
             }
@@ -143,6 +160,7 @@ fn a_dead_link_and_a_missing_heading_are_noticed() {
     assert_eq!(page.links.iter().map(|l| (l.line, l.target.as_str())).collect::<Vec<_>>(), [(3, "two.md")]);
     assert_eq!(page.code_spans.len(), 1);
     assert!(page.anchors.contains("one"));
-    assert!(link_objection(&[], "README.md", "no-such-page.md").is_some());
-    assert!(link_objection(&[], "README.md", "https://example.org").is_none());
+    let targets = Targets(BTreeSet::new());
+    assert!(link_objection(&[], &targets, "README.md", "no-such-page.md").is_some());
+    assert!(link_objection(&[], &targets, "README.md", "https://example.org").is_none());
 }

@@ -46,8 +46,11 @@ pub(crate) fn paths() -> Vec<String> {
         .expect("git should be installed: it knows which files belong to the project");
     assert!(list.status.success(), "git ls-files failed: {}", String::from_utf8_lossy(&list.stderr));
     let names = String::from_utf8(list.stdout).expect("file names should be UTF-8");
-    let mut paths: Vec<String> =
-        names.split_terminator('\0').map(String::from).filter(|p| exists(p)).collect();
+    let mut paths: Vec<String> = names
+        .split_terminator('\0')
+        .map(String::from)
+        .filter(|path| Path::new(top()).join(path).exists())
+        .collect();
     paths.sort();
     paths.dedup();
     paths
@@ -68,11 +71,6 @@ pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
 pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
     let below = text_files(&[".rs"]).into_iter().filter(|file| file.path.starts_with(folder));
     below.map(|file| Source::read(&file.path, &file.text)).collect()
-}
-
-/// Whether a file or folder of this path from the top is there.
-pub(crate) fn exists(path: &str) -> bool {
-    Path::new(top()).join(path).exists()
 }
 
 fn top() -> &'static str {
