@@ -1,3 +1,47 @@
-//! The program: the only clock, sockets and threads.
+//! The program: command line, clock, sockets and threads around the crates that have none.
 
-fn main() {}
+mod commands;
+
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use commands::{Command, Outcome};
+
+/// Exit status when the usage or the input is wrong; the command line parser ends with it, too.
+const BAD_INPUT: u8 = 2;
+
+/// Measures, models and predicts how trains move, with true uncertainty on every number.
+#[derive(Parser)]
+#[command(
+    version,
+    arg_required_else_help = true,
+    after_help = "Exit status: 0 done, 1 the result falls short, 2 wrong usage or input."
+)]
+struct Footplate {
+    #[command(subcommand)]
+    command: Command,
+}
+
+fn main() -> ExitCode {
+    let mut output = std::io::stdout().lock();
+    let result = Footplate::parse().command.run(&mut output).and_then(|outcome| {
+        output.flush()?;
+        Ok(outcome)
+    });
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::FallsShort) => ExitCode::FAILURE,
+        Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(BAD_INPUT)
+        }
+    }
+}
+
+/// Whether the reader of our output has seen enough, as `head` does.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,42 @@
+//! The list of verbs, and how each of them may end.
+
+use std::io::Write;
+
+use super::completions;
+
+/// Makes the list of verbs from the names of their files.
+macro_rules! verbs {
+    ($($Verb:ident: $file:ident,)+) => {
+        /// What the program is asked to do.
+        #[derive(clap::Subcommand)]
+        pub(crate) enum Command {
+            $($Verb($file::Arguments),)+
+        }
+
+        impl Command {
+            /// Does it, and writes the result to `output`.
+            ///
+            /// # Errors
+            /// What was wrong with the usage or the input, and what would be right.
+            pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+                match self {
+                    $(Self::$Verb(arguments) => arguments.run(output),)+
+                }
+            }
+        }
+    };
+}
+
+verbs! {
+    Completions: completions,
+}
+
+/// How a verb ended that was asked rightly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// As wanted.
+    Done,
+    /// It worked, but the result is not good enough: a check failed, a target was missed.
+    #[expect(dead_code, reason = "the first verb that scores a result takes this line away")]
+    FallsShort,
+}

@@ -1,0 +1,10 @@
+//! The verbs of the program, a file each.
+//!
+//! To add one: write `commands/VERB.rs` with a `pub(crate) struct Arguments` (its documentation is the help) that
+//! has `fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome>`, name the file below and in the list of
+//! `command.rs`. A verb writes its result to `output` and what it has to say about itself to standard error.
+
+mod command;
+mod completions;
+
+pub(crate) use command::{Command, Outcome};
