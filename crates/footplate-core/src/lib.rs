@@ -22,6 +22,7 @@ extern crate std;
 mod estimate;
 mod event;
 mod ids;
+pub mod kinematics;
 mod time;
 pub mod track;
 mod units;

@@ -1,0 +1,15 @@
+//! Motion in closed form: what a train does between two moments, and when it is where.
+//!
+//! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
+//! - [`SpeedChange`] is what a decoder makes of a new throttle step.
+
+mod motion;
+mod phase;
+mod slow_end;
+mod speed_change;
+
+pub use motion::{Motion, MotionState};
+pub use speed_change::{
+    ConstantAcceleration, ConstantJerk, Lag, MidStep, Smooth, SpeedChange, SpeedLaw, StepRamp, StepTable,
+    StepTableError,
+};

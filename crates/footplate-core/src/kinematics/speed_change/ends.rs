@@ -1,0 +1,104 @@
+//! What all laws of speed change agree on: before the change one steady speed, after it another.
+
+use crate::kinematics::motion::MotionState;
+use crate::kinematics::phase::Triple;
+use crate::time::TimeSpan;
+use crate::units::{Acceleration, Length, Speed};
+
+/// The two speeds of a change, its duration and its distance, turned so that the train runs forwards.
+///
+/// Plain numbers in m, m/s and s. A change that is told to take less than no time takes none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ends {
+    /// 1, or −1 for a train that runs towards smaller distances.
+    direction: f64,
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) duration: f64,
+    pub(super) distance: f64,
+}
+
+impl Ends {
+    /// For laws that are symmetric in time: their mean speed is the mean of the two speeds.
+    #[inline]
+    pub(super) fn symmetric(from: Speed, to: Speed, duration: TimeSpan) -> Self {
+        let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
+        let duration = duration.as_s().max(0.0);
+        Self::new(from, to, duration, 0.5 * (from + to) * duration)
+    }
+
+    #[inline]
+    pub(super) fn new(from: f64, to: f64, duration: f64, distance: f64) -> Self {
+        let direction = if from + to < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            direction,
+            from: direction * from,
+            to: direction * to,
+            duration,
+            distance: direction * distance,
+        }
+    }
+
+    /// `numerator` per second of the change, per second squared …; zero for a change that takes no time.
+    #[inline]
+    pub(super) fn per_duration(&self, numerator: f64) -> f64 {
+        if self.duration > 0.0 { numerator / self.duration } else { 0.0 }
+    }
+
+    /// Whether the train turns around on the way, so that distances are passed twice.
+    #[inline]
+    fn turns_around(&self) -> bool {
+        self.from < 0.0 || self.to < 0.0
+    }
+
+    /// The state at any time, from the law's own state `inside` the change.
+    #[inline]
+    pub(super) fn state_at(&self, time: TimeSpan, inside: impl Fn(f64) -> Triple) -> MotionState {
+        let time = time.as_s();
+        let (distance, speed, acceleration) = inside(time.max(0.0).min(self.duration));
+        let (before, after) = (time.min(0.0), (time - self.duration).max(0.0));
+        let changing = before == 0.0 && after == 0.0;
+        // At both borders the law itself has the exact speed, except one that takes no time.
+        let speed = if after > 0.0 { self.to } else { speed };
+        self.turned((
+            distance + self.from * before + self.to * after,
+            if before < 0.0 { self.from } else { speed },
+            if changing { acceleration } else { 0.0 },
+        ))
+    }
+
+    /// The time at any distance, from the law's own time `inside` the change.
+    #[inline]
+    pub(super) fn time_at(&self, distance: Length, inside: impl Fn(f64) -> f64) -> Option<TimeSpan> {
+        let distance = self.direction * distance.as_m();
+        if !distance.is_finite() || self.turns_around() {
+            return None;
+        }
+        let seconds = if distance < 0.0 {
+            distance / self.from
+        } else if distance > self.distance {
+            self.duration + (distance - self.distance) / self.to
+        } else {
+            inside(distance)
+        };
+        seconds.is_finite().then(|| TimeSpan::from_s(seconds))
+    }
+
+    pub(super) fn duration(&self) -> TimeSpan {
+        TimeSpan::from_s(self.duration)
+    }
+
+    pub(super) fn distance(&self) -> Length {
+        Length::from_m(self.direction * self.distance)
+    }
+
+    /// Back from forwards to the direction in which the train really runs.
+    #[inline]
+    fn turned(&self, (distance, speed, acceleration): Triple) -> MotionState {
+        MotionState {
+            distance: Length::from_m(self.direction * distance),
+            speed: Speed::from_m_per_s(self.direction * speed),
+            acceleration: Acceleration::from_m_per_s2(self.direction * acceleration),
+        }
+    }
+}
