@@ -103,7 +103,8 @@ impl<'a> SinceCommandLog<'a> {
             let counted = i64::from(ticks.wrapping_sub(from));
             let counted = TimeSpan::from_us(counted * 1_000_000 / TICKS_PER_S);
             if (counted - since).abs() > AGREEMENT {
-                let expected = since.as_ns() / 1_000 * TICKS_PER_S / 1_000_000;
+                // A slip of the pen may make centuries of the seconds, and ticks beyond 64 bits of those.
+                let expected = i128::from(since.as_ns()) * i128::from(TICKS_PER_S) / 1_000_000_000;
                 let expected = from.wrapping_add(u32::try_from(expected).unwrap_or(u32::MAX));
                 return Err(
                     row.wrong(column, format!("{expected}, if the seconds since the command are right"))
