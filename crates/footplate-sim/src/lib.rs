@@ -1,1 +1,46 @@
 //! A seeded world of trains, track and sensors, whose truth only scorers see.
+//!
+//! The referee of every claim that Footplate makes about accuracy. It shares no formula with the estimator:
+//! decoders and motors are processes run forward a millisecond at a time, contacts close where the rails
+//! really put them, and polls read them when the line lets them. What a program would have recorded comes out
+//! as [`Event`](footplate_core::Event)s; what really happened as a [`RunTruth`] beside them.
+//!
+//! One seed is one world, on every machine and in every release: see [`World::run`].
+//!
+//! ```text
+//! run            a script happens in a world: events and their truth
+//! host  script   the program that polls and the person with the tape
+//! rolling  load  a train on rails       poller  contacts  gates
+//! motor  law  train  speed_table        path  circuit  track
+//! draws
+//! ```
+
+mod circuit;
+mod contacts;
+mod draws;
+mod gates;
+mod host;
+mod law;
+mod load;
+mod motor;
+mod path;
+mod poller;
+mod rolling;
+mod run;
+mod script;
+mod speed_table;
+mod track;
+mod train;
+mod truth;
+
+pub use circuit::{Circuit, CircuitError};
+pub use contacts::{Cause, Faults};
+pub use gates::GatePass;
+pub use law::{Law, LawFamily};
+pub use poller::Link;
+pub use run::{Conditions, SimulatedRun, World};
+pub use script::{Order, Script, Start, What, When};
+pub use speed_table::{Shape, SpeedTable};
+pub use track::TrueTrack;
+pub use train::{StopScatter, Train};
+pub use truth::{CommandTruth, Motion, ReportTruth, RunTruth, StopTruth};

@@ -1,0 +1,142 @@
+//! A way round a layout that leads back to where it began, and the turnouts it needs.
+
+use std::collections::BTreeMap;
+
+use footplate_core::track::{Layout, Leg, NodeKind, TurnoutStates, Ways};
+use footplate_core::{EdgeId, Length, NodeId, SensorId, TurnoutId};
+
+use crate::draws::{Draws, Purpose};
+
+/// Ways tried before the best of them is taken (chosen: finds a loop of eight sensors and more on both course
+/// layouts for every seed tried).
+const TRIES: usize = 400;
+/// A way this many edges long that has not come back is given up.
+const LONGEST_WAY: usize = 400;
+
+/// A closed way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Circuit {
+    edges: Vec<EdgeId>,
+    turnouts: BTreeMap<TurnoutId, Leg>,
+}
+
+/// Why there is no circuit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CircuitError {
+    /// No way out and back was found on the layout.
+    #[error(
+        "no circuit with two sensors found on layout `{layout}`; name a layout on which a train can run round"
+    )]
+    NoneFound {
+        /// The layout.
+        layout: String,
+    },
+    /// The turnouts given lead elsewhere.
+    #[error(
+        "the way from {start} does not come back to it as the turnouts lie: it ends at {reached}; set the \
+         turnouts of a loop through {start}"
+    )]
+    DoesNotReturn {
+        /// The node it began at.
+        start: String,
+        /// The node beyond which there is no way, or at which the search was given up.
+        reached: String,
+    },
+}
+
+impl Circuit {
+    /// The way that leads from a node back to it as the turnouts lie; an unknown turnout counts as straight.
+    ///
+    /// # Errors
+    /// [`CircuitError::DoesNotReturn`] if it leads off the layout or into another loop.
+    pub fn from_turnouts(
+        layout: &Layout,
+        start: NodeId,
+        states: &TurnoutStates,
+    ) -> Result<Self, CircuitError> {
+        let choose = |turnout| states.get(turnout).unwrap_or(Leg::Straight);
+        let walked = walk(layout, start, choose);
+        walked.map_err(|reached| CircuitError::DoesNotReturn {
+            start: layout.node_name(start).to_owned(),
+            reached: layout.node_name(reached).to_owned(),
+        })
+    }
+
+    /// A circuit with many sensors: the best of many random ways, the same for the same seed.
+    ///
+    /// # Errors
+    /// [`CircuitError::NoneFound`] if no way came back.
+    pub fn draw(layout: &Layout, seed: u64) -> Result<Self, CircuitError> {
+        let mut draws = Draws::new(seed, Purpose::Scenario);
+        let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+        let mut best: Option<(usize, Self)> = None;
+        for _ in 0..TRIES {
+            let Some(&start) = starts.get(draws.below(starts.len())) else { break };
+            let leg = |_| Leg::from_curved(draws.chance(0.5));
+            let Ok(circuit) = walk(layout, start, leg) else { continue };
+            let sensors = circuit.sensors(layout).len();
+            if sensors >= 2 && best.as_ref().is_none_or(|(most, _)| sensors > *most) {
+                best = Some((sensors, circuit));
+            }
+        }
+        best.map(|(_, circuit)| circuit)
+            .ok_or_else(|| CircuitError::NoneFound { layout: layout.name().to_owned() })
+    }
+
+    /// Its edges, in the order of travel; the last ends where the first begins.
+    #[must_use]
+    pub fn edges(&self) -> &[EdgeId] {
+        &self.edges
+    }
+
+    /// The turnouts on it and how they have to lie.
+    pub fn turnouts(&self) -> impl ExactSizeIterator<Item = (TurnoutId, Leg)> {
+        self.turnouts.iter().map(|(turnout, leg)| (*turnout, *leg))
+    }
+
+    /// The sensors on it, in the order of travel.
+    #[must_use]
+    pub fn sensors(&self, layout: &Layout) -> Vec<SensorId> {
+        self.edges.iter().filter_map(|edge| layout.sensor_at(layout.edge(*edge)?.from)).collect()
+    }
+
+    /// The sum of its edges as the layout has them.
+    #[must_use]
+    pub fn length(&self, layout: &Layout) -> Length {
+        self.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum()
+    }
+}
+
+/// Walks until the way returns to its start; `choose` decides each turnout once. Fails with the last node.
+fn walk(layout: &Layout, start: NodeId, mut choose: impl FnMut(TurnoutId) -> Leg) -> Result<Circuit, NodeId> {
+    let mut turnouts: BTreeMap<TurnoutId, Leg> = BTreeMap::new();
+    let mut edges: Vec<EdgeId> = Vec::new();
+    let mut node = start;
+    for _ in 0..LONGEST_WAY {
+        let id = match (layout.ways(node), layout.node(node).map(|node| node.kind)) {
+            (Ways::Ahead(edge), _) => edge,
+            (Ways::Legs { straight, curved }, Some(NodeKind::Branch(turnout))) => {
+                let leg = *turnouts.entry(turnout).or_insert_with(|| choose(turnout));
+                if leg.is_curved() { curved } else { straight }
+            }
+            _ => return Err(node),
+        };
+        let Some(edge) = layout.edge(id) else { return Err(node) };
+        // Through a turnout from a leg: it has to lie for that leg, which is where the edge's twin leaves.
+        if let Some(NodeKind::Merge(turnout)) = layout.node(edge.to).map(|node| node.kind) {
+            let leg = layout.edge(id.twin()).and_then(|twin| twin.leg).ok_or(node)?;
+            if *turnouts.entry(turnout).or_insert(leg) != leg {
+                return Err(edge.to);
+            }
+        }
+        edges.push(id);
+        node = edge.to;
+        if node == start {
+            let curved = |turnout: &TurnoutId| turnouts.get(turnout).is_some_and(|leg| leg.is_curved());
+            let clash = layout.never_both_curved().iter().any(|pair| pair.iter().all(curved));
+            return if clash { Err(node) } else { Ok(Circuit { edges, turnouts }) };
+        }
+    }
+    Err(node)
+}

@@ -1,0 +1,92 @@
+//! What makes a train faster or slower than its table at every step: the run, the day, the rail.
+
+use crate::draws::Draws;
+use crate::motor::STEP_S;
+use crate::train::Train;
+
+/// Time in which a train's speed takes in a change of the rail under it (chosen: a coach length at mid speed).
+const RAIL_LAG_S: f64 = 0.15;
+/// How often the wander of speed is drawn anew (chosen: well below the time over which it forgets).
+const WANDER_STEP_S: f64 = 0.02;
+/// Speed while the shoe crosses a dirty spot over speed before (chosen; the lag lets little of it through).
+const DIRTY_FACTOR: f64 = 0.85;
+/// Length of a dirty spot (chosen).
+pub(crate) const DIRTY_MM: f64 = 15.0;
+/// Below this wheel speed a train may stall on a dirty spot (chosen: steps 1 to 4 of steep engines).
+const STALL_BELOW_MM_PER_S: f64 = 50.0;
+/// How often it does (chosen).
+const STALL_CHANCE: f64 = 0.15;
+
+/// All influences on the speed of one run, as a factor on the speed of the wheels.
+#[derive(Debug)]
+pub(crate) struct Load<'train> {
+    train: &'train Train,
+    draws: Draws,
+    run: f64,
+    wander: f64,
+    until_wander: f64,
+    /// 0 cold, 1 warm.
+    warmth: f64,
+    /// The factor after the lag.
+    factor: f64,
+}
+
+impl<'train> Load<'train> {
+    /// The influences at the start of a run on a rail with a factor.
+    pub(crate) fn new(train: &'train Train, warmth: f64, rail: f64, mut draws: Draws) -> Self {
+        let run = draws.normal(1.0, train.run_deviation.as_parts());
+        let wander = draws.normal(0.0, train.wander.as_parts());
+        let mut load = Self { train, draws, run, wander, until_wander: WANDER_STEP_S, warmth, factor: 1.0 };
+        load.factor = load.goal(rail);
+        load
+    }
+
+    /// The speed of this run over that of an average one.
+    pub(crate) fn run(&self) -> f64 {
+        self.run
+    }
+
+    /// Speed over that of the wheels on a level straight track, now.
+    pub(crate) fn factor(&self) -> f64 {
+        self.factor
+    }
+
+    /// How warm the train is now.
+    pub(crate) fn warmth(&self) -> f64 {
+        self.warmth
+    }
+
+    /// The factor one integration step later, on a rail with a factor.
+    pub(crate) fn advance(&mut self, rail: f64, is_dirty: bool, moves: bool) -> f64 {
+        self.warmth = warmth_after(self.train, self.warmth, moves, STEP_S);
+        self.until_wander -= STEP_S;
+        if self.until_wander <= 0.0 {
+            self.until_wander += WANDER_STEP_S;
+            // An autoregression of first order: it keeps its spread whatever the step.
+            let kept = 1.0 - WANDER_STEP_S / self.train.wander_time.as_s().max(WANDER_STEP_S);
+            let fresh = self.train.wander.as_parts() * libm::sqrt(1.0 - kept * kept);
+            self.wander = kept * self.wander + self.draws.normal(0.0, fresh);
+        }
+        let goal = self.goal(rail) * if is_dirty { DIRTY_FACTOR } else { 1.0 };
+        self.factor += (goal - self.factor) * STEP_S / RAIL_LAG_S;
+        self.factor
+    }
+
+    /// Whether a train at a wheel speed stalls on the dirty spot it has just reached.
+    pub(crate) fn stalls(&mut self, wheel_mm_per_s: f64) -> bool {
+        wheel_mm_per_s < STALL_BELOW_MM_PER_S && self.draws.chance(STALL_CHANCE)
+    }
+
+    fn goal(&self, rail: f64) -> f64 {
+        let felt = 1.0 + self.train.curve_feel * (rail - 1.0);
+        let warm = 1.0 - self.train.warm_up.as_parts() * (1.0 - self.warmth);
+        self.run * (1.0 + self.wander) * felt * warm
+    }
+}
+
+/// How warm a train is some time later, running or standing; small steps only.
+pub(crate) fn warmth_after(train: &Train, warmth: f64, moves: bool, for_s: f64) -> f64 {
+    let goal = if moves { 1.0 } else { 0.0 };
+    let rate = for_s / train.warm_up_time.as_s().max(for_s);
+    warmth + (goal - warmth) * rate
+}

@@ -1,0 +1,329 @@
+//! A decoder and its motor, run forward in steps of one millisecond.
+//!
+//! A command reaches the decoder, which after its dead time moves a *set speed* by its law; the motor follows
+//! the set speed with a lag. At step 0 nothing drives and friction brings the wheels to rest in finite time;
+//! at any other step the load control makes good for friction. From rest the wheels stick until the set speed
+//! passes the breakaway speed of this start, so low steps may never get going.
+//!
+//! Speeds in mm/s, times in s; the track's influence comes on top in [`load`](crate::load).
+
+use std::collections::VecDeque;
+
+use footplate_core::{Acceleration, Approach, Speed, SpeedStep, TimeSpan};
+
+use crate::draws::Draws;
+use crate::law::{COUNTS_PER_STEP, Law};
+use crate::train::Train;
+
+/// The step of the integration. The shortest time constant in the world is thirty times longer.
+pub(crate) const STEP_S: f64 = 1e-3;
+
+/// Lag of a motor with load control behind a set speed that moves gently (chosen: below half a poll).
+const RAMPED_MOTOR_LAG_S: f64 = 0.04;
+/// Lag of a motor behind a counter that moves in jumps (chosen: jumps of 5 mm/s are not felt at the rail).
+const COUNTED_MOTOR_LAG_S: f64 = 0.12;
+/// Time in which the play between the two speeds of a step is taken up (chosen; only counters show it).
+const PLAY_S: f64 = 1.0;
+/// Relative standard deviation of the breakaway speed from start to start (chosen).
+const START_SD: f64 = 0.3;
+/// Relative standard deviation of the dead time from start to start (chosen).
+const DEAD_TIME_SD: f64 = 0.1;
+/// Wheels below this speed without drive have come to rest (chosen: 1 mm in 20 s).
+const REST_MM_PER_S: f64 = 0.05;
+/// A stop is stretched or shortened by no more than this factor (chosen: beyond ten standard deviations).
+const STRETCH: core::ops::RangeInclusive<f64> = 0.75..=1.25;
+/// No stop takes longer than this (chosen: ten times the longest measured).
+const LONGEST_STOP_S: f64 = 60.0;
+
+/// The decoder's own variables, one form for each law.
+#[derive(Debug, Clone)]
+enum Process {
+    /// Moves at a constant rate.
+    Ramp { up: f64, down: f64 },
+    /// Moves at a rate that is a parabola over the change.
+    Eased { up: f64, down: f64, shortest: f64, change: f64, lasts: f64, elapsed: f64 },
+    /// A ramp seen through a moving average.
+    Averaged { up: f64, down: f64, ramp: f64, window: VecDeque<f64>, sum: f64, level: usize },
+    /// Jumps; the motor does the rest.
+    Direct,
+    /// Counts through internal steps; `play` is 0 at speeds reached from below, 1 from above.
+    Counted { up_s: f64, down_s: f64, count: u16, until_next: f64, play: f64 },
+    /// A ramp upwards, a jump downwards.
+    RampUp { up: f64 },
+}
+
+/// A decoder and its motor under way.
+#[derive(Debug, Clone)]
+pub(crate) struct Motor<'train> {
+    train: &'train Train,
+    process: Process,
+    step: SpeedStep,
+    approach: Approach,
+    /// What the decoder asks of the motor.
+    set_speed: f64,
+    /// How fast the wheels would turn on level straight track.
+    wheel_speed: f64,
+    /// A command that has arrived and waits for the dead time, in s, to pass.
+    pending: Option<(SpeedStep, f64)>,
+    /// The set speed at which the wheels break away; `None` while they turn.
+    breakaway: Option<f64>,
+    /// How fast the decoder's time runs: 1, but for stops, which scatter.
+    pace: f64,
+}
+
+impl<'train> Motor<'train> {
+    /// A train at rest.
+    pub(crate) fn at_rest(train: &'train Train) -> Self {
+        let mm = Acceleration::as_mm_per_s2;
+        let process = match train.law {
+            Law::Constant { up, down } => Process::Ramp { up: mm(up), down: mm(down) },
+            Law::Smooth { up, down, shortest } => Process::Eased {
+                up: mm(up),
+                down: mm(down),
+                shortest: shortest.as_s(),
+                change: 0.0,
+                lasts: 1.0,
+                elapsed: 1.0,
+            },
+            Law::SCurve { up, down, rounding } => {
+                let samples = (rounding.as_s() / STEP_S).max(1.0) as usize;
+                let window = VecDeque::from(vec![0.0; samples]);
+                Process::Averaged { up: mm(up), down: mm(down), ramp: 0.0, window, sum: 0.0, level: samples }
+            }
+            Law::Lag { .. } => Process::Direct,
+            Law::Momentum { up_per_count, down_per_count } => Process::Counted {
+                up_s: up_per_count.as_s(),
+                down_s: down_per_count.as_s(),
+                count: 0,
+                until_next: 0.0,
+                play: 0.0,
+            },
+            Law::Mixed { up, .. } => Process::RampUp { up: mm(up) },
+        };
+        Self {
+            train,
+            process,
+            step: SpeedStep::STAND,
+            approach: Approach::Below,
+            set_speed: 0.0,
+            wheel_speed: 0.0,
+            pending: None,
+            breakaway: Some(0.0),
+            pace: 1.0,
+        }
+    }
+
+    /// A train that has long been running steadily.
+    pub(crate) fn running(train: &'train Train, step: SpeedStep, approach: Approach) -> Self {
+        let mut motor = Self::at_rest(train);
+        motor.step = step;
+        motor.approach = approach;
+        let speed = motor.target();
+        let counts = u16::from(step.get()) * COUNTS_PER_STEP;
+        match &mut motor.process {
+            Process::Averaged { ramp, window, sum, .. } => {
+                *ramp = speed;
+                window.iter_mut().for_each(|sample| *sample = speed);
+                *sum = speed * window.len() as f64;
+            }
+            Process::Counted { count, play, .. } => {
+                *count = counts;
+                *play = above(approach);
+            }
+            Process::Ramp { .. } | Process::Eased { .. } | Process::Direct | Process::RampUp { .. } => {}
+        }
+        motor.set_speed = speed;
+        motor.wheel_speed = speed;
+        motor.breakaway = if speed > 0.0 { None } else { Some(0.0) };
+        motor
+    }
+
+    /// A command arrives at the decoder.
+    pub(crate) fn command(&mut self, step: SpeedStep, draws: &mut Draws) {
+        if self.is_at_rest() && self.step == SpeedStep::STAND {
+            let breakaway = self.train.breakaway.as_mm_per_s();
+            self.breakaway = Some(breakaway * draws.normal_within(1.0, START_SD, 2.5));
+            let dead_time = self.train.start_dead_time.as_s() * draws.normal_within(1.0, DEAD_TIME_SD, 2.5);
+            self.pending = Some((step, dead_time));
+            return;
+        }
+        self.command_without_scatter(step);
+        if step == SpeedStep::STAND {
+            let usual = self.clone().way_to_rest_mm();
+            let scatter = self.train.stop_scatter.sd(Speed::from_mm_per_s(self.wheel_speed)).as_mm();
+            let stretch = if usual > 0.0 { draws.normal(1.0, scatter / usual) } else { 1.0 };
+            self.pace = 1.0 / stretch.clamp(*STRETCH.start(), *STRETCH.end());
+        }
+    }
+
+    /// A command arrives at the decoder of a running train and is obeyed as on an average day.
+    pub(crate) fn command_without_scatter(&mut self, step: SpeedStep) {
+        self.pace = 1.0;
+        self.pending = Some((step, self.train.change_dead_time.as_s()));
+    }
+
+    /// How far the wheels still roll until they rest, on level straight track and without scatter, in mm.
+    pub(crate) fn way_to_rest_mm(mut self) -> f64 {
+        let mut way = 0.0;
+        for _ in 0..(LONGEST_STOP_S / STEP_S) as usize {
+            if self.stays_at_rest() {
+                break;
+            }
+            let before = self.wheel_speed;
+            way += 0.5 * (before + self.advance()) * STEP_S;
+        }
+        way
+    }
+
+    /// Contact with the rail is lost at a crawl: the wheels stick until a higher step is commanded.
+    pub(crate) fn stall(&mut self) {
+        self.breakaway = Some(f64::INFINITY);
+    }
+
+    /// Speed of the wheels on level straight track, in mm/s.
+    pub(crate) fn wheel_speed(&self) -> f64 {
+        self.wheel_speed
+    }
+
+    /// `true` while the wheels do not turn.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.wheel_speed == 0.0
+    }
+
+    /// `true` when the wheels do not turn and nothing that was commanded will turn them.
+    pub(crate) fn stays_at_rest(&self) -> bool {
+        self.is_at_rest() && self.pending.is_none() && (self.step == SpeedStep::STAND || self.is_stalled())
+    }
+
+    /// `true` when the wheels stick for good at a step that is not 0.
+    pub(crate) fn is_stalled(&self) -> bool {
+        let reach = self.target();
+        self.is_at_rest()
+            && self.step != SpeedStep::STAND
+            && self.breakaway.is_some_and(|needs| needs > reach)
+    }
+
+    /// Speed of the wheels on level straight track in mm/s, one step of [`STEP_S`] later.
+    pub(crate) fn advance(&mut self) -> f64 {
+        if let Some((step, left)) = self.pending {
+            if left <= 0.0 {
+                self.obey(step);
+            } else {
+                self.pending = Some((step, left - STEP_S));
+            }
+        }
+        let dt = STEP_S * if self.step == SpeedStep::STAND { self.pace } else { 1.0 };
+        self.set_speed = self.decide(dt);
+        self.follow(dt);
+        self.wheel_speed
+    }
+
+    fn target(&self) -> f64 {
+        self.train.speeds.speed(self.step, self.approach).as_mm_per_s()
+    }
+
+    fn obey(&mut self, step: SpeedStep) {
+        self.pending = None;
+        if step == self.step {
+            return;
+        }
+        // A stalled train gets going again when it is pushed up a step.
+        if step > self.step && self.breakaway == Some(f64::INFINITY) {
+            self.breakaway = Some(self.train.breakaway.as_mm_per_s());
+        }
+        self.approach = if step < self.step { Approach::Above } else { Approach::Below };
+        self.step = step;
+        let to = self.target();
+        if let Process::Eased { up, down, shortest, change, lasts, elapsed } = &mut self.process {
+            *change = to - self.set_speed;
+            *lasts = *shortest + if *change > 0.0 { *change / *up } else { -*change / *down };
+            *elapsed = 0.0;
+        }
+    }
+
+    /// The decoder: the set speed after `dt`.
+    fn decide(&mut self, dt: f64) -> f64 {
+        let target = self.target();
+        let counts = u16::from(self.step.get()) * COUNTS_PER_STEP;
+        match &mut self.process {
+            Process::Ramp { up, down } => toward(self.set_speed, target, *up * dt, *down * dt),
+            Process::Eased { change, lasts, elapsed, .. } => {
+                // The rate at mid-step: a parabola over the change whose area is the change.
+                let part = (*elapsed + 0.5 * dt) / *lasts;
+                *elapsed += dt;
+                if part >= 1.0 {
+                    target
+                } else {
+                    let rate = 6.0 * *change / *lasts * part * (1.0 - part);
+                    self.set_speed + rate * dt
+                }
+            }
+            Process::Averaged { up, down, ramp, window, sum, level } => {
+                *ramp = toward(*ramp, target, *up * dt, *down * dt);
+                let oldest = window.pop_front().unwrap_or(*ramp);
+                window.push_back(*ramp);
+                *sum += *ramp - oldest;
+                *level = if *ramp == target { *level + 1 } else { 0 };
+                // With equal samples throughout, the running sum would still carry its rounding errors.
+                if *level > window.len() { target } else { *sum / window.len() as f64 }
+            }
+            Process::Direct => target,
+            Process::Counted { up_s, down_s, count, until_next, play } => {
+                *until_next -= dt;
+                if *until_next <= 0.0 && *count != counts {
+                    let rises = counts > *count;
+                    *count = if rises { *count + 1 } else { count.saturating_sub(1) };
+                    *until_next += if rises { *up_s } else { *down_s };
+                }
+                *until_next = until_next.max(-dt);
+                let taken_up = dt / PLAY_S;
+                *play = toward(*play, above(self.approach), taken_up, taken_up);
+                self.train.speeds.mm_per_s(f64::from(*count) / f64::from(COUNTS_PER_STEP), *play)
+            }
+            Process::RampUp { up } => toward(self.set_speed, target, *up * dt, f64::INFINITY),
+        }
+    }
+
+    /// The motor: wheels follow the set speed.
+    fn follow(&mut self, dt: f64) {
+        if let Some(needs) = self.breakaway {
+            if self.wheel_speed == 0.0 && self.set_speed < needs {
+                return;
+            }
+            if needs.is_finite() {
+                self.breakaway = None;
+            }
+        }
+        let stuck = self.breakaway.is_some();
+        let drive = if stuck { 0.0 } else { self.set_speed };
+        let lag = if stuck { RAMPED_MOTOR_LAG_S } else { self.lag(drive > self.wheel_speed) };
+        let friction =
+            if drive == 0.0 { self.train.friction.as_mm_per_s2().min(self.wheel_speed / dt) } else { 0.0 };
+        // Semi-implicit: the new speed on both sides, so that no lag however short can overshoot.
+        let next = (self.wheel_speed + dt * (drive / lag - friction)) / (1.0 + dt / lag);
+        self.wheel_speed = if drive == 0.0 && next < REST_MM_PER_S { 0.0 } else { next };
+        if self.wheel_speed == 0.0 && self.breakaway.is_none() {
+            self.breakaway = Some(0.0);
+        }
+    }
+
+    fn lag(&self, speeds_up: bool) -> f64 {
+        match self.train.law {
+            Law::Lag { up, down } | Law::Mixed { up_lag: up, down, .. } => {
+                TimeSpan::as_s(if speeds_up { up } else { down })
+            }
+            Law::Momentum { .. } => COUNTED_MOTOR_LAG_S,
+            Law::Constant { .. } | Law::Smooth { .. } | Law::SCurve { .. } => RAMPED_MOTOR_LAG_S,
+        }
+    }
+}
+
+/// 1 for speeds reached from above, else 0.
+fn above(approach: Approach) -> f64 {
+    if approach == Approach::Above { 1.0 } else { 0.0 }
+}
+
+/// `from`, moved towards `to` by at most `up` or `down`.
+fn toward(from: f64, to: f64, up: f64, down: f64) -> f64 {
+    if to > from { (from + up).min(to) } else { (from - down).max(to) }
+}

@@ -1,0 +1,110 @@
+//! What lies along the rails ahead of a train, by true distance from where its run begins.
+
+use footplate_core::track::Layout;
+use footplate_core::{EdgeId, Length, SensorId};
+
+use crate::circuit::Circuit;
+use crate::gates::GATE_SPACING_MM;
+use crate::track::TrueTrack;
+
+/// Something at a point of the rails.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mark<T> {
+    /// Where, in mm from the start of the run; negative behind it.
+    pub(crate) at_mm: f64,
+    /// What.
+    pub(crate) what: T,
+}
+
+/// Where a path begins: past one of the circuit's sensors, counted in the order of travel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Origin {
+    /// Which sensor.
+    pub(crate) sensor: usize,
+    /// How far past its node.
+    pub(crate) past_mm: f64,
+}
+
+/// The way ahead, round and round a circuit, long enough for one run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Path {
+    /// Edges by where they begin.
+    pub(crate) edges: Vec<Mark<EdgeId>>,
+    /// Contacts by where they close, in order.
+    pub(crate) contacts: Vec<Mark<SensorId>>,
+    /// Nodes of sensors by where they are, in order: where a person lays the tape.
+    pub(crate) landmarks: Vec<Mark<SensorId>>,
+    /// Dirty spots.
+    pub(crate) dirty: Vec<Mark<()>>,
+    /// Light gates by number.
+    pub(crate) gates: Vec<Mark<u8>>,
+}
+
+impl Path {
+    /// The way from an origin, at least as long as `reach_mm`, with light gates (if any) in the middle of the
+    /// circuit's longest edge.
+    pub(crate) fn new(
+        layout: &Layout,
+        track: &TrueTrack,
+        circuit: &Circuit,
+        origin: Origin,
+        reach_mm: f64,
+        has_gates: bool,
+    ) -> Self {
+        let edges = circuit.edges();
+        let starts: Vec<usize> =
+            (0..edges.len()).filter(|at| sensor_before(layout, edges, *at).is_some()).collect();
+        let first = if starts.is_empty() { 0 } else { starts[origin.sensor % starts.len()] };
+        let length_mm = |edge: EdgeId| track.length(edge).as_mm();
+        let gated = edges
+            .iter()
+            .copied()
+            .max_by(|a, b| length_mm(*a).total_cmp(&length_mm(*b)))
+            .filter(|_| has_gates);
+        let mut path = Self {
+            edges: Vec::new(),
+            contacts: Vec::new(),
+            landmarks: Vec::new(),
+            dirty: Vec::new(),
+            gates: Vec::new(),
+        };
+        let mut begins_mm = -origin.past_mm;
+        for place in first.. {
+            if begins_mm > reach_mm || edges.is_empty() {
+                break;
+            }
+            let place = place % edges.len();
+            let edge = edges[place];
+            if let Some(sensor) = sensor_before(layout, edges, place) {
+                path.landmarks.push(Mark { at_mm: begins_mm, what: sensor });
+                path.contacts
+                    .push(Mark { at_mm: begins_mm + track.contact_offset(sensor).as_mm(), what: sensor });
+            }
+            path.edges.push(Mark { at_mm: begins_mm, what: edge });
+            path.dirty.extend(
+                track.dirty_mm(edge).into_iter().map(|spot| Mark { at_mm: begins_mm + spot, what: () }),
+            );
+            if gated == Some(edge) {
+                let middle_mm = begins_mm + 0.5 * length_mm(edge);
+                path.gates.push(Mark { at_mm: middle_mm, what: 1 });
+                path.gates.push(Mark { at_mm: middle_mm + GATE_SPACING_MM, what: 0 });
+            }
+            begins_mm += length_mm(edge);
+        }
+        // Contacts a few millimetres apart may close in another order than their nodes lie.
+        path.contacts.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
+        path
+    }
+
+    /// The edge at a distance and how far along it that is.
+    pub(crate) fn place(&self, at_mm: f64) -> Option<(EdgeId, Length)> {
+        let after = self.edges.partition_point(|mark| mark.at_mm <= at_mm);
+        let mark = self.edges.get(after.checked_sub(1)?)?;
+        Some((mark.what, Length::from_mm(at_mm - mark.at_mm)))
+    }
+}
+
+/// The sensor at the node where an edge of a circuit begins.
+fn sensor_before(layout: &Layout, edges: &[EdgeId], at: usize) -> Option<SensorId> {
+    layout.sensor_at(layout.edge(*edges.get(at)?)?.from)
+}

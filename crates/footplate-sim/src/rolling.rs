@@ -1,0 +1,174 @@
+//! A train on its way: the motor's speed, what the rails make of it, and what the shoe touches.
+
+use footplate_core::{EdgeId, SpeedStep};
+
+use crate::contacts::Contacts;
+use crate::draws::Draws;
+use crate::load::{DIRTY_MM, Load};
+use crate::motor::{Motor, STEP_S};
+use crate::path::{Mark, Path};
+use crate::track::TrueTrack;
+use crate::train::Train;
+
+/// A train under way on a path. Its distance is that of the leading end of its shoe.
+#[derive(Debug)]
+pub(crate) struct Rolling<'w> {
+    track: &'w TrueTrack,
+    path: &'w Path,
+    train: &'w Train,
+    motor: Motor<'w>,
+    load: Load<'w>,
+    draws: Draws,
+    distance_mm: f64,
+    speed_mm_per_s: f64,
+    rested_at: Option<f64>,
+    /// Commands on their way to the decoder, and when it has them.
+    commands: Vec<(f64, SpeedStep)>,
+    passed: Passed,
+}
+
+/// How many of the marks on the path lie behind.
+#[derive(Debug, Default)]
+struct Passed {
+    edges: usize,
+    closed: usize,
+    left: usize,
+    dirty: usize,
+    gates: usize,
+}
+
+impl<'w> Rolling<'w> {
+    /// A train at the start of its path. The shoe may stand on a contact; `closed_at`, in s before the run,
+    /// is when it closed the last one, which the station may remember.
+    pub(crate) fn new(
+        (track, path): (&'w TrueTrack, &'w Path),
+        train: &'w Train,
+        motor: Motor<'w>,
+        warmth: f64,
+        (contacts, closed_at): (&mut Contacts<'_>, f64),
+        mut draws: Draws,
+    ) -> Self {
+        let shoe_mm = train.shoe.as_mm();
+        let mut passed = Passed::default();
+        let behind = |mark: &&Mark<_>| mark.at_mm <= 0.0;
+        while let Some(mark) = path.contacts.get(passed.closed).filter(behind) {
+            let held = mark.at_mm > -shoe_mm;
+            contacts.remember(mark.what, closed_at, held);
+            passed.closed += 1;
+            passed.left += usize::from(!held);
+        }
+        passed.edges = path.edges.partition_point(|mark| mark.at_mm <= 0.0);
+        passed.dirty = path.dirty.partition_point(|mark| mark.at_mm <= 0.0);
+        passed.gates = path.gates.partition_point(|mark| mark.at_mm <= 0.0);
+        let rail = rail(track, path.edges.get(passed.edges.saturating_sub(1)));
+        let load = Load::new(train, warmth, rail, draws.split());
+        let speed_mm_per_s = motor.wheel_speed() * load.factor();
+        let (distance_mm, rested_at, commands) = (0.0, None, Vec::new());
+        Self {
+            track,
+            path,
+            train,
+            motor,
+            load,
+            draws,
+            distance_mm,
+            speed_mm_per_s,
+            rested_at,
+            commands,
+            passed,
+        }
+    }
+
+    /// Distance in mm and speed in mm/s.
+    pub(crate) const fn state(&self) -> [f64; 2] {
+        [self.distance_mm, self.speed_mm_per_s]
+    }
+
+    /// Since when, in s, the train has been at rest; `None` while it moves or before it ever did.
+    pub(crate) const fn rested_at(&self) -> Option<f64> {
+        self.rested_at
+    }
+
+    /// Whether nothing that was commanded will set the train in motion.
+    pub(crate) fn stays_at_rest(&self) -> bool {
+        self.motor.stays_at_rest() && self.commands.is_empty()
+    }
+
+    /// The motor.
+    pub(crate) const fn motor(&self) -> &Motor<'w> {
+        &self.motor
+    }
+
+    /// What acts on the speed.
+    pub(crate) const fn load(&self) -> &Load<'w> {
+        &self.load
+    }
+
+    /// A command has left the line at a time in s; returns when the decoder has it.
+    pub(crate) fn tell(&mut self, step: SpeedStep, sent: f64) -> f64 {
+        let delay = self.draws.normal(self.train.command_delay.as_s(), self.train.command_jitter.as_s());
+        // No command overtakes another.
+        let last = self.commands.last().map_or(sent, |(heard, _)| *heard);
+        let heard = (sent + delay.max(0.0)).max(last);
+        self.commands.push((heard, step));
+        heard
+    }
+
+    /// One integration step from `now`; contacts close and open, and gates passed are handed to `at_gate`.
+    pub(crate) fn advance(
+        &mut self,
+        now: f64,
+        contacts: &mut Contacts<'_>,
+        mut at_gate: impl FnMut(u8, f64),
+    ) {
+        if let Some(&(_, step)) = self.commands.first().filter(|(heard, _)| *heard <= now) {
+            self.commands.remove(0);
+            self.motor.command(step, &mut self.draws);
+        }
+        let was_moving = !self.motor.is_at_rest();
+        let wheel = self.motor.advance();
+        let here = self.distance_mm;
+        let dirt_mm = self.passed.dirty.checked_sub(1).and_then(|last| self.path.dirty.get(last));
+        let is_dirty = dirt_mm.is_some_and(|dirt| here < dirt.at_mm + DIRTY_MM);
+        let rail = rail(self.track, self.path.edges.get(self.passed.edges.saturating_sub(1)));
+        let speed = wheel * self.load.advance(rail, is_dirty, wheel > 0.0);
+        let there = here + 0.5 * (self.speed_mm_per_s + speed) * STEP_S;
+        self.distance_mm = there;
+        self.speed_mm_per_s = speed;
+        if wheel > 0.0 {
+            self.rested_at = None;
+        } else if was_moving {
+            self.rested_at = Some(now + STEP_S);
+        }
+
+        // Within a millisecond the speed is as good as constant.
+        let when = |at_mm: f64| now + STEP_S * ((at_mm - here) / (there - here)).clamp(0.0, 1.0);
+        for mark in passed(&self.path.contacts, &mut self.passed.closed, there) {
+            contacts.close(mark.what, when(mark.at_mm));
+        }
+        let shoe_mm = self.train.shoe.as_mm();
+        for mark in passed(&self.path.contacts, &mut self.passed.left, there - shoe_mm) {
+            contacts.leave(mark.what, when(mark.at_mm + shoe_mm));
+        }
+        for mark in passed(&self.path.gates, &mut self.passed.gates, there) {
+            at_gate(mark.what, when(mark.at_mm));
+        }
+        passed(&self.path.edges, &mut self.passed.edges, there);
+        if !passed(&self.path.dirty, &mut self.passed.dirty, there).is_empty() && self.load.stalls(wheel) {
+            self.motor.stall();
+        }
+    }
+}
+
+/// The marks that a train which has come to `to_mm` has newly passed; the count of those behind moves on.
+fn passed<'path, T>(marks: &'path [Mark<T>], behind: &mut usize, to_mm: f64) -> &'path [Mark<T>] {
+    let ahead = marks.get(*behind..).unwrap_or_default();
+    let count = ahead.iter().take_while(|mark| mark.at_mm <= to_mm).count();
+    *behind += count;
+    &ahead[..count]
+}
+
+/// What the rails at an edge make of a speed.
+fn rail(track: &TrueTrack, edge: Option<&Mark<EdgeId>>) -> f64 {
+    edge.map_or(1.0, |mark| track.speed_factor(mark.what).as_parts())
+}

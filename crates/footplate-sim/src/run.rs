@@ -1,0 +1,154 @@
+//! One run: train, rails, line and script, step by step, into events and their truth.
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{Approach, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
+
+use crate::circuit::Circuit;
+use crate::contacts::{Contacts, Faults};
+use crate::draws::{Draws, Purpose};
+use crate::gates::{GateClock, GatePass};
+use crate::host::{Host, Notes};
+use crate::motor::{Motor, STEP_S};
+use crate::path::{Origin, Path};
+use crate::poller::{Exchange, Line, Link};
+use crate::rolling::Rolling;
+use crate::script::{Script, Start};
+use crate::track::TrueTrack;
+use crate::train::Train;
+use crate::truth::{Motion, RunTruth, SAMPLE_STEPS};
+
+/// How far past a sensor's node a run begins (chosen: a hand puts the train there).
+const START_PAST_MM: core::ops::Range<f64> = 5.0..90.0;
+/// How long ago the train closed the contact that a station remembers from before the run (chosen).
+const REMEMBERED_S: core::ops::Range<f64> = -20.0..-2.0;
+/// Between commands to turnouts before the run (as one team's program waits).
+const TURNOUT_PAUSE_S: f64 = 0.15;
+/// How much faster than its table a train may be: the path is laid out for that (chosen: all factors at worst).
+const FASTEST: f64 = 1.3;
+/// What the path is longer than the way at that speed (chosen: more than any shoe).
+const SPARE_MM: f64 = 1000.0;
+
+/// Everything that a run takes place in and that it leaves as it was.
+#[derive(Debug, Clone, Copy)]
+pub struct World<'w> {
+    /// The track as the survey has it.
+    pub layout: &'w Layout,
+    /// The track as it is.
+    pub track: &'w TrueTrack,
+    /// Where the train runs round.
+    pub circuit: &'w Circuit,
+    /// How the host talks to the station.
+    pub link: &'w Link,
+    /// What goes wrong with contacts.
+    pub faults: &'w Faults,
+    /// What the station calls the train.
+    pub train_id: TrainId,
+    /// The train as it is.
+    pub train: &'w Train,
+}
+
+/// What runs of one session hand on to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// What the host's clock shows when the run begins.
+    pub clock: Timestamp,
+    /// How warm the train is, from 0, cold, to 1.
+    pub warmth: f64,
+}
+
+/// A recorded run, and what really happened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedRun {
+    /// The train.
+    pub train: TrainId,
+    /// The step it was running at when the run began; [`SpeedStep::STAND`] at rest.
+    pub running_at: SpeedStep,
+    /// What was reported and commanded, in order of time.
+    pub events: Vec<Event>,
+    /// Passes of light gates, on a clock of theirs.
+    pub gates: Vec<GatePass>,
+    /// For scorers only.
+    pub truth: RunTruth,
+}
+
+impl World<'_> {
+    /// Lets a script happen, the same for the same seed. Returns what the run leaves to the next as well.
+    #[must_use]
+    pub fn run(&self, script: &Script, conditions: Conditions, seed: u64) -> (SimulatedRun, Conditions) {
+        let mut draws = Draws::new(seed, Purpose::Scenario);
+        let past_mm = draws.uniform(START_PAST_MM);
+        let (sensor, motor, running_at, approach_at_start) = match script.start {
+            Start::AtRest { past } => (past, Motor::at_rest(self.train), SpeedStep::STAND, Approach::Below),
+            Start::Running { past, step, approach } => {
+                (past, Motor::running(self.train, step, approach), step, approach)
+            }
+        };
+        let path = self.path(script, Origin { sensor, past_mm });
+        let sensors = self.layout.sensors().map(|(sensor, _)| sensor).collect();
+        let mut contacts = Contacts::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
+        let remembered = (&mut contacts, draws.uniform(REMEMBERED_S));
+        let motion_draws = Draws::new(seed, Purpose::Motion);
+        let mut rolling =
+            Rolling::new((self.track, &path), self.train, motor, conditions.warmth, remembered, motion_draws);
+        let run_factor = rolling.load().run();
+        let mut line = Line::new(self.link, Draws::new(seed, Purpose::Line));
+        let gate_clock = GateClock::new(&mut draws);
+        let mut gates = Vec::new();
+        let turnouts = self.turnouts_thrown(conditions.clock);
+        let mut host = Host::new(self.train_id, self.link, conditions.clock, &script.orders, turnouts, draws);
+
+        let steps = (script.lasts.as_s() / STEP_S).max(0.0) as usize;
+        let mut samples = Vec::with_capacity(steps / SAMPLE_STEPS + 1);
+        for step in 0..=steps {
+            if step % SAMPLE_STEPS == 0 {
+                samples.push(rolling.state());
+                if host.is_done() && rolling.stays_at_rest() {
+                    break;
+                }
+            }
+            let now = step as f64 * STEP_S;
+            host.attend(now, &rolling, &path, &mut line);
+            rolling.advance(now, &mut contacts, |gate, at| gates.push(gate_clock.pass(gate, at)));
+            while let Some(exchange) = line.poll_exchange(now + STEP_S) {
+                match exchange {
+                    Exchange::Sent { command, began, ended } => {
+                        let heard = rolling.tell(command, ended);
+                        host.note_command(command, began, heard);
+                    }
+                    Exchange::Answered { poll } => {
+                        let closed = contacts.read(poll.before, poll.reading, self.link.latched);
+                        host.note_poll(poll, &closed);
+                    }
+                }
+            }
+        }
+
+        let stalled = rolling.motor().is_stalled();
+        let warmth = rolling.load().warmth();
+        let spacing = TimeSpan::from_s(STEP_S * SAMPLE_STEPS as f64);
+        drop(rolling);
+        let motion = Motion { begins: conditions.clock, spacing, samples, path };
+        let ended = motion.ends();
+        let Notes { events, reports, commands, stops } = host.into_notes();
+        let truth = RunTruth { reports, commands, stops, motion, approach_at_start, run_factor, stalled };
+        let run = SimulatedRun { train: self.train_id, running_at, events, gates, truth };
+        (run, Conditions { clock: ended, warmth })
+    }
+
+    fn path(&self, script: &Script, origin: Origin) -> Path {
+        let speeds = &self.train.speeds;
+        let top = speeds.speed(speeds.highest(), Approach::Below).as_mm_per_s();
+        let reach_mm = FASTEST * top * script.lasts.as_s() + SPARE_MM;
+        Path::new(self.layout, self.track, self.circuit, origin, reach_mm, script.has_gates)
+    }
+
+    /// The turnouts of the circuit, thrown one after the other before the run.
+    fn turnouts_thrown(&self, begins: Timestamp) -> Vec<Event> {
+        let count = self.circuit.turnouts().len();
+        let event = |(nth, (turnout, leg)): (usize, (_, Leg))| Event {
+            time: begins - TimeSpan::from_s(TURNOUT_PAUSE_S * (count - nth) as f64),
+            kind: EventKind::Turnout { turnout, curved: leg.is_curved() },
+        };
+        self.circuit.turnouts().enumerate().map(event).collect()
+    }
+}

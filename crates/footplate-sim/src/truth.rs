@@ -1,0 +1,156 @@
+//! What really happened in a run: for scorers, and for nobody else.
+
+use footplate_core::{Approach, EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp};
+
+use crate::contacts::Cause;
+use crate::path::{Mark, Path};
+
+/// How densely motion is kept; between samples it is a cubic through places and speeds, good to micrometres.
+pub(crate) const SAMPLE_STEPS: usize = 10;
+
+/// The truth of one run, on the clock of its events.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunTruth {
+    /// One entry for each sensor report among the events, in their order.
+    pub reports: Vec<ReportTruth>,
+    /// One entry for each speed command among the events, in their order.
+    pub commands: Vec<CommandTruth>,
+    /// One entry for each hand measurement among the events, in their order.
+    pub stops: Vec<StopTruth>,
+    /// Where the train was and how fast it ran.
+    pub motion: Motion,
+    /// Side from which a train that runs from the start got to its speed.
+    pub approach_at_start: Approach,
+    /// The speed of this run over that of an average one.
+    pub run_factor: f64,
+    /// Whether the train stood still at a step other than 0 when the run ended.
+    pub stalled: bool,
+}
+
+/// The truth behind a sensor report.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReportTruth {
+    /// Which of the events it belongs to.
+    pub event: usize,
+    /// The contact.
+    pub sensor: SensorId,
+    /// Why it was closed.
+    pub cause: Cause,
+    /// Whether this is the first report of that closure.
+    pub first: bool,
+    /// When it closed.
+    pub closed: Timestamp,
+    /// When the reading took place that saw it closed.
+    pub reading: Timestamp,
+    /// When the reading before took place.
+    pub reading_before: Timestamp,
+}
+
+/// The truth behind a speed command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandTruth {
+    /// Which of the events it belongs to.
+    pub event: usize,
+    /// The step commanded.
+    pub step: SpeedStep,
+    /// When the decoder had it.
+    pub heard: Timestamp,
+}
+
+/// The truth behind a hand measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopTruth {
+    /// Which of the events it belongs to.
+    pub event: usize,
+    /// When the train came to rest.
+    pub rested: Timestamp,
+    /// How far past the landmark's node it did.
+    pub offset: Length,
+}
+
+/// The leading end of the train's shoe over time, from the start of the run to its end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    pub(crate) begins: Timestamp,
+    pub(crate) spacing: TimeSpan,
+    /// Distance in mm and speed in mm/s, evenly spaced.
+    pub(crate) samples: Vec<[f64; 2]>,
+    pub(crate) path: Path,
+}
+
+impl Motion {
+    /// The start of the run.
+    #[must_use]
+    pub const fn begins(&self) -> Timestamp {
+        self.begins
+    }
+
+    /// The end of the run.
+    #[must_use]
+    pub fn ends(&self) -> Timestamp {
+        let spans = self.samples.len().saturating_sub(1) as i64;
+        self.begins + TimeSpan::from_ns(self.spacing.as_ns() * spans)
+    }
+
+    /// Distance from the start of the run; before it and after its end, the distance there.
+    #[must_use]
+    pub fn distance(&self, at: Timestamp) -> Length {
+        let Some(([x0, v0], [x1, v1], part)) = self.around(at) else { return Length::ZERO };
+        let h = self.spacing.as_s();
+        let (rest, all) = (1.0 - part, part);
+        // The cubic that has both places and both speeds (Hermite).
+        let mm = x0 * rest * rest * (1.0 + 2.0 * all)
+            + x1 * all * all * (1.0 + 2.0 * rest)
+            + h * v0 * all * rest * rest
+            - h * v1 * rest * all * all;
+        Length::from_mm(mm)
+    }
+
+    /// Speed; before the start and after the end of the run, the speed there.
+    #[must_use]
+    pub fn speed(&self, at: Timestamp) -> Speed {
+        let Some(([_, v0], [_, v1], part)) = self.around(at) else { return Speed::ZERO };
+        Speed::from_mm_per_s(v0 + (v1 - v0) * part)
+    }
+
+    /// The edge and how far along it, by true lengths.
+    #[must_use]
+    pub fn place(&self, at: Timestamp) -> Option<(EdgeId, Length)> {
+        self.path.place(self.distance(at).as_mm())
+    }
+
+    /// Every contact on the way, passed or still ahead, with its distance from the start of the run.
+    pub fn contacts(&self) -> impl ExactSizeIterator<Item = (SensorId, Length)> + '_ {
+        self.path.contacts.iter().map(|Mark { at_mm, what }| (*what, Length::from_mm(*at_mm)))
+    }
+
+    /// When the train had gone a distance; `None` if it never did.
+    #[must_use]
+    pub fn time_at(&self, distance: Length) -> Option<Timestamp> {
+        let mm = distance.as_mm();
+        let after = self.samples.partition_point(|[x, _]| *x < mm);
+        let (before, [reached, _]) = (after.checked_sub(1)?, self.samples.get(after)?);
+        let [x, _] = self.samples.get(before)?;
+        let (mut low, mut high) = (self.time_of(before), self.time_of(after));
+        debug_assert!(*x < mm && *reached >= mm);
+        // Bisection on the cubic, to the nanosecond.
+        while (high - low).as_ns() > 1 {
+            let middle = low + TimeSpan::from_ns((high - low).as_ns() / 2);
+            if self.distance(middle).as_mm() < mm { low = middle } else { high = middle }
+        }
+        Some(high)
+    }
+
+    fn time_of(&self, sample: usize) -> Timestamp {
+        self.begins + TimeSpan::from_ns(self.spacing.as_ns() * sample as i64)
+    }
+
+    fn around(&self, at: Timestamp) -> Option<([f64; 2], [f64; 2], f64)> {
+        let last = self.samples.len().checked_sub(1)?;
+        let spans = (at - self.begins).as_ns() as f64 / self.spacing.as_ns() as f64;
+        let spans = spans.clamp(0.0, last as f64);
+        let lower = (spans as usize).min(last.saturating_sub(1));
+        let upper = (lower + 1).min(last);
+        Some((*self.samples.get(lower)?, *self.samples.get(upper)?, (spans - lower as f64).min(1.0)))
+    }
+}

@@ -1,0 +1,5 @@
+//! What the simulated world promises, a file a promise.
+
+mod continuity;
+mod oval;
+mod reports;
