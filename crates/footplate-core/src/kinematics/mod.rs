@@ -2,14 +2,19 @@
 //!
 //! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
 //! - [`SpeedChange`] is what a decoder makes of a new throttle step.
+//! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
 
 mod motion;
 mod phase;
 mod slow_end;
 mod speed_change;
+mod stopping_distance;
+mod stopping_law;
 
 pub use motion::{Motion, MotionState};
 pub use speed_change::{
     ConstantAcceleration, ConstantJerk, Lag, MidStep, Smooth, SpeedChange, SpeedLaw, StepRamp, StepTable,
     StepTableError,
 };
+pub use stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDistance};
+pub use stopping_law::{Braking, StoppingError, StoppingLaw};

@@ -3,3 +3,4 @@
 mod draw;
 mod motion_checks;
 mod speed_change_laws;
+mod stopping;

@@ -1,0 +1,222 @@
+//! How far and how long a train runs until it stands, as a law of its speed.
+//!
+//! Every law is a delay, in which the train runs on as before, and a way of braking after it:
+//!
+//! ```text
+//! constant deceleration    d = v²/2a                 with no delay
+//! two terms                d = v τ + v²/2a           the best simple law on real stops of model trains
+//! exponential              d = v t₀ + v θ            decoders with load control; never quite stands
+//! ```
+//!
+//! Letters: `v` speed, `d` stopping distance, `a` deceleration, `τ` and `t₀` delay, `θ` time constant.
+
+use core::marker::PhantomData;
+
+use super::motion::Motion;
+use super::speed_change::{ConstantAcceleration, Lag, SpeedChange};
+use super::stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDistance, mean_report_delay};
+use crate::time::TimeSpan;
+use crate::units::{Acceleration, Length, Speed};
+
+/// How speed goes to zero once braking has begun.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Braking {
+    /// Evenly, by this much.
+    Constant(Acceleration),
+    /// By the same share in every time constant; it counts as standing below [`Lag::SETTLED_WITHIN`], although
+    /// the whole way is only run in infinite time.
+    Exponential(TimeSpan),
+}
+
+/// A law of stopping, and since when its distances and times are counted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StoppingLaw<From> {
+    delay: TimeSpan,
+    braking: Braking,
+    counted_from: PhantomData<From>,
+}
+
+/// Why some numbers make no law of stopping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum StoppingError {
+    /// A train that does not slow down does not stop.
+    NoDeceleration {
+        /// What was given.
+        found: Acceleration,
+    },
+    /// An exponential needs a time constant above zero.
+    NoTimeConstant {
+        /// What was given.
+        found: TimeSpan,
+    },
+    /// Braking cannot begin before the moment from which it is counted.
+    NegativeDelay {
+        /// What was given, or what would be left of the delay.
+        found: TimeSpan,
+    },
+}
+
+impl core::fmt::Display for StoppingError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NoDeceleration { found } => {
+                write!(f, "deceleration should be above zero, not {} mm/s²", found.as_mm_per_s2())
+            }
+            Self::NoTimeConstant { found } => {
+                write!(f, "the time constant of a stop should be above zero, not {} ms", found.as_ms())
+            }
+            Self::NegativeDelay { found } => {
+                write!(f, "the delay before braking should be zero or more, not {} ms", found.as_ms())
+            }
+        }
+    }
+}
+
+impl core::error::Error for StoppingError {}
+
+impl<From> StoppingLaw<From> {
+    /// A law that runs on for a delay and then brakes.
+    ///
+    /// # Errors
+    ///
+    /// If the delay is negative, or the braking would never bring the train to a stand.
+    pub fn new(delay: TimeSpan, braking: Braking) -> Result<Self, StoppingError> {
+        if delay < TimeSpan::ZERO {
+            return Err(StoppingError::NegativeDelay { found: delay });
+        }
+        match braking {
+            Braking::Constant(found) if !(found.is_finite() && found > Acceleration::ZERO) => {
+                Err(StoppingError::NoDeceleration { found })
+            }
+            Braking::Exponential(found) if found <= TimeSpan::ZERO => {
+                Err(StoppingError::NoTimeConstant { found })
+            }
+            _ => Ok(Self { delay, braking, counted_from: PhantomData }),
+        }
+    }
+
+    /// How long the train runs on as before.
+    #[must_use]
+    pub const fn delay(&self) -> TimeSpan {
+        self.delay
+    }
+
+    /// How it brakes after that.
+    #[must_use]
+    pub const fn braking(&self) -> Braking {
+        self.braking
+    }
+
+    /// The whole way until it stands, from a speed in either direction.
+    #[must_use]
+    pub fn distance(&self, speed: Speed) -> StoppingDistance<From> {
+        let speed = speed.abs().as_m_per_s();
+        // In plain numbers: the time that a quotient of quantities gives would be rounded to nanoseconds.
+        let braking = match self.braking {
+            Braking::Constant(deceleration) => 0.5 * speed * (speed / deceleration.as_m_per_s2()),
+            Braking::Exponential(time_constant) => speed * time_constant.as_s(),
+        };
+        StoppingDistance::new(Length::from_m(speed * self.delay.as_s() + braking))
+    }
+
+    /// How long that takes; an exponential stop counts as done at [`Lag::SETTLED_WITHIN`].
+    #[must_use]
+    pub fn time(&self, speed: Speed) -> TimeSpan {
+        self.delay + self.change_from(speed).duration()
+    }
+
+    /// The highest speed from which the train stops within a distance; zero for one that is not ahead.
+    #[must_use]
+    pub fn speed_for(&self, distance: StoppingDistance<From>) -> Speed {
+        let distance = distance.length().max(Length::ZERO).as_m();
+        let delay = self.delay.as_s();
+        let speed = match self.braking {
+            // The root of v²/2a + τ v − d = 0, without the difference of two large numbers.
+            Braking::Constant(deceleration) => {
+                let twice = 2.0 * distance;
+                let sum = delay + libm::sqrt(delay * delay + twice / deceleration.as_m_per_s2());
+                if distance > 0.0 { twice / sum } else { 0.0 }
+            }
+            Braking::Exponential(time_constant) => distance / (delay + time_constant.as_s()),
+        };
+        Speed::from_m_per_s(speed)
+    }
+
+    /// The braking itself as a motion; it begins a [`delay`](Self::delay) after the moment from which the law
+    /// counts.
+    #[must_use]
+    pub fn change_from(&self, speed: Speed) -> SpeedChange<'static> {
+        match self.braking {
+            Braking::Constant(deceleration) => SpeedChange::ConstantAcceleration(
+                ConstantAcceleration::with_acceleration(speed, Speed::ZERO, deceleration),
+            ),
+            Braking::Exponential(time_constant) => {
+                SpeedChange::Lag(Lag::new(speed, Speed::ZERO, time_constant, Lag::SETTLED_WITHIN))
+            }
+        }
+    }
+
+    /// The same stop seen from a moment that lies `delay` earlier.
+    fn earlier<Other>(&self, delay: TimeSpan) -> Result<StoppingLaw<Other>, StoppingError> {
+        StoppingLaw::new(self.delay + delay, self.braking)
+    }
+}
+
+impl StoppingLaw<FromBraking> {
+    /// Of a train that starts to brake `command_delay` (τ₂) after the command.
+    ///
+    /// # Errors
+    ///
+    /// If that delay is negative.
+    pub fn counted_from_command(
+        &self,
+        command_delay: TimeSpan,
+    ) -> Result<StoppingLaw<FromCommand>, StoppingError> {
+        self.earlier(command_delay)
+    }
+}
+
+impl StoppingLaw<FromCommand> {
+    /// Of a train that starts to brake `command_delay` (τ₂) after the command.
+    ///
+    /// # Errors
+    ///
+    /// If the law has less delay than that.
+    pub fn counted_from_braking(
+        &self,
+        command_delay: TimeSpan,
+    ) -> Result<StoppingLaw<FromBraking>, StoppingError> {
+        self.earlier(-command_delay)
+    }
+
+    /// In the mean, when the command follows at once on a report that is stamped `to_stamp` (φ) after a reading
+    /// that came `poll_interval` (π) after the reading before.
+    ///
+    /// # Errors
+    ///
+    /// If that mean is negative.
+    pub fn counted_from_report(
+        &self,
+        to_stamp: TimeSpan,
+        poll_interval: TimeSpan,
+    ) -> Result<StoppingLaw<FromReport>, StoppingError> {
+        self.earlier(mean_report_delay(to_stamp, poll_interval))
+    }
+}
+
+impl StoppingLaw<FromReport> {
+    /// The inverse of [`counted_from_report`](StoppingLaw::<FromCommand>::counted_from_report).
+    ///
+    /// # Errors
+    ///
+    /// If the law has less delay than the report.
+    pub fn counted_from_command(
+        &self,
+        to_stamp: TimeSpan,
+        poll_interval: TimeSpan,
+    ) -> Result<StoppingLaw<FromCommand>, StoppingError> {
+        self.earlier(-mean_report_delay(to_stamp, poll_interval))
+    }
+}
