@@ -67,10 +67,13 @@ pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
     paths().into_iter().filter(|path| wanted(path)).filter_map(read).collect()
 }
 
-/// The Rust sources below a folder, which ends in `/`.
+/// The Rust sources below a folder, which ends in `/`, less those that only tests have.
 pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
     let below = text_files(&[".rs"]).into_iter().filter(|file| file.path.starts_with(folder));
-    below.map(|file| Source::read(&file.path, &file.text)).collect()
+    let mut sources: Vec<Source> = below.map(|file| Source::read(&file.path, &file.text)).collect();
+    let of_tests: Vec<Vec<String>> = sources.iter().flat_map(|source| source.test_modules.clone()).collect();
+    sources.retain(|source| !of_tests.iter().any(|module| source.module().starts_with(module)));
+    sources
 }
 
 fn top() -> &'static str {

@@ -12,6 +12,8 @@ pub(crate) struct Source {
     pub(crate) named: Vec<NamedPath>,
     /// Each item that stands in the file itself, not in a module within it.
     pub(crate) items: Vec<Item>,
+    /// The modules of other files that only tests have, from the crate's root.
+    pub(crate) test_modules: Vec<Vec<String>>,
 }
 
 /// A path such as `crate::time::Timestamp`.
@@ -32,7 +34,8 @@ impl Source {
     /// Reads a file; `path` says which module it is.
     pub(crate) fn read(path: &str, text: &str) -> Self {
         let tokens = TokenStream::from_str(text).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let mut source = Self { path: path.into(), named: Vec::new(), items: Vec::new() };
+        let mut source =
+            Self { path: path.into(), named: Vec::new(), items: Vec::new(), test_modules: Vec::new() };
         source.walk(tokens, &module_of(path), 0);
         source
     }
@@ -47,13 +50,13 @@ impl Source {
         let mut at = 0;
         while let Some(token) = tokens.get(at) {
             at = match token {
-                TokenTree::Punct(p) if p.as_char() == '#' && attribute(&tokens, at).is_some() => {
-                    if attribute(&tokens, at).is_some_and(is_cfg_test) {
-                        after_item(&tokens, at)
-                    } else {
-                        at + 2
-                    }
+                TokenTree::Punct(_) if attribute(&tokens, at).is_some_and(is_cfg_test) => {
+                    let end = after_item(&tokens, at);
+                    let item = tokens.get(at..end).unwrap_or_default();
+                    self.test_modules.extend(module_elsewhere(item).map(|name| [module, &[name]].concat()));
+                    end
                 }
+                TokenTree::Punct(_) if attribute(&tokens, at).is_some() => at + 2,
                 TokenTree::Ident(_) if starts_path(&tokens, at) => {
                     self.take_path(&tokens, at, Vec::new(), module)
                 }
@@ -186,14 +189,26 @@ fn after_item(tokens: &[TokenTree], mut at: usize) -> usize {
     while attribute(tokens, at).is_some() {
         at += 2;
     }
-    let ends_in_semicolon =
-        tokens.iter().skip(at).take_while(|t| !ends_item(t, false)).any(
-            |t| matches!(t, TokenTree::Ident(word) if word == "use" || word == "extern" || word == "const"),
-        );
+    let head: Vec<String> = words(tokens.get(at..).unwrap_or_default()).collect();
+    let has = |word: &str| head.iter().any(|found| found == word);
+    // The braces of these are a group of names or a value, not the end.
+    let ends_in_semicolon = ["use", "extern", "static", "type", "const"].into_iter().any(has) && !has("fn");
     while tokens.get(at).is_some_and(|token| !ends_item(token, ends_in_semicolon)) {
         at += 1;
     }
-    at + 1
+    tokens.len().min(at + 1)
+}
+
+/// The words of an item up to its first braces or semicolon.
+fn words(item: &[TokenTree]) -> impl Iterator<Item = String> {
+    let head = item.iter().take_while(|token| !ends_item(token, false));
+    head.filter_map(|token| if let TokenTree::Ident(word) = token { Some(word.to_string()) } else { None })
+}
+
+/// The name of the module, if the item is one whose text is in another file.
+fn module_elsewhere(item: &[TokenTree]) -> Option<String> {
+    let elsewhere = matches!(item.last(), Some(TokenTree::Punct(p)) if p.as_char() == ';');
+    elsewhere.then(|| words(item).skip_while(|word| word != "mod").nth(1)).flatten()
 }
 
 fn ends_item(token: &TokenTree, by_semicolon: bool) -> bool {
@@ -237,6 +252,21 @@ mod tests {
         let text = "#[cfg(test)] extern crate std;\n#[cfg(test)] use std::{vec::Vec, fs::File};\n\
                     #[cfg(test)] mod tests { use std::fs::File; }\nuse core::fmt::Debug;";
         assert_eq!(named("core/src/time.rs", text), ["core::fmt::Debug"]);
+    }
+
+    #[test]
+    fn what_only_tests_see_ends_where_it_ends() {
+        let text = "#[cfg(test)] const fn f() -> u8 { std::u8::MAX } use core::fmt::Debug;";
+        assert_eq!(named("core/src/time.rs", text), ["core::fmt::Debug"]);
+        let text = "#[cfg(test)] static S: P = P { x: std::u8::MAX }; use core::fmt::Debug;";
+        assert_eq!(named("core/src/time.rs", text), ["core::fmt::Debug"]);
+    }
+
+    #[test]
+    fn a_module_of_tests_in_its_own_file_is_known() {
+        let text = "mod graph; #[cfg(test)] mod example; #[cfg(test)] mod tests {}";
+        let tests = Source::read("core/src/track/mod.rs", text).test_modules;
+        assert_eq!(tests, [["track", "example"]]);
     }
 
     #[test]
