@@ -19,10 +19,14 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+pub mod calibration;
 mod estimate;
+pub mod estimation;
 mod event;
 mod ids;
 pub mod kinematics;
+pub mod latency;
+pub mod linalg;
 mod time;
 pub mod track;
 mod units;

@@ -16,6 +16,15 @@ const MAX_TABLE_WORK: usize = 1 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct HopId(pub(crate) u32);
 
+impl HopId {
+    /// Its place as a number, to keep things by hop.
+    #[inline]
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// A way from a node to the first sensor on it, or to the end of the track when there is none before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hop<'l> {

@@ -1,0 +1,20 @@
+//! What the next report will be, learnt from the last.
+//!
+//! [`Predictor`] walks a recording entry by entry and never looks ahead. At every passage of a contact it
+//! compares what it had forecast with what happened ([`Hit`]), and learns: where the train is and how fast
+//! (`belief`), what the step means ([`SpeedTable`](crate::calibration::SpeedTable)), how long the hop is,
+//! and how the train changes speed. Each forecast is a distribution ([`Forecast`]) whose intervals hold as
+//! often as they say.
+
+mod belief;
+mod contact_scatter;
+mod forecast;
+mod law_memory;
+mod predictor;
+mod train_model;
+mod transition;
+
+pub use forecast::{Forecast, Phase};
+pub use law_memory::{Direction, KnownLaw, LawMemory};
+pub use predictor::{Hit, Predictor, Verdict};
+pub use train_model::TrainModel;

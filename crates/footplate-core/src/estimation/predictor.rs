@@ -1,0 +1,171 @@
+//! Walks a recording, forecasts every report and learns from it.
+
+use alloc::vec::Vec;
+
+use super::forecast::Forecast;
+use super::train_model::TrainModel;
+use crate::calibration::{Drift, LengthTable, Passage, PassageTracker, SectionIndex, Sighting};
+use crate::event::Event;
+use crate::ids::{SensorId, SpeedStep, TrainId};
+use crate::latency::PollTimingEstimator;
+use crate::track::Layout;
+
+/// What became of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Verdict {
+    /// The first passage of a run, or the first after the train's place was lost: nothing to compare with.
+    First,
+    /// It was as forecast, within what chance allows, and was learnt from.
+    Learnt,
+    /// It came at a time that one forecast in a hundred thousand allows; only its place was taken over.
+    Rejected,
+    /// It was rejected like the one before it: the gate is open again and the speed is learnt anew.
+    Reopened,
+}
+
+/// One passage of a contact, beside what had been forecast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// The passage.
+    pub passage: Passage,
+    /// What had been forecast for this contact before it reported; `None` when nothing could be.
+    pub forecast: Option<Forecast>,
+    /// The contact that had been named as the next; it differs after a missed contact or another way.
+    pub named: Option<SensorId>,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// The forecasts have been going wrong to one side for long: the future is no longer like the past.
+    pub drift: Option<Drift>,
+}
+
+/// Everything learnt so far, and the train under way.
+#[derive(Debug, Clone)]
+pub struct Predictor {
+    sections: SectionIndex,
+    trains: Vec<TrainModel>,
+    /// Which of `trains` the run is of, and its tracker.
+    under_way: Option<(usize, PassageTracker)>,
+    timing: PollTimingEstimator,
+}
+
+impl Predictor {
+    /// Knows the layout and nothing of any train.
+    #[must_use]
+    pub fn new(layout: &Layout) -> Self {
+        Self {
+            sections: SectionIndex::of(layout),
+            trains: Vec::new(),
+            under_way: None,
+            timing: PollTimingEstimator::default(),
+        }
+    }
+
+    /// A run begins: `train` has been running at `step` for long, or stands at step 0. The run's clock has
+    /// nothing to do with any before.
+    pub fn begin_run(&mut self, train: TrainId, step: SpeedStep) {
+        self.end_run();
+        let place = self.place_of(train);
+        if let Some(model) = self.trains.get_mut(place) {
+            model.begin_run(step);
+        }
+        self.timing.restart();
+        self.under_way = Some((place, PassageTracker::new(train, step, self.timing.clone())));
+    }
+
+    /// The run is over: what it showed of the train's speed goes into the table.
+    pub fn end_run(&mut self) {
+        if let Some((place, tracker)) = self.under_way.take() {
+            self.timing = tracker.timing().clone();
+            if let Some(model) = self.trains.get_mut(place) {
+                model.end_run();
+            }
+        }
+    }
+
+    /// The next entry of the run. A hit where it is a report of a passage; `None` for all else and outside
+    /// a run.
+    #[inline]
+    pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Hit> {
+        let (place, tracker) = self.under_way.as_mut()?;
+        let before = tracker.drive();
+        let period = tracker.timing().timing().period;
+        match tracker.take(layout, event) {
+            Some(Sighting::Passage(passage)) => {
+                let place = *place;
+                let prior = self.lengths_ahead(layout, place, &passage);
+                let model = self.trains.get_mut(place)?;
+                Some(model.pass(layout, &self.sections, passage, period, &prior))
+            }
+            Some(_) => None,
+            None => {
+                let now = tracker.drive();
+                if now != before {
+                    let model = self.trains.get_mut(*place)?;
+                    model.command(now);
+                }
+                None
+            }
+        }
+    }
+
+    /// What other trains found on the sections of a way on which this train never was, as (section, by,
+    /// variance) rows that its own table takes over. Empty on every later pass.
+    fn lengths_ahead(&self, layout: &Layout, place: usize, passage: &Passage) -> Vec<(usize, f64, f64)> {
+        let (Some(way), Some(model)) = (&passage.way, self.trains.get(place)) else { return Vec::new() };
+        let own = model.lengths();
+        way.hops()
+            .iter()
+            .filter_map(|hop| self.sections.section(*hop))
+            .filter(|section| own.get(*section).is_none())
+            .map(|section| {
+                let others = self.trains.iter().map(TrainModel::lengths);
+                let (by, variance) = LengthTable::pooled(others, section, layout.survey().uncertainty);
+                (section, by, variance)
+            })
+            .collect()
+    }
+
+    /// The forecast for the contact named next, as things stand: before any further report.
+    #[must_use]
+    pub fn forecast(&self, layout: &Layout) -> Option<Forecast> {
+        let (place, tracker) = self.under_way.as_ref()?;
+        self.trains.get(*place)?.forecast(layout, &self.sections, tracker)
+    }
+
+    /// What is known of a train.
+    #[must_use]
+    pub fn train(&self, train: TrainId) -> Option<&TrainModel> {
+        self.trains.iter().find(|model| model.train() == train)
+    }
+
+    /// The same, to take over a calibration.
+    pub fn train_mut(&mut self, train: TrainId) -> Option<&mut TrainModel> {
+        let place = self.place_of(train);
+        self.trains.get_mut(place)
+    }
+
+    /// All trains seen, in the order of their first run.
+    pub fn trains(&self) -> impl Iterator<Item = &TrainModel> {
+        self.trains.iter()
+    }
+
+    /// The sections by which lengths are kept.
+    #[must_use]
+    pub const fn sections(&self) -> &SectionIndex {
+        &self.sections
+    }
+
+    /// The rhythm of the link as learnt so far.
+    #[must_use]
+    pub fn timing(&self) -> &PollTimingEstimator {
+        self.under_way.as_ref().map_or(&self.timing, |(_, tracker)| tracker.timing())
+    }
+
+    fn place_of(&mut self, train: TrainId) -> usize {
+        self.trains.iter().position(|model| model.train() == train).unwrap_or_else(|| {
+            self.trains.push(TrainModel::new(train));
+            self.trains.len() - 1
+        })
+    }
+}

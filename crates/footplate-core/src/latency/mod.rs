@@ -1,0 +1,14 @@
+//! When things really happened: from the time of a report to the time of the contact.
+//!
+//! A contact that closed is reported by the first poll that reads it, so the report says only that it closed
+//! within the poll interval before. `poll_timing` finds the poll intervals of a link in the reports
+//! themselves, `contact_window` turns a report into an interval of contact times, and `uniform_normal` is
+//! the distribution of a report about a forecast.
+
+mod contact_window;
+mod poll_timing;
+mod uniform_normal;
+
+pub use contact_window::ContactWindow;
+pub use poll_timing::{PollTiming, PollTimingEstimator};
+pub use uniform_normal::UniformNormal;
