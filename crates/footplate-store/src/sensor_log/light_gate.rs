@@ -7,7 +7,7 @@
 use footplate_core::{EventKind, Report, RunId, SpeedStep, Timestamp, TrainId};
 
 use super::read::FormReader;
-use super::runs::{Runs, gate_named};
+use super::runs::{Runs, UNIX_TIMES_FROM, gate_named};
 use crate::decimal::scaled;
 use crate::recording::{Form, Note, Oddity, TrainAtStart};
 use crate::sensor_names::SensorNames;
@@ -36,7 +36,7 @@ impl<'a> LightGateLog<'a> {
         Self { sensors, run, train, speed_level, kind, name, time, clock, last_gate: None }
     }
 
-    fn entry(&self, row: Row<'_>) -> Result<Entry, TableError> {
+    fn entry(&self, row: Row<'_>, time: Timestamp) -> Result<Entry, TableError> {
         let (entry, clock) = match row.text(self.kind) {
             "sensor" => {
                 let sensor =
@@ -48,6 +48,9 @@ impl<'a> LightGateLog<'a> {
         };
         if row.text(self.clock) != clock {
             return Err(row.wrong(self.clock, format!("`{clock}`, the clock of this kind of row")));
+        }
+        if matches!(entry, Entry::Sensor(_)) && time < UNIX_TIMES_FROM {
+            return Err(row.wrong(self.time, "milliseconds since the Unix epoch, 1000000000000 or more"));
         }
         Ok(entry)
     }
@@ -72,7 +75,7 @@ impl FormReader for LightGateLog<'_> {
         let clock = row.read(self.time, "a time in milliseconds", |text| {
             scaled(text, 6).filter(|ns| *ns >= 0).map(Timestamp::from_ns)
         })?;
-        let entry = self.entry(row)?;
+        let entry = self.entry(row, clock)?;
         runs.check_not_ended(row, Some(self.run), id)?;
         let running = TrainAtStart { train, step };
         if runs.open(id).is_none() {
@@ -91,6 +94,11 @@ impl FormReader for LightGateLog<'_> {
         }
         match entry {
             Entry::Sensor(report) => {
+                if clock < UNIX_TIMES_FROM {
+                    return Err(
+                        row.wrong(self.time, "milliseconds since the Unix epoch, 1000000000000 or more")
+                    );
+                }
                 let origin = *run.began_at.get_or_insert(clock);
                 run.add(row, self.time, Timestamp::ZERO + (clock - origin), EventKind::Sensor(report))
             }

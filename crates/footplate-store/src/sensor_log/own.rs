@@ -8,7 +8,7 @@ use std::io::BufRead;
 use footplate_core::{EventKind, Report, RunId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::read::{FormReader, LogContext};
-use super::runs::{Runs, gate_named};
+use super::runs::{Runs, UNIX_TIMES_FROM, gate_named};
 use super::since_command::length_in_mm;
 use crate::decimal::scaled;
 use crate::recording::{Form, Run, TrainAtStart};
@@ -16,10 +16,6 @@ use crate::table::{Column, Row, Table, TableError};
 
 /// The run of a log that has no column `run`.
 const ONLY_RUN: RunId = RunId(1);
-/// Times from here on count from the Unix epoch (this is September 2001); earlier ones from the beginning of
-/// their run.
-pub(super) const UNIX_TIMES_FROM: Timestamp = Timestamp::from_ns(1_000_000_000 * 1_000_000_000);
-
 pub(super) struct OwnLog<'a> {
     context: LogContext<'a>,
     time: Column,

@@ -10,6 +10,10 @@ use crate::table::{Column, Row, TableError};
 /// The longest run that is believed, chosen: a month, beyond any session, and far from any epoch.
 pub(super) const LONGEST_RUN: TimeSpan = TimeSpan::from_ms(30 * 24 * 3_600_000);
 
+/// Times from here on count from the Unix epoch (this is September 2001); earlier ones from the beginning of
+/// their run.
+pub(super) const UNIX_TIMES_FROM: Timestamp = Timestamp::from_ns(1_000_000_000 * 1_000_000_000);
+
 /// The runs read so far. The last one is still open.
 #[derive(Default)]
 pub(super) struct Runs {
@@ -63,6 +67,8 @@ impl Runs {
 
     /// Ends the last run and hands everything over.
     pub(super) fn finish(mut self) -> (Vec<Run>, Vec<Note>) {
+        // A last line that turned out to be cut off may have opened a run and left nothing in it.
+        self.runs.pop_if(|run| run.events.is_empty() && run.trains.is_empty() && run.gates.is_empty());
         for (run, line) in self.runs.iter().zip(&self.began) {
             if run.reports().next().is_none() {
                 self.notes.push(Note { line: *line, oddity: Oddity::NoReports { run: run.id } });

@@ -9,17 +9,17 @@ use std::io::BufRead;
 use footplate_core::{EventKind, Length, Report, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::read::FormReader;
-use super::runs::Runs;
+use super::runs::{LONGEST_RUN, Runs};
 use crate::decimal::scaled;
 use crate::recording::{Form, Note, Oddity, TrainAtStart};
 use crate::sensor_names::SensorNames;
 use crate::table::{Column, Row, Table, TableError};
 
-/// The rate with which the seconds of these logs were made from ticks. (The processor's manual gives
-/// 508.469 kHz: true times are 0.09 % shorter. The seconds are taken as written.)
+/// The rate with which the seconds of these logs were made from ticks. (The timer of their processor, an EP9302,
+/// counts at 508.469 kHz: true times are 0.09 % shorter. The seconds are taken as written.)
 const TICKS_PER_S: i64 = 508_000;
-/// How far ticks and seconds may disagree: seconds are written to the microsecond.
-const AGREEMENT: TimeSpan = TimeSpan::from_us(2);
+/// How far ticks and seconds may disagree: seconds are rounded to the microsecond, half a tick.
+const AGREEMENT_TICKS: u32 = 1;
 
 pub(super) struct SinceCommandLog<'a> {
     sensors: &'a dyn SensorNames,
@@ -99,13 +99,10 @@ impl<'a> SinceCommandLog<'a> {
         let Some(column) = self.ticks.filter(|column| !row.text(*column).is_empty()) else { return Ok(None) };
         let ticks = row.read(column, "a count of ticks, 0 to 4294967295", |text| text.parse::<u32>().ok())?;
         if let (Some(from), false) = (self.ticks_at_command, begins) {
-            // The timer has 32 bits and runs over after 2.3 hours.
-            let counted = i64::from(ticks.wrapping_sub(from));
-            let counted = TimeSpan::from_us(counted * 1_000_000 / TICKS_PER_S);
-            if (counted - since).abs() > AGREEMENT {
-                // A slip of the pen may make centuries of the seconds, and ticks beyond 64 bits of those.
-                let expected = i128::from(since.as_ns()) * i128::from(TICKS_PER_S) / 1_000_000_000;
-                let expected = from.wrapping_add(u32::try_from(expected).unwrap_or(u32::MAX));
+            // The timer has 32 bits and begins anew after 2.3 hours: only the low bits can be compared.
+            let counted = since.as_ns() / 1_000 * TICKS_PER_S / 1_000_000;
+            let expected = from.wrapping_add(counted as u32);
+            if (ticks.wrapping_sub(expected) as i32).unsigned_abs() > AGREEMENT_TICKS {
                 return Err(
                     row.wrong(column, format!("{expected}, if the seconds since the command are right"))
                 );
@@ -125,9 +122,12 @@ impl FormReader for SinceCommandLog<'_> {
         let step = row.read(self.speed_level, "a throttle step, 0 to 126", |text| {
             text.parse().ok().and_then(SpeedStep::new)
         })?;
-        let since = row.read(self.since_command, "seconds since the command, such as 1.914390", |text| {
-            scaled(text, 9).filter(|ns| *ns >= 0).map(TimeSpan::from_ns)
-        })?;
+        let since =
+            row.read(self.since_command, "seconds since the command, 0 to 2592000 (30 days)", |text| {
+                scaled(text, 9)
+                    .map(TimeSpan::from_ns)
+                    .filter(|since| (TimeSpan::ZERO..=LONGEST_RUN).contains(since))
+            })?;
         let time = Timestamp::ZERO + since;
         runs.check_not_ended(row, Some(self.run), id)?;
         let begins = runs.open(id).is_none();

@@ -101,6 +101,10 @@ fn a_wrong_field_is_named_with_its_place_and_what_is_right() {
             "column 6 (t_ticks): `509009` should be 509000, if the seconds since the command are right",
         ),
         (
+            format!("{SINCE}1,speed,14,,,0,0.0\n1,sensor,14,A3,,1,9000000000\n"),
+            "column 7 (t_since_command_s): `9000000000` should be seconds since the command, 0 to 2592000 (30 days)",
+        ),
+        (
             format!("{SINCE}1,speed,14,,,,0.0\n1,sensor,13,A3,,,1.0\n"),
             "column 3 (speed_level): `13` should be 14, the step commanded in this run",
         ),
@@ -114,7 +118,13 @@ fn a_wrong_field_is_named_with_its_place_and_what_is_right() {
             "column 7 (clock): `gate_clock_ms` should be `host_epoch_ms`, the clock of this kind of row",
         ),
         (
-            format!("{GATE}1,74,14,sensor,C14,5,host_epoch_ms\n1,78,14,sensor,A4,6,host_epoch_ms\n"),
+            format!("{GATE}1,74,14,sensor,C14,15837402,host_epoch_ms\n"),
+            "column 6 (t_ms): `15837402` should be milliseconds since the Unix epoch, 1000000000000 or more",
+        ),
+        (
+            format!(
+                "{GATE}1,74,14,sensor,C14,1583740245914,host_epoch_ms\n1,78,14,sensor,A4,1583740245915,host_epoch_ms\n"
+            ),
             "line 3, column 2 (train): `78` should be 74, the train of this run",
         ),
     ];
@@ -188,6 +198,13 @@ fn a_last_line_without_its_end_is_kept_if_whole_and_left_out_if_cut() {
         assert_eq!(recording.notes[0].oddity, Oddity::LineCutOff, "{cut}");
         assert_eq!(recording.notes[0].line, 3, "{cut}");
     }
+}
+
+#[test]
+fn a_run_that_only_a_cut_line_would_begin_is_no_run() {
+    let recording = parse(b"run,t_s,kind,name\n1,0,sensor,A1\n2,99999999,sensor,A1").unwrap();
+    assert_eq!(recording.runs.len(), 1);
+    assert!(parse(b"run,t_s,kind,name\n2,99999999,sensor,A1").is_err());
 }
 
 #[test]
