@@ -19,10 +19,9 @@
 set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")"
-export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+export PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 
 readonly ALL_STEPS=(lint test bare-metal docs examples)
-readonly EXAMPLE_FOLDERS=(crates/*/examples)
 readonly EXPECTED_EXAMPLES=testdata/examples
 readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
 
@@ -81,32 +80,30 @@ step_bare-metal() {
 step_docs() {
   need_nextest
   RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
-  cargo nextest run -p footplate-core --test architecture -E 'test(/^links::/)'
+  # With the features of the whole workspace, in which the tests are built already.
+  cargo nextest run --workspace -E 'package(footplate-core) & binary(architecture) & test(/^links::/)'
 }
 
-# Calls $1 with the crate's name, the example's name and its source for each numbered example.
+# Calls $1 with the name of each numbered example. They are built as the tests are, and so are built already.
 each_example() {
-  local folder source
-  for folder in "${EXAMPLE_FOLDERS[@]}"; do
-    for source in "$folder"/[0-9][0-9]_*.rs; do
-      [[ -e $source ]] || continue
-      "$1" "$(basename "$(dirname "$folder")")" "$(basename "$source" .rs)" "$source"
-    done
+  cargo build --quiet --workspace --examples --profile test
+  local source
+  for source in crates/*/examples/[0-9][0-9]_*.rs; do
+    "$1" "$(basename "$source" .rs)"
   done
 }
 
-# In the profile of the tests, which has them built already.
-run_example() {
-  cargo run --quiet --profile test -p "$1" --example "$2"
+print_example() {
+  "$TARGET/debug/examples/$1"
 }
 
 check_example() {
-  local expected="$EXPECTED_EXAMPLES/$2.txt"
-  if ! run_example "$@" | diff --unified --label "$expected" --label "printed by $3" "$expected" -; then
-    echo "$3 no longer prints what is committed; if the new output is right: ./ci.sh expected"
+  local expected="$EXPECTED_EXAMPLES/$1.txt"
+  if ! print_example "$1" | diff --unified --label "$expected" --label "example $1" "$expected" -; then
+    echo "example $1 no longer prints what is committed; if the new output is right: ./ci.sh expected"
     return 1
   fi
-  echo "$2 prints what is committed"
+  echo "example $1 prints what is committed"
 }
 
 step_examples() {
@@ -115,8 +112,8 @@ step_examples() {
 }
 
 refresh_example() {
-  run_example "$@" >"$TARGET/$2.txt"
-  mv "$TARGET/$2.txt" "$EXPECTED_EXAMPLES/$2.txt"
+  print_example "$1" >"$TARGET/$1.txt"
+  mv "$TARGET/$1.txt" "$EXPECTED_EXAMPLES/$1.txt"
 }
 
 step_expected() {

@@ -1,7 +1,7 @@
 //! The files of the project, as git knows them.
 
 use std::fmt::{Display, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::source::Source;
@@ -39,18 +39,16 @@ pub(crate) fn assert_none(faults: &[Fault]) {
 /// Every file that is tracked, or new and not ignored, by its path from the top of the project, sorted.
 pub(crate) fn paths() -> Vec<String> {
     let list = Command::new("git")
+        .current_dir(top())
         // A server may check a project out as one user and test it as another.
-        .args(["-c", "safe.directory=*", "-C", top()])
+        .args(["-c", "safe.directory=*"])
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
         .output()
         .expect("git should be installed: it knows which files belong to the project");
     assert!(list.status.success(), "git ls-files failed: {}", String::from_utf8_lossy(&list.stderr));
     let names = String::from_utf8(list.stdout).expect("file names should be UTF-8");
-    let mut paths: Vec<String> = names
-        .split_terminator('\0')
-        .map(String::from)
-        .filter(|path| Path::new(top()).join(path).exists())
-        .collect();
+    let mut paths: Vec<String> =
+        names.split_terminator('\0').map(String::from).filter(|path| top().join(path).exists()).collect();
     paths.sort();
     paths.dedup();
     paths
@@ -60,7 +58,7 @@ pub(crate) fn paths() -> Vec<String> {
 pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
     let wanted = |path: &str| endings.is_empty() || endings.iter().any(|ending| path.ends_with(ending));
     let read = |path: String| {
-        let bytes = std::fs::read(Path::new(top()).join(&path)).expect("a listed file should be readable");
+        let bytes = std::fs::read(top().join(&path)).expect("a listed file should be readable");
         // What is no UTF-8 is no text.
         String::from_utf8(bytes).ok().map(|text| TextFile { path, text })
     };
@@ -76,6 +74,8 @@ pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
     sources
 }
 
-fn top() -> &'static str {
-    concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+/// The folder of the project. Asked when the test runs: checkouts that share a target folder share its binary.
+fn top() -> PathBuf {
+    let package = std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo should say where the package is");
+    Path::new(&package).join("../..")
 }
