@@ -5,7 +5,8 @@
 //! measurement of one unknown. Priors keep `a` positive definite, so no rank has to be guessed.
 #![expect(
     clippy::indexing_slicing,
-    reason = "all indices stay below `unknowns`, the size both vectors are made for"
+    clippy::needless_range_loop,
+    reason = "all indices stay below `unknowns`, the size both vectors are made for, and run as in the formulas"
 )]
 
 use alloc::vec;
