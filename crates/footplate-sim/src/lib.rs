@@ -8,10 +8,11 @@
 //! One seed is one world, on every machine and in every release: see [`World::run`].
 //!
 //! ```text
-//! run            a script happens in a world: events and their truth
-//! host  script   the program that polls and the person with the tape
-//! rolling  load  a train on rails       poller  contacts  gates
-//! motor  law  train  speed_table        path  circuit  track
+//! session  scenario   what a person would record in an hour, by name
+//! run  truth          a script happens in a world: events and what is behind them
+//! host  script        the program that polls and the person with the tape
+//! rolling  load       a train on rails       poller  contacts  gates
+//! motor  law  train  speed_table             path  railway  circuit  track
 //! draws
 //! ```
 
@@ -25,9 +26,12 @@ mod load;
 mod motor;
 mod path;
 mod poller;
+mod railway;
 mod rolling;
 mod run;
+mod scenario;
 mod script;
+mod session;
 mod speed_table;
 mod track;
 mod train;
@@ -38,8 +42,11 @@ pub use contacts::{Cause, Faults};
 pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use poller::Link;
+pub use railway::Railway;
 pub use run::{Conditions, SimulatedRun, World};
+pub use scenario::Scenario;
 pub use script::{Order, Script, Start, What, When};
+pub use session::Session;
 pub use speed_table::{Shape, SpeedTable};
 pub use track::TrueTrack;
 pub use train::{StopScatter, Train};

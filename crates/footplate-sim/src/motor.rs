@@ -32,6 +32,8 @@ const DEAD_TIME_SD: f64 = 0.1;
 const REST_MM_PER_S: f64 = 0.05;
 /// A stop is stretched or shortened by no more than this factor (chosen: beyond ten standard deviations).
 const STRETCH: core::ops::RangeInclusive<f64> = 0.75..=1.25;
+/// How much longer the trial stop lasts that tells what stretching does (chosen: small, far above rounding).
+const TRIAL_STRETCH: f64 = 0.01;
 /// No stop takes longer than this (chosen: ten times the longest measured).
 const LONGEST_STOP_S: f64 = 60.0;
 
@@ -149,10 +151,14 @@ impl<'train> Motor<'train> {
         }
         self.command_without_scatter(step);
         if step == SpeedStep::STAND {
+            // Dead time and averages do not stretch with the rest: ask the process itself what a slower pace
+            // makes of its way.
             let usual = self.clone().way_to_rest_mm();
+            let slower = Self { pace: 1.0 / (1.0 + TRIAL_STRETCH), ..self.clone() };
+            let per_stretch = (slower.way_to_rest_mm() - usual) / TRIAL_STRETCH;
             let scatter = self.train.stop_scatter.sd(Speed::from_mm_per_s(self.wheel_speed)).as_mm();
-            let stretch = if usual > 0.0 { draws.normal(1.0, scatter / usual) } else { 1.0 };
-            self.pace = 1.0 / stretch.clamp(*STRETCH.start(), *STRETCH.end());
+            let sd = if per_stretch > scatter { scatter / per_stretch } else { 0.0 };
+            self.pace = 1.0 / draws.normal(1.0, sd).clamp(*STRETCH.start(), *STRETCH.end());
         }
     }
 

@@ -3,9 +3,8 @@
 use footplate_core::track::Layout;
 use footplate_core::{EdgeId, Length, SensorId};
 
-use crate::circuit::Circuit;
 use crate::gates::GATE_SPACING_MM;
-use crate::track::TrueTrack;
+use crate::railway::Railway;
 
 /// Something at a point of the rails.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,14 +42,8 @@ pub(crate) struct Path {
 impl Path {
     /// The way from an origin, at least as long as `reach_mm`, with light gates (if any) in the middle of the
     /// circuit's longest edge.
-    pub(crate) fn new(
-        layout: &Layout,
-        track: &TrueTrack,
-        circuit: &Circuit,
-        origin: Origin,
-        reach_mm: f64,
-        has_gates: bool,
-    ) -> Self {
+    pub(crate) fn new(railway: &Railway<'_>, origin: Origin, reach_mm: f64, has_gates: bool) -> Self {
+        let Railway { layout, track, circuit } = railway;
         let edges = circuit.edges();
         let starts: Vec<usize> =
             (0..edges.len()).filter(|at| sensor_before(layout, edges, *at).is_some()).collect();

@@ -1,9 +1,8 @@
 //! One run: train, rails, line and script, step by step, into events and their truth.
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{Approach, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use crate::circuit::Circuit;
 use crate::contacts::{Contacts, Faults};
 use crate::draws::{Draws, Purpose};
 use crate::gates::{GateClock, GatePass};
@@ -11,9 +10,9 @@ use crate::host::{Host, Notes};
 use crate::motor::{Motor, STEP_S};
 use crate::path::{Origin, Path};
 use crate::poller::{Exchange, Line, Link};
+use crate::railway::Railway;
 use crate::rolling::Rolling;
 use crate::script::{Script, Start};
-use crate::track::TrueTrack;
 use crate::train::Train;
 use crate::truth::{Motion, RunTruth, SAMPLE_STEPS};
 
@@ -31,12 +30,8 @@ const SPARE_MM: f64 = 1000.0;
 /// Everything that a run takes place in and that it leaves as it was.
 #[derive(Debug, Clone, Copy)]
 pub struct World<'w> {
-    /// The track as the survey has it.
-    pub layout: &'w Layout,
-    /// The track as it is.
-    pub track: &'w TrueTrack,
-    /// Where the train runs round.
-    pub circuit: &'w Circuit,
+    /// The track, and where the train runs round.
+    pub railway: &'w Railway<'w>,
     /// How the host talks to the station.
     pub link: &'w Link,
     /// What goes wrong with contacts.
@@ -84,12 +79,18 @@ impl World<'_> {
             }
         };
         let path = self.path(script, Origin { sensor, past_mm });
-        let sensors = self.layout.sensors().map(|(sensor, _)| sensor).collect();
+        let sensors = self.railway.layout.sensors().map(|(sensor, _)| sensor).collect();
         let mut contacts = Contacts::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
         let remembered = (&mut contacts, draws.uniform(REMEMBERED_S));
         let motion_draws = Draws::new(seed, Purpose::Motion);
-        let mut rolling =
-            Rolling::new((self.track, &path), self.train, motor, conditions.warmth, remembered, motion_draws);
+        let mut rolling = Rolling::new(
+            (&self.railway.track, &path),
+            self.train,
+            motor,
+            conditions.warmth,
+            remembered,
+            motion_draws,
+        );
         let run_factor = rolling.load().run();
         let mut line = Line::new(self.link, Draws::new(seed, Purpose::Line));
         let gate_clock = GateClock::new(&mut draws);
@@ -139,16 +140,16 @@ impl World<'_> {
         let speeds = &self.train.speeds;
         let top = speeds.speed(speeds.highest(), Approach::Below).as_mm_per_s();
         let reach_mm = FASTEST * top * script.lasts.as_s() + SPARE_MM;
-        Path::new(self.layout, self.track, self.circuit, origin, reach_mm, script.has_gates)
+        Path::new(self.railway, origin, reach_mm, script.has_gates)
     }
 
     /// The turnouts of the circuit, thrown one after the other before the run.
     fn turnouts_thrown(&self, begins: Timestamp) -> Vec<Event> {
-        let count = self.circuit.turnouts().len();
+        let count = self.railway.circuit.turnouts().len();
         let event = |(nth, (turnout, leg)): (usize, (_, Leg))| Event {
             time: begins - TimeSpan::from_s(TURNOUT_PAUSE_S * (count - nth) as f64),
             kind: EventKind::Turnout { turnout, curved: leg.is_curved() },
         };
-        self.circuit.turnouts().enumerate().map(event).collect()
+        self.railway.circuit.turnouts().enumerate().map(event).collect()
     }
 }

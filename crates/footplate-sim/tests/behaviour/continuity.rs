@@ -3,7 +3,7 @@
 use footplate_core::{Approach, TimeSpan};
 use footplate_sim::{LawFamily, Script, SimulatedRun, Train, What, When};
 
-use crate::oval::{Yard, seconds, step};
+use crate::oval::{Yard, oval, seconds, step};
 
 /// No law or stiction of the drawn trains gives or takes speed faster than this (wheels of 80 g driven
 /// locomotives slip at about 2 m/s²; a motor let go at its breakaway speed jerks by 14 mm/s within 40 ms).
@@ -40,9 +40,10 @@ fn check(run: &SimulatedRun, name: &str) {
 
 #[test]
 fn place_and_speed_are_continuous_under_every_law() {
+    let layout = oval();
     for family in LawFamily::ALL {
         for seed in 0..8 {
-            let yard = Yard::new(Train::draw(seed, family), seed);
+            let yard = Yard::new(&layout, Train::draw(seed, family), seed);
             let run = yard.run(&up_down_and_stop(), seed);
             check(&run, &format!("{family} {seed}"));
             assert_eq!(run.truth.stops.len(), 1, "{family} {seed} did not stop within two minutes");
@@ -54,6 +55,7 @@ fn place_and_speed_are_continuous_under_every_law() {
 
 #[test]
 fn steady_speeds_are_those_of_the_table_from_both_sides() {
+    let layout = oval();
     for family in LawFamily::ALL {
         for seed in 0..4 {
             let mut train = Train::draw(seed, family);
@@ -61,8 +63,8 @@ fn steady_speeds_are_those_of_the_table_from_both_sides() {
             train.wander = footplate_core::Ratio::ZERO;
             train.warm_up = footplate_core::Ratio::ZERO;
             train.curve_feel = 0.0;
-            let mut yard = Yard::new(train, seed);
-            yard.track = footplate_sim::TrueTrack::as_surveyed(&yard.layout);
+            let mut yard = Yard::new(&layout, train, seed);
+            yard.railway.track = footplate_sim::TrueTrack::as_surveyed(&layout);
             for (first, approach) in [(6, Approach::Below), (12, Approach::Above)] {
                 let script = Script::from_rest(0, seconds(36))
                     .then(When::After(TimeSpan::ZERO), What::Speed(step(first)))

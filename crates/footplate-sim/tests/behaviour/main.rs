@@ -3,3 +3,7 @@
 mod continuity;
 mod oval;
 mod reports;
+mod same_seed;
+mod sessions;
+mod speeds;
+mod stops;

@@ -2,7 +2,9 @@
 
 use footplate_core::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey, TurnoutStates};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
-use footplate_sim::{Circuit, Conditions, Faults, Link, Script, SimulatedRun, Train, TrueTrack, World};
+use footplate_sim::{
+    Circuit, Conditions, Faults, Link, Railway, Script, SimulatedRun, Train, TrueTrack, World,
+};
 
 /// The layout.
 pub(crate) fn oval() -> Layout {
@@ -43,41 +45,27 @@ pub(crate) fn oval() -> Layout {
     .unwrap()
 }
 
-/// Round by the straight track of the passing loop.
-pub(crate) fn circuit(layout: &Layout) -> Circuit {
-    Circuit::from_turnouts(layout, layout.node_named("S0").unwrap(), &TurnoutStates::unknown()).unwrap()
-}
-
 /// A train on the oval, with the settings of a world that a test may change.
-pub(crate) struct Yard {
-    pub(crate) layout: Layout,
-    pub(crate) track: TrueTrack,
-    pub(crate) circuit: Circuit,
+pub(crate) struct Yard<'l> {
+    pub(crate) railway: Railway<'l>,
     pub(crate) link: Link,
     pub(crate) faults: Faults,
     pub(crate) train: Train,
 }
 
-impl Yard {
-    /// Without faults, on rails drawn from a seed.
-    pub(crate) fn new(train: Train, seed: u64) -> Self {
-        let layout = oval();
-        let track = TrueTrack::draw(&layout, seed);
-        let circuit = circuit(&layout);
-        Self { layout, track, circuit, link: Link::every_report(), faults: Faults::default(), train }
+impl<'l> Yard<'l> {
+    /// Round by the straight track of the passing loop, without faults, on rails drawn from a seed.
+    pub(crate) fn new(layout: &'l Layout, train: Train, seed: u64) -> Self {
+        let start = layout.node_named("S0").unwrap();
+        let circuit = Circuit::from_turnouts(layout, start, &TurnoutStates::unknown()).unwrap();
+        let railway = Railway { layout, track: TrueTrack::draw(layout, seed), circuit };
+        Self { railway, link: Link::every_report(), faults: Faults::default(), train }
     }
 
     /// One run of a train that is half warm.
     pub(crate) fn run(&self, script: &Script, seed: u64) -> SimulatedRun {
-        let world = World {
-            layout: &self.layout,
-            track: &self.track,
-            circuit: &self.circuit,
-            link: &self.link,
-            faults: &self.faults,
-            train_id: TrainId(24),
-            train: &self.train,
-        };
+        let Self { railway, link, faults, train } = self;
+        let world = World { railway, link, faults, train_id: TrainId(24), train };
         world.run(script, Conditions { clock: Timestamp::ZERO, warmth: 0.5 }, seed).0
     }
 }

@@ -3,17 +3,18 @@
 use footplate_core::{Approach, EventKind, Ratio, TimeSpan};
 use footplate_sim::{Cause, LawFamily, Link, Script, SimulatedRun, Train};
 
-use crate::oval::{Yard, seconds, step};
+use crate::oval::{Yard, oval, seconds, step};
 
-fn steady(yard: &Yard, seed: u64) -> SimulatedRun {
+fn steady(yard: &Yard<'_>, seed: u64) -> SimulatedRun {
     yard.run(&Script::running(2, step(11), Approach::Below, seconds(60)), seed)
 }
 
 #[test]
 fn contacts_close_at_times_uniform_between_two_readings() {
+    let layout = oval();
     let mut parts: Vec<f64> = Vec::new();
     for seed in 0..30 {
-        let yard = Yard::new(Train::draw(seed, LawFamily::Constant), seed);
+        let yard = Yard::new(&layout, Train::draw(seed, LawFamily::Constant), seed);
         for report in steady(&yard, seed).truth.reports.iter().filter(|report| report.first) {
             if report.cause == Cause::Train {
                 let span = (report.reading - report.reading_before).as_s();
@@ -32,7 +33,8 @@ fn contacts_close_at_times_uniform_between_two_readings() {
 
 #[test]
 fn a_contact_is_reported_while_the_shoe_is_on_it_and_where_it_really_lies() {
-    let yard = Yard::new(Train::draw(3, LawFamily::Lag), 3);
+    let layout = oval();
+    let yard = Yard::new(&layout, Train::draw(3, LawFamily::Lag), 3);
     let run = steady(&yard, 3);
     let motion = &run.truth.motion;
     for report in run.truth.reports.iter().filter(|report| report.cause == Cause::Train) {
@@ -55,7 +57,8 @@ fn a_contact_is_reported_while_the_shoe_is_on_it_and_where_it_really_lies() {
 
 #[test]
 fn events_are_in_order_of_time_and_a_program_may_note_only_the_first_report() {
-    let mut yard = Yard::new(Train::draw(5, LawFamily::Momentum), 5);
+    let layout = oval();
+    let mut yard = Yard::new(&layout, Train::draw(5, LawFamily::Momentum), 5);
     yard.link = Link { intervals: true, ..Link::first_reports() };
     yard.faults.missed = Ratio::from_percent(10.0);
     yard.faults.spurious_per_minute = 5.0;
@@ -73,7 +76,8 @@ fn events_are_in_order_of_time_and_a_program_may_note_only_the_first_report() {
 
 #[test]
 fn the_same_seed_is_the_same_run() {
-    let yard = Yard::new(Train::draw(9, LawFamily::Mixed), 9);
+    let layout = oval();
+    let yard = Yard::new(&layout, Train::draw(9, LawFamily::Mixed), 9);
     assert_eq!(steady(&yard, 9), steady(&yard, 9));
     assert_ne!(steady(&yard, 9).events, steady(&yard, 10).events);
 }
