@@ -4,14 +4,22 @@
 //! [`Recording`].
 
 mod decimal;
+mod layout_file;
 mod recording;
 mod sensor_log;
 mod sensor_names;
 mod table;
+mod whole_file;
 
+pub use layout_file::{
+    BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
+    LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
+    layout_named, parse_layout, read_layout, write_layout,
+};
 pub use recording::{Form, GatePass, Note, Oddity, RawEvent, Recording, Run, TrainAtStart};
 pub use sensor_log::{
     LogContext, RecordingError, WriteLogError, parse_sensor_log, read_sensor_log, write_sensor_log,
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
 pub use table::{LONGEST_LINE, TableError};
+pub use whole_file::write_whole;

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::completions;
+use super::{completions, layout};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -29,6 +29,7 @@ macro_rules! verbs {
 
 verbs! {
     Completions: completions,
+    Layout: layout,
 }
 
 /// How a verb ended that was asked rightly.

@@ -6,5 +6,6 @@
 
 mod command;
 mod completions;
+mod layout;
 
 pub(crate) use command::{Command, Outcome};

@@ -1,0 +1,41 @@
+//! The layouts that come with Footplate, and the one meaning of every `--layout`.
+
+use std::path::Path;
+
+use super::drawing::LayoutFile;
+use super::error::LayoutFileError;
+use super::read::{parse_layout, read_layout};
+
+/// The built-in layouts by name: the two tracks of the course on real-time trains, and the first of them as
+/// it was measured years before.
+pub const BUILT_IN: [&str; 3] = ["track-a", "track-a-v1", "track-b"];
+
+const TEXTS: [&str; 3] = [
+    include_str!("../../layouts/track-a.toml"),
+    include_str!("../../layouts/track-a-v1.toml"),
+    include_str!("../../layouts/track-b.toml"),
+];
+
+/// A built-in layout.
+///
+/// # Errors
+/// [`LayoutFileError::Unknown`] if there is none of that name.
+pub fn built_in(name: &str) -> Result<LayoutFile, LayoutFileError> {
+    let found = BUILT_IN.iter().zip(TEXTS).find(|(known, _)| **known == name);
+    let Some((name, text)) = found else {
+        return Err(LayoutFileError::Unknown { name: name.to_owned(), built_in: BUILT_IN.join(" or ") });
+    };
+    parse_layout(name, text.as_bytes())
+}
+
+/// A built-in layout if `name` is the name of one, otherwise the layout file at that path.
+///
+/// # Errors
+/// What is wrong with the file, or that there is neither.
+pub fn layout_named(name: &str) -> Result<LayoutFile, LayoutFileError> {
+    let path = Path::new(name);
+    match built_in(name) {
+        Err(LayoutFileError::Unknown { .. }) if path.exists() => read_layout(path),
+        result => result,
+    }
+}

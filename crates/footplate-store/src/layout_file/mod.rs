@@ -1,0 +1,24 @@
+//! Layouts on disk: a TOML file that people write by hand, an importer for tables, and the built-in ones.
+//!
+//! [`layout_named`] is what every `--layout` means: a built-in name or the path of a file. The grammar is
+//! described in `docs/formats/layout.md`.
+
+mod built_in;
+mod draw;
+mod drawing;
+mod error;
+mod import;
+mod import_error;
+mod read;
+mod tables;
+mod write;
+
+pub use built_in::{BUILT_IN, built_in, layout_named};
+pub use draw::{NothingToDraw, draw_layout};
+pub use drawing::{Drawing, LayoutFile};
+pub use error::{LayoutFileError, LayoutProblem, TextPlace};
+pub use import::{ImportContext, import_layout};
+pub use import_error::{ImportError, RowProblem};
+pub use read::{LARGEST_LAYOUT, parse_layout, read_layout};
+pub use tables::LayoutTables;
+pub use write::write_layout;

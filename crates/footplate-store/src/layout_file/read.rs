@@ -1,0 +1,246 @@
+//! Reads a layout from TOML.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use footplate_core::track::{
+    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, RailEnd, Stretch, Survey,
+};
+use footplate_core::{Length, TurnoutId};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::drawing::{Drawing, LayoutFile};
+use super::error::{LayoutFileError, LayoutProblem, TextPlace};
+use crate::sensor_names::{ModuleLetters, SensorNames};
+
+/// The largest file that is read, in bytes: a hundred times a built-in layout.
+pub const LARGEST_LAYOUT: usize = 1024 * 1024;
+
+/// The version of the grammar.
+pub(super) const FORMAT: i64 = 1;
+
+/// The largest coordinate that is drawn, in the unit of the file: far beyond any plan, and exact in `f64`.
+pub(super) const LARGEST_COORDINATE: f64 = 1e6;
+
+/// Reads the layout file at `path`.
+///
+/// # Errors
+/// What is wrong with it, with file, line and column.
+pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|input| input.take(LARGEST_LAYOUT as u64 + 1).read_to_end(&mut bytes))
+        .map_err(|source| LayoutFileError::Read { file: file.clone(), source })?;
+    parse_layout(&file, &bytes)
+}
+
+/// Reads a layout from the bytes of a file. `file` is what messages call it.
+///
+/// # Errors
+/// As [`read_layout`].
+pub fn parse_layout(file: &str, bytes: &[u8]) -> Result<LayoutFile, LayoutFileError> {
+    if bytes.len() > LARGEST_LAYOUT {
+        return Err(LayoutFileError::TooLarge { file: file.to_owned(), limit: LARGEST_LAYOUT });
+    }
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let before = &bytes[..error.valid_up_to()];
+        let line_start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        LayoutFileError::NotText {
+            file: file.to_owned(),
+            line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
+            byte: before.len() - line_start + 1,
+        }
+    })?;
+    read_text(text).map_err(|(byte, problem)| LayoutFileError::Wrong {
+        place: TextPlace::of_byte(file, text, byte),
+        problem,
+    })
+}
+
+/// The byte at fault and what is wrong with it.
+type Fault = (usize, LayoutProblem);
+
+fn read_text(text: &str) -> Result<LayoutFile, Fault> {
+    let written: Written = toml::from_str(text).map_err(|error| {
+        let byte = error.span().map_or(0, |span| span.start);
+        (byte, LayoutProblem::Toml(error.message().trim_end().replace('\n', "; ")))
+    })?;
+    let found = *written.format.get_ref();
+    if found != FORMAT {
+        return Err((written.format.span().start, LayoutProblem::Format { found, known: FORMAT }));
+    }
+    let plan = written.plan()?;
+    let layout = Layout::build(&plan).map_err(|error| (written.place_of(&error), error.into()))?;
+    let mut drawing = Drawing::default();
+    for (place, at) in plan.places.iter().zip(written.points()) {
+        let Some(at) = at else { continue };
+        let [x, y] = *at.get_ref();
+        // NaN is not within the limit either.
+        if !(x.abs() <= LARGEST_COORDINATE && y.abs() <= LARGEST_COORDINATE) {
+            return Err((at.span().start, LayoutProblem::Point { x, y, limit: LARGEST_COORDINATE }));
+        }
+        if let Some(node) = layout.node_named(&place.names()[0]) {
+            drawing.set(node, [x, y]);
+        }
+    }
+    Ok(LayoutFile { layout, about: written.about.trim().to_owned(), drawing })
+}
+
+/// The file as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    format: Spanned<i64>,
+    name: String,
+    #[serde(default)]
+    about: String,
+    length_uncertainty_mm: Spanned<f64>,
+    length_origin: String,
+    #[serde(default)]
+    sensors: Vec<Spanned<WrittenSensor>>,
+    #[serde(default)]
+    turnouts: Vec<Spanned<WrittenTurnout>>,
+    #[serde(default)]
+    never_both_curved: Vec<Spanned<[u16; 2]>>,
+    #[serde(default)]
+    ends: Vec<Spanned<WrittenEnd>>,
+    edges: Vec<Spanned<WrittenEdge>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenSensor {
+    names: [String; 2],
+    numbers: Option<[u16; 2]>,
+    at: Option<Spanned<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenTurnout {
+    number: u16,
+    names: [String; 2],
+    at: Option<Spanned<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenEnd {
+    names: [String; 2],
+    at: Option<Spanned<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenEdge {
+    from: Spanned<String>,
+    to: Spanned<String>,
+    mm: Spanned<f64>,
+}
+
+impl Written {
+    /// Sensors first, then turnouts, then ends: the order in which they are written.
+    fn plan(&self) -> Result<LayoutPlan, Fault> {
+        let sensors = self.sensors.iter().map(|sensor| sensor.get_ref().place(sensor.span().start));
+        let turnouts = self.turnouts.iter().map(|turnout| {
+            let WrittenTurnout { number, names, .. } = turnout.get_ref();
+            Ok(Place::Turnout { names: names.clone(), turnout: TurnoutId(*number) })
+        });
+        let ends = self.ends.iter().map(|end| Ok(Place::End { names: end.get_ref().names.clone() }));
+        let stretches = self.edges.iter().map(|edge| {
+            let WrittenEdge { from, to, mm } = edge.get_ref();
+            let length = Length::from_mm(*mm.get_ref());
+            Ok(Stretch { from: rail_end(from)?, to: rail_end(to)?, length })
+        });
+        Ok(LayoutPlan {
+            name: self.name.clone(),
+            survey: Survey {
+                uncertainty: Length::from_mm(*self.length_uncertainty_mm.get_ref()),
+                origin: self.length_origin.clone(),
+            },
+            places: sensors.chain(turnouts).chain(ends).collect::<Result<_, _>>()?,
+            stretches: stretches.collect::<Result<_, _>>()?,
+            never_both_curved: self
+                .never_both_curved
+                .iter()
+                .map(|pair| pair.get_ref().map(TurnoutId))
+                .collect(),
+        })
+    }
+
+    /// The points of all places, in the order of the plan.
+    fn points(&self) -> impl Iterator<Item = Option<&Spanned<[f64; 2]>>> {
+        let sensors = self.sensors.iter().map(|sensor| sensor.get_ref().at.as_ref());
+        let turnouts = self.turnouts.iter().map(|turnout| turnout.get_ref().at.as_ref());
+        let ends = self.ends.iter().map(|end| end.get_ref().at.as_ref());
+        sensors.chain(turnouts).chain(ends)
+    }
+
+    /// The byte at which stands what the layout complains about.
+    fn place_of(&self, error: &LayoutError) -> usize {
+        let mut places = (self.sensors.iter().map(|sensor| sensor.span().start))
+            .chain(self.turnouts.iter().map(|turnout| turnout.span().start))
+            .chain(self.ends.iter().map(|end| end.span().start));
+        let start = match error.entry() {
+            PlanEntry::Place(place) => places.nth(place),
+            PlanEntry::Stretch(stretch) => self.edges.get(stretch).map(|edge| edge.get_ref().place_of(error)),
+            PlanEntry::Pair(pair) => self.never_both_curved.get(pair).map(|pair| pair.span().start),
+            PlanEntry::Survey => Some(self.length_uncertainty_mm.span().start),
+            PlanEntry::Plan => None,
+        };
+        start.unwrap_or(0)
+    }
+}
+
+impl WrittenSensor {
+    fn place(&self, start: usize) -> Result<Place, Fault> {
+        let [one, other] = &self.names;
+        let number_in = |name: &String| {
+            let unknown = || (start, LayoutProblem::SensorNumber { name: name.clone() });
+            ModuleLetters.sensor_named(name).ok_or_else(unknown)
+        };
+        let sensors = match self.numbers {
+            Some(numbers) => numbers.map(footplate_core::SensorId),
+            None => [number_in(one)?, number_in(other)?],
+        };
+        Ok(Place::Sensor { names: self.names.clone(), sensors })
+    }
+}
+
+impl WrittenEdge {
+    /// The byte at which stands what the layout complains about in this edge.
+    fn place_of(&self, error: &LayoutError) -> usize {
+        let at_fault = match error {
+            LayoutError::IllegalLength { .. } => return self.mm.span().start,
+            LayoutError::UnknownNode { node, .. }
+            | LayoutError::LegMissing { node, .. }
+            | LayoutError::LegWithoutTurnout { node, .. }
+            | LayoutError::BeyondTrackEnd { node, .. } => node,
+            _ => return self.from.span().start,
+        };
+        let is_from = self.from.get_ref().split_whitespace().next() == Some(at_fault);
+        if is_from { self.from.span().start } else { self.to.span().start }
+    }
+}
+
+/// `C13`, `BR6 straight` or `BR6 curved`.
+fn rail_end(text: &Spanned<String>) -> Result<RailEnd, Fault> {
+    let mut words = text.get_ref().split_whitespace();
+    let node = words.next().map(ToOwned::to_owned);
+    let leg = match words.next() {
+        None => Some(None),
+        Some("straight") => Some(Some(Leg::Straight)),
+        Some("curved") => Some(Some(Leg::Curved)),
+        Some(_) => None,
+    };
+    match (node, leg, words.next()) {
+        (Some(node), Some(leg), None) => Ok(RailEnd { node, leg }),
+        _ => Err((
+            text.span().start,
+            LayoutProblem::RailEnd { found: text.get_ref().escape_debug().to_string() },
+        )),
+    }
+}

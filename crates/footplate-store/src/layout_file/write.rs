@@ -1,0 +1,120 @@
+//! Writes a layout as TOML that a person likes to read, and that reads back as the same layout.
+
+use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind};
+use footplate_core::{Length, NodeId};
+
+use super::drawing::{Drawing, LayoutFile};
+use super::read::FORMAT;
+use crate::decimal::unscaled;
+use crate::sensor_names::{ModuleLetters, SensorNames};
+
+/// The text of a layout file. Lengths are written to the nanometre.
+#[must_use]
+pub fn write_layout(file: &LayoutFile) -> String {
+    let LayoutFile { layout, about, drawing } = file;
+    let survey = layout.survey();
+    let mut text = format!("format = {FORMAT}\nname = {}\n", quoted(layout.name()));
+    if !about.is_empty() {
+        text += &format!("about = {}\n", quoted_lines(about));
+    }
+    text += &format!(
+        "# One standard deviation of the length of an edge, and how it is known.\n\
+         length_uncertainty_mm = {}\n\
+         length_origin = {}\n",
+        millimetres(survey.uncertainty),
+        quoted(&survey.origin),
+    );
+    let places = Places { layout, drawing };
+    text += "\n# A contact reports under one name or the other, by the direction of the train.\n";
+    text += &list("sensors", places.lines(|kind| matches!(kind, NodeKind::Sensor(_))));
+    text += "\n# First the name of the turnout met at its toe, then when met from one of its legs.\n";
+    text += &list("turnouts", places.lines(|kind| matches!(kind, NodeKind::Branch(_))));
+    if !layout.never_both_curved().is_empty() {
+        let pairs = layout.never_both_curved().iter().map(|[one, other]| format!("[{one}, {other}]"));
+        text += "\n# Turnouts in one place, of which at most one may lie curved.\n";
+        text += &format!("never_both_curved = [{}]\n", pairs.collect::<Vec<_>>().join(", "));
+    }
+    text += "\n# Where the track ends: first the name on the way in, then on the way out.\n";
+    text += &list("ends", places.lines(|kind| matches!(kind, NodeKind::Enter)));
+    text += "\n# Each stretch of rail once, in one of its directions; the way back is the same rail.\n";
+    text += &list("edges", stretches(layout));
+    text
+}
+
+/// `key = [` and an entry a line.
+fn list(key: &str, entries: impl Iterator<Item = String>) -> String {
+    let mut text = format!("{key} = [");
+    let mut end = "]\n";
+    for entry in entries {
+        text += &format!("\n  {{ {entry} }},");
+        end = "\n]\n";
+    }
+    text + end
+}
+
+struct Places<'f> {
+    layout: &'f Layout,
+    drawing: &'f Drawing,
+}
+
+impl<'f> Places<'f> {
+    fn lines(&self, is_wanted: impl Fn(NodeKind) -> bool) -> impl Iterator<Item = String> {
+        let firsts = self.layout.nodes().step_by(2);
+        firsts.filter(move |(_, node)| is_wanted(node.kind)).map(|(id, node)| self.line(id, node))
+    }
+
+    fn line(&self, id: NodeId, node: &Node) -> String {
+        let other = id.reverse();
+        let mut line = String::new();
+        if let NodeKind::Branch(turnout) = node.kind {
+            line += &format!("number = {turnout}, ");
+        }
+        line += &format!("names = [{}, {}]", quoted(&node.name), quoted(self.layout.node_name(other)));
+        if let (Some(one), Some(two)) = (self.layout.sensor_at(id), self.layout.sensor_at(other)) {
+            let told =
+                [&node.name, self.layout.node_name(other)].map(|name| ModuleLetters.sensor_named(name));
+            if told != [Some(one), Some(two)] {
+                line += &format!(", numbers = [{one}, {two}]");
+            }
+        }
+        if let Some([x, y]) = self.drawing.point(id) {
+            line += &format!(", at = [{x}, {y}]");
+        }
+        line
+    }
+}
+
+/// The edges in pairs: the first of each says where it leads, its twin by which leg it gets there.
+fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
+    let twins = layout.edges().skip(1).step_by(2);
+    layout.edges().step_by(2).zip(twins).map(|((_, there), (_, back))| {
+        let from = rail_end(layout, there.from, there);
+        let to = rail_end(layout, there.to, back);
+        format!("from = {from}, to = {to}, mm = {}", millimetres(there.length))
+    })
+}
+
+/// A node with the leg by which `leaving` leaves its place.
+fn rail_end(layout: &Layout, node: NodeId, leaving: &Edge) -> String {
+    let name = layout.node_name(node);
+    match leaving.leg {
+        None => quoted(name),
+        Some(Leg::Straight) => quoted(&format!("{name} straight")),
+        Some(Leg::Curved) => quoted(&format!("{name} curved")),
+    }
+}
+
+fn millimetres(length: Length) -> String {
+    unscaled((length.as_mm() * 1e6).round() as i64, 6)
+}
+
+/// A TOML string on one line.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// A TOML string that keeps its line ends, so that a paragraph stays one to the eye.
+fn quoted_lines(text: &str) -> String {
+    let is_plain = text.chars().all(|c| c == '\n' || !(c.is_control() || matches!(c, '"' | '\\')));
+    if text.contains('\n') && is_plain { format!("\"\"\"\n{text}\n\"\"\"") } else { quoted(text) }
+}

@@ -1,0 +1,87 @@
+//! `footplate layout import`: from tables of nodes and edges to a layout file.
+
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use footplate_core::track::Survey;
+use footplate_core::{Length, TurnoutId};
+use footplate_store::{ImportContext, LayoutTables, import_layout, write_layout, write_whole};
+
+use crate::commands::Outcome;
+
+/// What is assumed of lengths that come without a figure: two surveys of one course track by hand differ from
+/// a third by 9 and 11 mm (standard deviation of an edge).
+const ASSUMED_UNCERTAINTY_MM: &str = "10";
+const ASSUMED_ORIGIN: &str =
+    "assumed: surveys of one track by hand were seen to differ by 9 to 11 mm an edge";
+
+/// Import a layout from CSV tables of nodes and directed edges.
+///
+/// Nodes: name, type (sensor, branch, merge, enter or exit), number, reverse. Edges, with their twins: src, dst,
+/// direction (ahead, straight or curved), dist_mm. Points to draw at: name, x_px, y_px.
+#[derive(Args)]
+#[command(
+    after_help = "Example: footplate layout import --nodes nodes.csv --edges edges.csv --out loop.toml"
+)]
+pub(super) struct Arguments {
+    /// The table of nodes.
+    #[arg(long, value_name = "CSV")]
+    nodes: PathBuf,
+    /// The table of edges.
+    #[arg(long, value_name = "CSV")]
+    edges: PathBuf,
+    /// The table of points to draw at.
+    #[arg(long, value_name = "CSV")]
+    schematic: Option<PathBuf>,
+    /// The layout file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// What to call the layout [default: as the file].
+    #[arg(long)]
+    name: Option<String>,
+    /// A few words about the layout: where it stands, who measured it.
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    about: String,
+    /// One standard deviation of the length of an edge.
+    #[arg(long, value_name = "MM", default_value = ASSUMED_UNCERTAINTY_MM)]
+    length_uncertainty: f64,
+    /// Where that figure comes from.
+    #[arg(long, value_name = "TEXT", default_value = ASSUMED_ORIGIN)]
+    length_origin: String,
+    /// Two turnouts in one place of which at most one may lie curved, such as 153+154.
+    #[arg(long, value_name = "PAIR", value_parser = pair)]
+    never_both_curved: Vec<[TurnoutId; 2]>,
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let stem = || self.out.file_stem().map(OsStr::to_string_lossy).unwrap_or_default().into_owned();
+        let context = ImportContext {
+            name: self.name.clone().unwrap_or_else(stem),
+            about: self.about.trim().to_owned(),
+            survey: Survey {
+                uncertainty: Length::from_mm(self.length_uncertainty),
+                origin: self.length_origin.clone(),
+            },
+            never_both_curved: self.never_both_curved.clone(),
+        };
+        let tables = LayoutTables::open(&self.nodes, &self.edges, self.schematic.as_deref())?;
+        let file = import_layout(tables, &context)?;
+        let text = write_layout(&file);
+        write_whole(&self.out, text.as_bytes()).with_context(|| format!("writing {}", self.out.display()))?;
+        let (nodes, edges) = (file.layout.nodes().len(), file.layout.edges().len());
+        writeln!(output, "{}: {nodes} nodes and {edges} edges", self.out.display())?;
+        Ok(Outcome::Done)
+    }
+}
+
+fn pair(text: &str) -> Result<[TurnoutId; 2], String> {
+    let numbers =
+        text.split_once('+').and_then(|(one, other)| Some([one.parse().ok()?, other.parse().ok()?]));
+    numbers
+        .map(|pair| pair.map(TurnoutId))
+        .ok_or_else(|| "write two turnout numbers as in 153+154".to_owned())
+}
