@@ -1,6 +1,7 @@
 //! What people call a sensor: the names that files use for the numbers inside.
 
 use footplate_core::SensorId;
+use footplate_core::track::Layout;
 
 /// The names of a railway's sensors, both ways.
 pub trait SensorNames {
@@ -13,6 +14,25 @@ pub trait SensorNames {
     /// What a right name looks like, to end the sentence "this should be …".
     fn example(&self) -> String {
         "the name of a sensor of this layout".to_owned()
+    }
+}
+
+/// Sensors named as on a layout.
+impl SensorNames for Layout {
+    fn sensor_named(&self, name: &str) -> Option<SensorId> {
+        self.sensor_named(name)
+    }
+
+    fn name_of(&self, sensor: SensorId) -> Option<String> {
+        self.sensor_node(sensor).map(|node| self.node_name(node).to_owned())
+    }
+
+    fn example(&self) -> String {
+        let first = self.sensors().next().map(|(sensor, _)| self.sensor_name(sensor));
+        first.map_or_else(
+            || "a sensor, and this layout has none".to_owned(),
+            |first| format!("the name of a sensor of {}, such as {first}", self.name()),
+        )
     }
 }
 
@@ -60,6 +80,15 @@ mod tests {
             assert_eq!(ModuleLetters.name_of(SensorId(number)).as_deref(), Some(name));
         }
         assert_eq!(ModuleLetters.sensor_named("A01"), Some(SensorId(0)));
+    }
+
+    #[test]
+    fn a_layout_names_its_sensors() {
+        let layout: &dyn SensorNames = &crate::built_in("track-a").unwrap().layout;
+        assert_eq!(layout.sensor_named("C13"), Some(SensorId(44)));
+        assert_eq!(layout.name_of(SensorId(44)).as_deref(), Some("C13"));
+        assert_eq!((layout.sensor_named("BR6"), layout.name_of(SensorId(80))), (None, None));
+        assert_eq!(layout.example(), "the name of a sensor of track-a, such as A1");
     }
 
     #[test]

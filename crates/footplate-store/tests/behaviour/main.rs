@@ -1,6 +1,7 @@
 //! What the store promises, a file a promise.
 
 mod bad_logs;
+mod built_in_layouts;
 mod logs_round_trip;
 mod real_logs;
 mod recordings;
