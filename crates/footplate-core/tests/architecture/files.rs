@@ -93,7 +93,7 @@ fn mod_rs_is_a_contents_page() {
     let mut faults = Vec::new();
     for file in written_files().filter(|file| file.path.ends_with("/mod.rs")) {
         for item in Source::read(&file.path, &file.text).items {
-            let what = format!("defines a {}; it belongs in a file that is named after it", item.keyword);
+            let what = format!("defines a {}; it belongs in a file that is named after it", item.word);
             faults.push(Fault { path: file.path.clone(), line: item.line, what });
         }
     }

@@ -1,5 +1,6 @@
 //! The files of the project, as git knows them.
 
+use std::collections::BTreeSet;
 use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -63,6 +64,12 @@ pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
         String::from_utf8(bytes).ok().map(|text| TextFile { path, text })
     };
     paths().into_iter().filter(|path| wanted(path)).filter_map(read).collect()
+}
+
+/// The folder of sources of each crate, with a `/` at its end.
+pub(crate) fn source_folders() -> BTreeSet<String> {
+    let split = |path: &String| path.split_once("/src/").map(|(package, _)| format!("{package}/src/"));
+    paths().iter().filter_map(split).collect()
 }
 
 /// The Rust sources below a folder, which ends in `/`, less those that only tests have.

@@ -1,6 +1,7 @@
-//! What is absent from core and wire on purpose: std, clocks, randomness, and dependencies.
+//! What is absent on purpose: std, clocks, randomness and dependencies from core and wire, and from everything
+//! the mathematics that differs from machine to machine.
 
-use crate::project::{Fault, TextFile, assert_none, sources_below, text_files};
+use crate::project::{Fault, TextFile, assert_none, source_folders, sources_below, text_files};
 use crate::source::Source;
 
 const PURE: [&str; 2] = ["crates/footplate-core/src/", "crates/footplate-wire/src/"];
@@ -12,6 +13,13 @@ const WORLD: [(&str, &str); 5] = [
     ("rand_core", "draw random numbers in the simulator"),
     ("rand_chacha", "draw random numbers in the simulator"),
     ("rand_distr", "draw random numbers in the simulator"),
+];
+
+/// Methods of `f64` that take the platform's word for it, each in the last bit another. Rust promises exactness
+/// for the rest (the four operations, `sqrt`, rounding).
+const PLATFORM_MATHEMATICS: [&str; 22] = [
+    "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot", "sin", "cos",
+    "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh",
 ];
 
 /// What each pure crate may depend on.
@@ -27,6 +35,21 @@ fn worldly_paths(source: &Source) -> impl Iterator<Item = Fault> {
         let (_, instead) = WORLD.iter().find(|(name, _)| name == first)?;
         let what = format!("uses {}; {instead}", named.segments.join("::"));
         Some(Fault { path: source.path.clone(), line: named.line, what })
+    })
+}
+
+fn platform_mathematics(source: &Source) -> impl Iterator<Item = Fault> {
+    let methods = source.called.iter().map(|call| (call.line, call.word.as_str()));
+    let functions = source.named.iter().filter_map(|named| match named.segments.as_slice() {
+        [float, function] if matches!(float.as_str(), "f64" | "f32") => Some((named.line, function.as_str())),
+        _ => None,
+    });
+    methods.chain(functions).filter(|(_, name)| PLATFORM_MATHEMATICS.contains(name)).map(|(line, name)| {
+        Fault {
+            path: source.path.clone(),
+            line,
+            what: format!("calls {name}, whose last bit differs from machine to machine; take it from libm"),
+        }
     })
 }
 
@@ -77,12 +100,24 @@ fn core_and_wire_depend_on_what_is_listed_here() {
 }
 
 #[test]
+fn elementary_functions_come_from_libm() {
+    let sources = source_folders().into_iter().flat_map(|folder| sources_below(&folder));
+    let faults: Vec<Fault> = sources.flat_map(|s| platform_mathematics(&s).collect::<Vec<_>>()).collect();
+    assert_none(&faults);
+}
+
+#[test]
 fn a_clock_a_die_and_a_dependency_are_noticed() {
     let count = |text| worldly_paths(&Source::read("crates/footplate-core/src/time.rs", text)).count();
     assert_eq!(count("fn now() { std::time::Instant::now(); }"), 1);
     assert_eq!(count("use rand::Rng;"), 1);
     assert_eq!(count("extern crate std;"), 1);
     assert_eq!(count("use core::fmt::Display;"), 0);
+
+    let count = |text| platform_mathematics(&Source::read("crates/footplate-sim/src/motor.rs", text)).count();
+    assert_eq!(count("fn f(x: f64) -> f64 { x.exp() }"), 1);
+    assert_eq!(count("fn f(x: f64) -> f64 { f64::ln(x) }"), 1);
+    assert_eq!(count("fn f(x: f64) -> f64 { libm::exp(x).sqrt() }"), 0);
 
     let manifest = TextFile {
         path: "Cargo.toml".into(),

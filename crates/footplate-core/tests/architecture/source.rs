@@ -10,8 +10,10 @@ pub(crate) struct Source {
     pub(crate) path: String,
     /// Each path of two segments or more, with `crate`, `self` and `super` followed to where they lead.
     pub(crate) named: Vec<NamedPath>,
-    /// Each item that stands in the file itself, not in a module within it.
-    pub(crate) items: Vec<Item>,
+    /// Each method that is called.
+    pub(crate) called: Vec<Word>,
+    /// The keyword, such as `struct`, of each item that stands in the file itself, not in a module within it.
+    pub(crate) items: Vec<Word>,
     /// The modules of other files that only tests have, from the crate's root.
     pub(crate) test_modules: Vec<Vec<String>>,
 }
@@ -22,10 +24,10 @@ pub(crate) struct NamedPath {
     pub(crate) segments: Vec<String>,
 }
 
-/// The keyword of an item, such as `struct`.
-pub(crate) struct Item {
+/// One word and where it stands.
+pub(crate) struct Word {
     pub(crate) line: usize,
-    pub(crate) keyword: String,
+    pub(crate) word: String,
 }
 
 const ITEM_KEYWORDS: [&str; 7] = ["struct", "enum", "union", "trait", "impl", "fn", "macro_rules"];
@@ -34,8 +36,13 @@ impl Source {
     /// Reads a file; `path` says which module it is.
     pub(crate) fn read(path: &str, text: &str) -> Self {
         let tokens = TokenStream::from_str(text).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let mut source =
-            Self { path: path.into(), named: Vec::new(), items: Vec::new(), test_modules: Vec::new() };
+        let mut source = Self {
+            path: path.into(),
+            named: Vec::new(),
+            called: Vec::new(),
+            items: Vec::new(),
+            test_modules: Vec::new(),
+        };
         source.walk(tokens, &module_of(path), 0);
         source
     }
@@ -62,8 +69,12 @@ impl Source {
                 }
                 TokenTree::Ident(word) => {
                     let keyword = word.to_string();
+                    let here = || Word { line: word.span().start().line, word: keyword.clone() };
                     if depth == 0 && ITEM_KEYWORDS.contains(&keyword.as_str()) {
-                        self.items.push(Item { line: word.span().start().line, keyword: keyword.clone() });
+                        self.items.push(here());
+                    }
+                    if is_call(&tokens, at) {
+                        self.called.push(here());
                     }
                     match (keyword.as_str(), tokens.get(at + 1), tokens.get(at + 2)) {
                         ("mod", Some(TokenTree::Ident(name)), Some(TokenTree::Group(body))) => {
@@ -158,6 +169,12 @@ fn module_of(path: &str) -> Vec<String> {
 fn is_path_separator(tokens: &[TokenTree], at: usize) -> bool {
     let colon = |token: Option<&TokenTree>| matches!(token, Some(TokenTree::Punct(p)) if p.as_char() == ':');
     colon(tokens.get(at)) && colon(tokens.get(at.wrapping_add(1)))
+}
+
+/// Whether the word at `at` is a method and its arguments follow.
+fn is_call(tokens: &[TokenTree], at: usize) -> bool {
+    matches!(tokens.get(at.wrapping_sub(1)), Some(TokenTree::Punct(p)) if p.as_char() == '.')
+        && matches!(tokens.get(at + 1), Some(TokenTree::Group(g)) if g.delimiter() == Delimiter::Parenthesis)
 }
 
 fn starts_path(tokens: &[TokenTree], at: usize) -> bool {
@@ -275,9 +292,16 @@ mod tests {
     }
 
     #[test]
+    fn a_call_is_a_word_after_a_dot() {
+        let called =
+            Source::read("core/src/time.rs", "fn f(x: f64) -> f64 { x.exp() + ln(x) + self.cos }").called;
+        assert_eq!(called.iter().map(|call| call.word.as_str()).collect::<Vec<_>>(), ["exp"]);
+    }
+
+    #[test]
     fn items_within_a_module_are_not_the_files_own() {
         let text = "pub struct A; mod inner { fn f() {} } #[cfg(test)] mod tests { fn g() {} }";
         let items = Source::read("core/src/track/mod.rs", text).items;
-        assert_eq!(items.iter().map(|item| item.keyword.as_str()).collect::<Vec<_>>(), ["struct"]);
+        assert_eq!(items.iter().map(|item| item.word.as_str()).collect::<Vec<_>>(), ["struct"]);
     }
 }
