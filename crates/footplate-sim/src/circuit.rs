@@ -7,9 +7,11 @@ use footplate_core::{EdgeId, Length, NodeId, SensorId, TurnoutId};
 
 use crate::draws::{Draws, Purpose};
 
-/// Ways tried before the best of them is taken (chosen: finds a loop of eight sensors and more on both course
-/// layouts for every seed tried).
-const TRIES: usize = 400;
+/// Ways tried before a layout is said to have no circuit (chosen: far more than the few that the course layouts
+/// need).
+const TRIES: usize = 1000;
+/// The best of so many circuits is taken (chosen: long ones, but not always the same).
+const CANDIDATES: usize = 3;
 /// A way this many edges long that has not come back is given up.
 const LONGEST_WAY: usize = 400;
 
@@ -63,23 +65,19 @@ impl Circuit {
         })
     }
 
-    /// A circuit with many sensors: the best of many random ways, the same for the same seed.
+    /// A circuit with many sensors: the best of a few random ones, the same for the same seed.
     ///
     /// # Errors
     /// [`CircuitError::NoneFound`] if no way came back.
     pub fn draw(layout: &Layout, seed: u64) -> Result<Self, CircuitError> {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
-        let mut best: Option<(usize, Self)> = None;
-        for _ in 0..TRIES {
-            let Some(&start) = starts.get(draws.below(starts.len())) else { break };
-            let leg = |_| Leg::from_curved(draws.chance(0.5));
-            let Ok(circuit) = walk(layout, start, leg) else { continue };
-            let sensors = circuit.sensors(layout).len();
-            if sensors >= 2 && best.as_ref().is_none_or(|(most, _)| sensors > *most) {
-                best = Some((sensors, circuit));
-            }
-        }
+        let ways = (0..TRIES).filter_map(|_| {
+            let start = *starts.get(draws.below(starts.len()))?;
+            let circuit = walk(layout, start, |_| Leg::from_curved(draws.chance(0.5))).ok()?;
+            Some((circuit.sensors(layout).len(), circuit)).filter(|(sensors, _)| *sensors >= 2)
+        });
+        let best = ways.take(CANDIDATES).max_by_key(|(sensors, _)| *sensors);
         best.map(|(_, circuit)| circuit)
             .ok_or_else(|| CircuitError::NoneFound { layout: layout.name().to_owned() })
     }

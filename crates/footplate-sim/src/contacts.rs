@@ -11,6 +11,9 @@ const SPURIOUS_S: f64 = 0.02;
 /// How long a contact that sticks stays closed after the shoe has left it (chosen).
 const STUCK_S: core::ops::Range<f64> = 1.0..15.0;
 
+/// No more contacts close by themselves within a second (chosen: all of a large layout at once).
+const MOST_SPURIOUS_PER_S: f64 = 100.0;
+
 /// What goes wrong with contacts, and how often.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Faults {
@@ -20,7 +23,7 @@ pub struct Faults {
     pub poor: BTreeMap<SensorId, Ratio>,
     /// How often a contact stays closed after the shoe has left it.
     pub stuck: Ratio,
-    /// How many contacts close by themselves within a minute, over the whole layout.
+    /// How many contacts close by themselves within a minute, over the whole layout; at most 6000 do.
     pub spurious_per_minute: f64,
 }
 
@@ -75,7 +78,7 @@ pub(crate) struct Contacts<'faults> {
 impl<'faults> Contacts<'faults> {
     /// All open.
     pub(crate) fn new(faults: &'faults Faults, sensors: Vec<SensorId>, mut draws: Draws) -> Self {
-        let next_spurious = draws.waiting(faults.spurious_per_minute / 60.0);
+        let next_spurious = draws.waiting(spurious_per_s(faults));
         Self { faults, draws, sensors, closures: VecDeque::new(), before_run: Vec::new(), next_spurious }
     }
 
@@ -112,7 +115,7 @@ impl<'faults> Contacts<'faults> {
     pub(crate) fn read(&mut self, before: f64, reading: f64, latched: bool) -> Vec<Closure> {
         while self.next_spurious <= reading {
             let at = self.next_spurious;
-            self.next_spurious += self.draws.waiting(self.faults.spurious_per_minute / 60.0);
+            self.next_spurious += self.draws.waiting(spurious_per_s(self.faults));
             let Some(&sensor) = self.sensors.get(self.draws.below(self.sensors.len())) else { continue };
             let opened = at + SPURIOUS_S;
             self.closures.push_back(Closure {
@@ -139,6 +142,10 @@ impl<'faults> Contacts<'faults> {
         seen.dedup_by_key(|closure| closure.sensor);
         seen
     }
+}
+
+fn spurious_per_s(faults: &Faults) -> f64 {
+    (faults.spurious_per_minute / 60.0).min(MOST_SPURIOUS_PER_S)
 }
 
 #[cfg(test)]

@@ -34,6 +34,8 @@ const REST_MM_PER_S: f64 = 0.05;
 const STRETCH: core::ops::RangeInclusive<f64> = 0.75..=1.25;
 /// How much longer the trial stop lasts that tells what stretching does (chosen: small, far above rounding).
 const TRIAL_STRETCH: f64 = 0.01;
+/// Samples in the longest moving average (chosen: ten seconds of them).
+const MOST_SAMPLES: f64 = 10_000.0;
 /// No stop takes longer than this (chosen: ten times the longest measured).
 const LONGEST_STOP_S: f64 = 60.0;
 
@@ -88,7 +90,7 @@ impl<'train> Motor<'train> {
                 elapsed: 1.0,
             },
             Law::SCurve { up, down, rounding } => {
-                let samples = (rounding.as_s() / STEP_S).max(1.0) as usize;
+                let samples = (rounding.as_s() / STEP_S).clamp(1.0, MOST_SAMPLES) as usize;
                 let window = VecDeque::from(vec![0.0; samples]);
                 Process::Averaged { up: mm(up), down: mm(down), ramp: 0.0, window, sum: 0.0, level: samples }
             }
@@ -316,7 +318,7 @@ impl<'train> Motor<'train> {
     fn lag(&self, speeds_up: bool) -> f64 {
         match self.train.law {
             Law::Lag { up, down } | Law::Mixed { up_lag: up, down, .. } => {
-                TimeSpan::as_s(if speeds_up { up } else { down })
+                TimeSpan::as_s(if speeds_up { up } else { down }).max(STEP_S)
             }
             Law::Momentum { .. } => COUNTED_MOTOR_LAG_S,
             Law::Constant { .. } | Law::Smooth { .. } | Law::SCurve { .. } => RAMPED_MOTOR_LAG_S,

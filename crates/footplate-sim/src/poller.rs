@@ -74,6 +74,9 @@ impl Link {
     }
 }
 
+/// No poll is shorter (chosen: a thousand a second is more than any line carries).
+const SHORTEST_POLL_S: f64 = 1e-3;
+
 /// What happened on the line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Exchange<C> {
@@ -110,7 +113,7 @@ pub(crate) struct Line<C> {
 impl<C> Line<C> {
     /// A line on which polling has gone on for long before the run; its phase is random.
     pub(crate) fn new(link: &Link, mut draws: Draws) -> Self {
-        let period = link.period.as_s();
+        let period = link.period.as_s().max(SHORTEST_POLL_S);
         let free_at = draws.uniform(0.0..period);
         let reading = free_at - link.reading_to_stamp.as_s();
         let last = Poll { before: reading - period, reading, stamp_before: free_at - period, stamp: free_at };
@@ -145,7 +148,7 @@ impl<C> Line<C> {
     fn ask(&mut self) -> Poll {
         let period = self.link.period.as_s();
         // No poll is ever answered before it was asked, nor read before the last.
-        let takes = self.draws.normal(period, self.link.jitter.as_s()).max(0.5 * period);
+        let takes = self.draws.normal(period, self.link.jitter.as_s()).max(0.5 * period).max(SHORTEST_POLL_S);
         let stamp = self.free_at + takes;
         let reading = stamp - self.link.reading_to_stamp.as_s();
         Poll { before: self.last.reading, reading, stamp_before: self.last.stamp, stamp }

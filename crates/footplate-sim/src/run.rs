@@ -24,6 +24,8 @@ const REMEMBERED_S: core::ops::Range<f64> = -20.0..-2.0;
 const TURNOUT_PAUSE_S: f64 = 0.15;
 /// How much faster than its table a train may be: the path is laid out for that (chosen: all factors at worst).
 const FASTEST: f64 = 1.3;
+/// No run is longer (chosen: more than any experiment, and its truth still fits into memory).
+const LONGEST_RUN_S: f64 = 86_400.0;
 /// What the path is longer than the way at that speed (chosen: more than any shoe).
 const SPARE_MM: f64 = 1000.0;
 
@@ -98,7 +100,7 @@ impl World<'_> {
         let turnouts = self.turnouts_thrown(conditions.clock);
         let mut host = Host::new(self.train_id, self.link, conditions.clock, &script.orders, turnouts, draws);
 
-        let steps = (script.lasts.as_s() / STEP_S).max(0.0) as usize;
+        let steps = (lasts_s(script) / STEP_S) as usize;
         let mut samples = Vec::with_capacity(steps / SAMPLE_STEPS + 1);
         for step in 0..=steps {
             if step % SAMPLE_STEPS == 0 {
@@ -139,7 +141,7 @@ impl World<'_> {
     fn path(&self, script: &Script, origin: Origin) -> Path {
         let speeds = &self.train.speeds;
         let top = speeds.speed(speeds.highest(), Approach::Below).as_mm_per_s();
-        let reach_mm = FASTEST * top * script.lasts.as_s() + SPARE_MM;
+        let reach_mm = FASTEST * top * lasts_s(script) + SPARE_MM;
         Path::new(self.railway, origin, reach_mm, script.has_gates)
     }
 
@@ -152,4 +154,9 @@ impl World<'_> {
         };
         self.railway.circuit.turnouts().enumerate().map(event).collect()
     }
+}
+
+/// How long a run lasts at most, in s.
+fn lasts_s(script: &Script) -> f64 {
+    script.lasts.as_s().clamp(0.0, LONGEST_RUN_S)
 }

@@ -9,7 +9,8 @@ pub struct Script {
     pub start: Start,
     /// What is done, one after the other.
     pub orders: Vec<Order>,
-    /// When the run ends at the latest; earlier only once every order is done and the train rests.
+    /// When the run ends at the latest, a day at most; earlier only once every order is done and the train
+    /// rests for good.
     pub lasts: TimeSpan,
     /// Whether there are light gates on the track.
     pub has_gates: bool,

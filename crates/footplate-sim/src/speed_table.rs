@@ -43,6 +43,9 @@ const LEAST_RISE_MM_PER_S: f64 = 2.0;
 /// The largest part of the way to the next step that hysteresis may take (chosen below 1: steps keep their order).
 const LARGEST_PART_OF_A_STEP: f64 = 0.9;
 
+/// No model train is faster (chosen: five times the fastest measured).
+const FASTEST_MM_PER_S: f64 = 5000.0;
+
 /// True steady speeds on level straight track, the train warm and its run an average one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedTable {
@@ -53,12 +56,17 @@ pub struct SpeedTable {
 impl SpeedTable {
     /// A table from speeds at steps 0, 1, 2 … reached from below and from above.
     ///
-    /// The shorter of the two decides how many steps there are; step 0 stands whatever is given for it.
+    /// The shorter of the two decides how many steps there are; step 0 stands whatever is given for it. Speeds
+    /// below zero count as zero, beyond 5 m/s as 5 m/s.
     #[must_use]
     pub fn new(below: &[Speed], above: &[Speed]) -> Self {
         let steps = below.len().min(above.len());
         let column = |speeds: &[Speed]| {
-            let mut column: Vec<f64> = speeds.iter().take(steps).map(|speed| speed.as_mm_per_s()).collect();
+            let mut column: Vec<f64> = speeds
+                .iter()
+                .take(steps)
+                .map(|speed| Speed::ZERO.max(*speed).as_mm_per_s().min(FASTEST_MM_PER_S))
+                .collect();
             if let Some(stand) = column.first_mut() {
                 *stand = 0.0;
             }

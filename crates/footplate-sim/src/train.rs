@@ -121,7 +121,7 @@ impl Train {
     /// From the decoder's having the stop command until standstill, on level straight track, in an average
     /// run without scatter; integrated, not looked up.
     #[must_use]
-    pub fn stopping_distance(&self, step: SpeedStep, approach: Approach) -> Length {
+    pub fn way_to_rest(&self, step: SpeedStep, approach: Approach) -> Length {
         let mut motor = Motor::running(self, step, approach);
         motor.command_without_scatter(SpeedStep::STAND);
         Length::from_mm(motor.way_to_rest_mm())
@@ -141,14 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn stopping_distances_are_those_of_real_engines() {
+    fn ways_to_rest_are_those_of_real_engines() {
         // Real ones at top step: 817 mm (train 47) to 1588 mm (train 77); E stops of 13 from 580 to 640 mm.
         for family in LawFamily::ALL {
             for seed in 0..60 {
                 let train = Train::draw(seed, family);
-                let top = train.stopping_distance(train.speeds.highest(), Approach::Below).as_mm();
+                let top = train.way_to_rest(train.speeds.highest(), Approach::Below).as_mm();
                 assert!((550.0..1900.0).contains(&top), "{family} {seed}: {top} mm");
-                let low = train.stopping_distance(SpeedStep::new(5).unwrap(), Approach::Below).as_mm();
+                let low = train.way_to_rest(SpeedStep::new(5).unwrap(), Approach::Below).as_mm();
                 assert!(low < 0.6 * top, "{family} {seed}: {low} of {top} mm");
             }
         }

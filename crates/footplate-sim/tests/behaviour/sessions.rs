@@ -1,10 +1,12 @@
 //! Every scenario can be had with every law and seed, and looks like the recordings it is named after.
 
-use footplate_core::{EventKind, SpeedStep, TrainId};
-use footplate_sim::{Cause, LawFamily, Railway, Scenario, Session, SimulatedRun};
-use proptest::prelude::{ProptestConfig, any, prop_assert, proptest};
+use footplate_core::{Acceleration, EventKind, Length, Speed, SpeedStep, TimeSpan, TrainId};
+use footplate_sim::{
+    Cause, Law, LawFamily, Railway, Scenario, Script, Session, SimulatedRun, SpeedTable, Train, What, When,
+};
+use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_oneof, proptest};
 
-use crate::oval::oval;
+use crate::oval::{Yard, oval, step};
 
 fn session(name: &str, law: LawFamily, seed: u64) -> Session {
     let layout = oval();
@@ -43,6 +45,47 @@ proptest! {
                 prop_assert!(report.closed <= report.reading && report.reading <= run.events[report.event].time);
             }
         }
+    }
+}
+
+/// Any number a person could type, and then some.
+fn wild() -> impl Strategy<Value = f64> {
+    prop_oneof![-10.0..1000.0, Just(0.0), Just(f64::NAN), Just(f64::INFINITY), Just(-1e300), Just(1e300)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn no_setting_breaks_a_run(seed in any::<u64>(), law in 0..6_usize, wild in proptest::collection::vec(wild(), 18)) {
+        let span = |at: usize| TimeSpan::from_s(wild[at]);
+        let rate = |at: usize| Acceleration::from_mm_per_s2(wild[at]);
+        let speeds: Vec<Speed> = wild[..5].iter().map(|mm_per_s| Speed::from_mm_per_s(*mm_per_s)).collect();
+        let drawn = Train::draw(seed, LawFamily::ALL[law]);
+        let law = match drawn.law {
+            Law::Constant { .. } => Law::Constant { up: rate(5), down: rate(6) },
+            Law::Smooth { .. } => Law::Smooth { up: rate(5), down: rate(6), shortest: span(7) },
+            Law::SCurve { .. } => Law::SCurve { up: rate(5), down: rate(6), rounding: span(7) },
+            Law::Lag { .. } => Law::Lag { up: span(5), down: span(6) },
+            Law::Momentum { .. } => Law::Momentum { up_per_count: span(5), down_per_count: span(6) },
+            Law::Mixed { .. } => Law::Mixed { up: rate(5), up_lag: span(6), down: span(7) },
+        };
+        let train = Train {
+            speeds: SpeedTable::new(&speeds, &speeds), law, command_delay: span(8), start_dead_time: span(9),
+            friction: rate(10), wander_time: span(11), warm_up_time: span(12), curve_feel: wild[13],
+            shoe: Length::from_mm(wild[14]), ..drawn
+        };
+        let layout = oval();
+        let mut yard = Yard::new(&layout, train, seed);
+        yard.link.period = span(15);
+        yard.link.jitter = span(16);
+        yard.faults.spurious_per_minute = wild[17];
+        let script = Script::from_rest(0, TimeSpan::from_s(6.0))
+            .then(When::After(span(16)), What::Speed(step(3)))
+            .then(When::After(TimeSpan::from_ms(2000)), What::Speed(step(0)))
+            .then(When::AtRest, What::Measure);
+        let run = yard.run(&script, seed);
+        prop_assert!(run.truth.motion.ends() - run.truth.motion.begins() <= TimeSpan::from_s(6.0));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{completions, layout};
+use super::{completions, layout, simulate};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -30,6 +30,7 @@ macro_rules! verbs {
 verbs! {
     Completions: completions,
     Layout: layout,
+    Simulate: simulate,
 }
 
 /// How a verb ended that was asked rightly.

@@ -7,5 +7,6 @@
 mod command;
 mod completions;
 mod layout;
+mod simulate;
 
 pub(crate) use command::{Command, Outcome};

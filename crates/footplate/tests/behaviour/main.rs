@@ -1,4 +1,5 @@
 //! The program as a person in a shell sees it: what it prints, and the status it ends with.
 
 mod program;
+mod simulate;
 mod usage;

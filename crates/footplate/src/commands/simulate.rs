@@ -1,0 +1,43 @@
+//! `footplate simulate`: worlds whose truth is known.
+
+mod layout;
+mod recording;
+mod truth;
+
+use std::io::Write;
+
+use clap::{Args, Subcommand};
+
+use super::Outcome;
+
+/// Write recordings of simulated trains, with the truth beside them.
+#[derive(Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    arg_required_else_help = true,
+    after_help = "Example: footplate simulate layout --layout track-a --scenario stops --seed 7 --out runs"
+)]
+pub(crate) struct Arguments {
+    /// List the scenarios and laws of speed change.
+    #[arg(long)]
+    list: bool,
+    #[command(subcommand)]
+    world: Option<World>,
+}
+
+#[derive(Subcommand)]
+enum World {
+    Layout(layout::Arguments),
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if let Some(World::Layout(arguments)) = self.world {
+            return arguments.run(output);
+        }
+        if self.list {
+            layout::list(output)?;
+        }
+        Ok(Outcome::Done)
+    }
+}
