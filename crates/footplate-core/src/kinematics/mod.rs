@@ -1,20 +1,30 @@
 //! Motion in closed form: what a train does between two moments, and when it is where.
 //!
 //! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
+//! - [`Trapezoid`] and [`SCurve`] are planned: built from the current state, the target and the [`Limits`].
 //! - [`SpeedChange`] is what a decoder makes of a new throttle step.
 //! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
 
+mod bracket;
+mod limits;
 mod motion;
 mod phase;
+mod s_curve;
 mod slow_end;
 mod speed_change;
 mod stopping_distance;
 mod stopping_law;
+mod stretch;
+mod trapezoid;
 
+pub use limits::{Limits, ProfileError};
 pub use motion::{Motion, MotionState};
+pub use s_curve::{Playback, SCurve};
 pub use speed_change::{
     ConstantAcceleration, ConstantJerk, Lag, MidStep, Smooth, SpeedChange, SpeedLaw, StepRamp, StepTable,
     StepTableError,
 };
 pub use stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDistance};
 pub use stopping_law::{Braking, StoppingError, StoppingLaw};
+pub use stretch::{Running, Stretch};
+pub use trapezoid::Trapezoid;

@@ -61,3 +61,21 @@ fn rough_square_root(x: f64) -> f64 {
     const OFFSET: u64 = 0x1FF7_A3BE_A91D_9B1B;
     f64::from_bits((x.to_bits() >> 1) + OFFSET)
 }
+
+/// Cube root of a number that is not negative, to two units in the last place.
+///
+/// Written here because the one of `libm` rounds correctly, which takes four times as long without hardware
+/// that multiplies and adds in one step.
+#[inline]
+pub(super) fn cube_root(x: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    let mut root = rough_cube_root(x);
+    // Halley's method turns 3 % into 2e-5 and that into 5e-15; Newton's takes the rest.
+    for _ in 0..2 {
+        let cube = root * root * root;
+        root *= (cube + 2.0 * x) / (2.0 * cube + x);
+    }
+    root - (root - x / (root * root)) / 3.0
+}

@@ -2,5 +2,6 @@
 
 mod draw;
 mod motion_checks;
+mod profiles;
 mod speed_change_laws;
 mod stopping;

@@ -137,7 +137,11 @@ fn assert_law_holds(change: &SpeedChange<'_>, from: Speed, to: Speed, draw: &mut
     let speed = change.state_at(moment).speed;
     let slack = m_per_s(grain);
     assert!(from.min(to) - slack <= speed && speed <= from.max(to) + slack, "{speed:?} in {change:?}");
-    assert_inverse_leads_back(change, moment);
+    let at_the_step = matches!(change, SpeedChange::MidStep(_))
+        && (moment + moment - change.duration()).abs() <= TimeSpan::from_ns(2);
+    if !at_the_step {
+        assert_inverse_leads_back(change, moment); // from standstill, every moment before has the same distance
+    }
     // Within one half, so that no kink lies inside.
     let half = change.duration().as_s() / 2.0;
     let offset = if draw.one_in(2) { half } else { 0.0 };

@@ -1,0 +1,192 @@
+//! What a train may do at most, and why a profile within that cannot be had.
+
+use super::motion::MotionState;
+use crate::units::{Acceleration, Jerk, Length, Speed};
+
+/// The most that a profile uses; every limit is a size without a sign, above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Limits {
+    /// Speed.
+    pub speed: Speed,
+    /// Rate at which the train speeds up.
+    pub acceleration: Acceleration,
+    /// Rate at which it slows down.
+    pub deceleration: Acceleration,
+    /// Rate at which either of the two builds up and fades; profiles of constant acceleration do not look at it.
+    pub jerk: Jerk,
+}
+
+/// Why there is no profile from here to there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum ProfileError {
+    /// A limit is zero, negative or not a number.
+    NoLimit {
+        /// Its name in [`Limits`].
+        limit: &'static str,
+        /// What was given, in SI units.
+        found: f64,
+    },
+    /// A distance, speed or acceleration is not finite.
+    NotFinite {
+        /// The state that holds it.
+        found: MotionState,
+    },
+    /// The target's speed is above the limit, or leads back to where the train comes from.
+    TargetSpeed {
+        /// What was asked.
+        found: Speed,
+        /// The limit.
+        highest: Speed,
+    },
+    /// A jerk-limited profile ends without acceleration.
+    TargetAcceleration {
+        /// What was asked.
+        found: Acceleration,
+    },
+    /// The train runs away from the target and has to stop first.
+    RunsAway {
+        /// Its speed.
+        found: Speed,
+    },
+    /// The train already speeds up or slows down more than the limits allow.
+    BeyondLimits {
+        /// Its acceleration.
+        found: Acceleration,
+    },
+    /// The train brakes so hard that it stands before the jerk limit lets it ease off.
+    StandsFirst {
+        /// Its acceleration.
+        found: Acceleration,
+    },
+    /// The target is nearer than the train can reach its speed.
+    TooNear {
+        /// The way left.
+        found: Length,
+        /// The shortest way in which the target's speed can be reached.
+        shortest: Length,
+    },
+}
+
+impl core::fmt::Display for ProfileError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NoLimit { limit, found } => {
+                write!(f, "the limit of {limit} should be a number above zero, not {found}")
+            }
+            Self::NotFinite { found } => {
+                write!(f, "distance, speed and acceleration should be finite numbers, not {found:?}")
+            }
+            Self::TargetSpeed { found, highest } => {
+                let (found, highest) = (found.as_m_per_s(), highest.as_m_per_s());
+                write!(
+                    f,
+                    "the speed at the target should lead ahead with at most {highest} m/s, not be {found} m/s"
+                )
+            }
+            Self::TargetAcceleration { found } => {
+                let found = found.as_m_per_s2();
+                write!(f, "the acceleration at the target should be zero, not {found} m/s²")
+            }
+            Self::RunsAway { found } => {
+                let found = found.as_m_per_s();
+                write!(f, "the train runs away from the target at {found} m/s: stop it first")
+            }
+            Self::BeyondLimits { found } => {
+                let found = found.as_m_per_s2();
+                write!(
+                    f,
+                    "the train's acceleration of {found} m/s² is beyond the limits already: wait, or widen them"
+                )
+            }
+            Self::StandsFirst { found } => {
+                let found = found.as_m_per_s2();
+                write!(
+                    f,
+                    "at {found} m/s² the train stands before it can ease off: start from standstill instead"
+                )
+            }
+            Self::TooNear { found, shortest } => {
+                let (found, shortest) = (found.as_m(), shortest.as_m());
+                write!(f, "the target is {found} m ahead, and it takes {shortest} m to get to its speed")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ProfileError {}
+
+/// A problem turned so that the train runs forwards from distance 0, in plain SI numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ahead {
+    /// 1, or −1 where the target lies at the smaller distance.
+    pub(super) direction: f64,
+    /// Speed and acceleration now.
+    pub(super) speed: f64,
+    pub(super) acceleration: f64,
+    /// Way to the target and speed there.
+    pub(super) way: f64,
+    pub(super) target_speed: f64,
+    /// How precisely the way can be known from two distances.
+    pub(super) grain: f64,
+}
+
+/// Roundings that a state has gone through at most, in units in the last place.
+pub(super) const ROUNDINGS: f64 = 16.0;
+
+impl Ahead {
+    /// Turns a problem, and refuses what has no sense for any kind of profile.
+    #[inline]
+    pub(super) fn new(
+        current: MotionState,
+        target: MotionState,
+        limits: &Limits,
+    ) -> Result<Self, ProfileError> {
+        let checked = [
+            ("speed", limits.speed.as_m_per_s()),
+            ("acceleration", limits.acceleration.as_m_per_s2()),
+            ("deceleration", limits.deceleration.as_m_per_s2()),
+        ];
+        for (limit, found) in checked {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(ProfileError::NoLimit { limit, found });
+            }
+        }
+        for found in [current, target] {
+            let MotionState { distance, speed, acceleration } = found;
+            if !(distance.is_finite() && speed.is_finite() && acceleration.is_finite()) {
+                return Err(ProfileError::NotFinite { found });
+            }
+        }
+        let difference = (target.distance - current.distance).as_m();
+        // Where the target is here, the speeds tell which way is ahead.
+        let sense = if difference == 0.0 { (current.speed + target.speed).as_m_per_s() } else { difference };
+        let direction = if sense < 0.0 { -1.0 } else { 1.0 };
+        let ahead = Self {
+            direction,
+            speed: direction * current.speed.as_m_per_s(),
+            acceleration: direction * current.acceleration.as_m_per_s2(),
+            way: direction * difference,
+            target_speed: direction * target.speed.as_m_per_s(),
+            grain: ROUNDINGS * f64::EPSILON * current.distance.abs().max(target.distance.abs()).as_m(),
+        };
+        if ahead.speed < 0.0 {
+            return Err(ProfileError::RunsAway { found: current.speed });
+        }
+        if !(0.0..=limits.speed.as_m_per_s()).contains(&ahead.target_speed) {
+            return Err(ProfileError::TargetSpeed { found: target.speed, highest: limits.speed });
+        }
+        Ok(ahead)
+    }
+
+    /// The refusal of a target that is nearer than `shortest`, unless by no more than the grain.
+    #[inline]
+    pub(super) fn refuse_nearer_than(&self, shortest: f64) -> Result<(), ProfileError> {
+        if self.way < shortest - self.grain {
+            let (found, shortest) = (Length::from_m(self.way), Length::from_m(shortest));
+            return Err(ProfileError::TooNear { found, shortest });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! The profile of constant acceleration: speed up, cruise, slow down.
+
+#![expect(clippy::indexing_slicing, reason = "a phase's index is a count of the borders passed")]
+
+use super::limits::{Ahead, Limits, ProfileError};
+use super::motion::{Motion, MotionState};
+use super::stretch::{Stretch, stretches};
+use crate::time::TimeSpan;
+use crate::units::{Acceleration, Length, Speed};
+
+/// The quickest way from one state to another within limits of speed, acceleration and deceleration; a
+/// trapezium when drawn as speed over time.
+///
+/// Distances are those of the states it was built from. Acceleration jumps, so the states' own does not count.
+/// A train that is faster than the limit slows down to it first. Before the start the state is that of the
+/// start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trapezoid {
+    direction: f64,
+    origin: f64,
+    /// End of each phase in s since the start, and the way there in m; the last is the end of the profile.
+    times: [f64; PHASES],
+    ways: [f64; PHASES],
+    /// And one more, for the time after the end.
+    phases: [EvenPhase; PHASES + 1],
+}
+
+/// Speeding up or slowing down to the highest speed, cruising at it, and slowing down.
+const PHASES: usize = 3;
+
+/// A stretch of constant acceleration, counted from its slow end (see `slow_end.rs`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct EvenPhase {
+    time: f64,
+    way: f64,
+    speed: f64,
+    acceleration: f64,
+}
+
+impl Trapezoid {
+    /// The profile from a state to another.
+    ///
+    /// # Errors
+    ///
+    /// If a limit or a state makes no sense, or the target is nearer than its speed can be reached.
+    #[inline]
+    pub fn between(current: MotionState, target: MotionState, limits: Limits) -> Result<Self, ProfileError> {
+        let ahead = Ahead::new(current, target, &limits)?;
+        let Ahead { direction, speed: start, way, target_speed: end, .. } = ahead;
+        let (speeding, braking) = (limits.acceleration.as_m_per_s2(), limits.deceleration.as_m_per_s2());
+        let highest = limits.speed.as_m_per_s();
+        // What it takes to get from one end's speed to the other's at once.
+        let rate = if end > start { speeding } else { braking };
+        ahead.refuse_nearer_than(0.5 * (end - start).abs() * (end + start) / rate)?;
+        // d = (v² − v₁²)/2a + (v² − v₂²)/2b for the peak speed v.
+        let square = (2.0 * speeding * braking * way + braking * start * start + speeding * end * end)
+            / (speeding + braking);
+        let peak = libm::sqrt(square).max(start.max(end)).min(highest);
+        let first = if start > peak { -braking } else { speeding };
+        let (first_time, last_time) = ((peak - start) / first, (peak - end) / braking);
+        let (first_way, last_way) = (0.5 * (peak + start) * first_time, 0.5 * (peak + end) * last_time);
+        let cruise_way = (way - first_way - last_way).max(0.0);
+        let cruise_time = if cruise_way > 0.0 { cruise_way / peak } else { 0.0 };
+        let (cruise_end, whole) = (first_time + cruise_time, first_time + cruise_time + last_time);
+        let even = |time, way, speed, acceleration| EvenPhase { time, way, speed, acceleration };
+        Ok(Self {
+            direction,
+            origin: current.distance.as_m(),
+            times: [first_time, cruise_end, whole],
+            ways: [first_way, way - last_way, way],
+            phases: [
+                if first < 0.0 {
+                    even(first_time, first_way, peak, first)
+                } else {
+                    even(0.0, 0.0, start, first)
+                },
+                even(first_time, first_way, peak, 0.0),
+                even(whole, way, end, -braking),
+                even(whole, way, end, 0.0),
+            ],
+        })
+    }
+
+    /// Where it speeds up, cruises and slows down.
+    pub fn stretches(&self) -> impl Iterator<Item = Stretch> {
+        stretches(self.times.into_iter().zip(self.phases.map(|phase| phase.acceleration)))
+    }
+}
+
+impl Motion for Trapezoid {
+    #[inline]
+    fn state_at(&self, time: TimeSpan) -> MotionState {
+        let time = time.as_s().max(0.0);
+        let passed: usize = self.times.iter().map(|&end| usize::from(time >= end)).sum();
+        let phase = &self.phases[passed];
+        let t = time - phase.time;
+        let gained = phase.acceleration * t;
+        let way = phase.way + t * (phase.speed + 0.5 * gained);
+        MotionState {
+            distance: Length::from_m(self.origin + self.direction * way),
+            speed: Speed::from_m_per_s(self.direction * (phase.speed + gained)),
+            acceleration: Acceleration::from_m_per_s2(self.direction * phase.acceleration),
+        }
+    }
+
+    #[inline]
+    fn time_at(&self, distance: Length) -> Option<TimeSpan> {
+        let way = self.direction * (distance.as_m() - self.origin);
+        // The end itself belongs to the last phase: it may have no speed.
+        let passed: usize = self.ways.iter().map(|&end| usize::from(way > end)).sum();
+        let phase = &self.phases[passed];
+        let off = way - phase.way;
+        // From the slow end v t + a t²/2 = d has no cancellation as t = 2d / (v + √(v² + 2ad)).
+        let size = off.abs();
+        let speed =
+            phase.speed + libm::sqrt(phase.speed * phase.speed + 2.0 * phase.acceleration.abs() * size);
+        let after = if size > 0.0 { (2.0 * size / speed).copysign(off) } else { 0.0 };
+        let time = (phase.time + after).max(0.0);
+        (way >= 0.0 && time.is_finite()).then(|| TimeSpan::from_s(time))
+    }
+
+    fn duration(&self) -> TimeSpan {
+        let [.., whole] = self.times;
+        TimeSpan::from_s(whole)
+    }
+
+    fn distance(&self) -> Length {
+        let [.., whole] = self.ways;
+        Length::from_m(self.direction * whole)
+    }
+}
