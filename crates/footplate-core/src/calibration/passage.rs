@@ -155,6 +155,11 @@ impl PassageTracker {
         }
     }
 
+    /// The next entry of the run was excluded by a person: it counts, but nothing is made of it.
+    pub const fn skip(&mut self) {
+        self.entries += 1;
+    }
+
     fn sight(&mut self, layout: &Layout, sensor: SensorId, window: ContactWindow, entry: usize) -> Sighting {
         let Some(node) = layout.sensor_node(sensor) else { return Sighting::UnknownSensor };
         self.last_sensor = Some(sensor);

@@ -5,7 +5,7 @@
 //! reprogrammed is believed again soon.
 
 use super::belief::{A, Belief, C, Q, U};
-use crate::calibration::{Drive, LawFamily};
+use crate::calibration::{Direction, LawFamily};
 
 /// Delay from a command to its effect before a train has shown its own (s): 0.1 to 1 s over published
 /// decoders and stations.
@@ -18,24 +18,6 @@ const WORST_EVIDENCE: f64 = -8.0;
 /// Laws are doubted a little more after every report, so that they follow a train that changes.
 const PACE_WANDER: f64 = 0.01;
 const DELAY_WANDER_S: f64 = 0.01;
-
-/// Whether the train gets faster or slower.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
-pub enum Direction {
-    /// Faster, starts from rest included.
-    Up,
-    /// Slower, stops included.
-    Down,
-}
-
-impl Direction {
-    /// The direction of a command.
-    #[must_use]
-    pub fn of(drive: Drive) -> Self {
-        if drive.step < drive.from { Self::Down } else { Self::Up }
-    }
-}
 
 /// One law with its pace and delay as learnt so far.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,6 +15,6 @@ mod train_model;
 mod transition;
 
 pub use forecast::{Forecast, Phase};
-pub use law_memory::{Direction, KnownLaw, LawMemory};
+pub use law_memory::{KnownLaw, LawMemory};
 pub use predictor::{Hit, Predictor, Verdict};
 pub use train_model::TrainModel;

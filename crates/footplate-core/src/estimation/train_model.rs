@@ -5,11 +5,11 @@ use alloc::vec::Vec;
 use super::belief::{Belief, C, Command, Due, Hop, U, Unmodelled};
 use super::contact_scatter::ContactScatter;
 use super::forecast::{Forecast, Phase};
-use super::law_memory::{Direction, LawMemory};
+use super::law_memory::LawMemory;
 use super::predictor::{Hit, Verdict};
 use crate::calibration::{
-    DriftTest, Drive, Expected, Familiarity, LawFamily, LengthTable, Passage, PassageTracker, SectionIndex,
-    SpeedTable,
+    Direction, DriftTest, Drive, Expected, Familiarity, LawFamily, LengthTable, Passage, PassageTracker,
+    SectionIndex, SpeedTable,
 };
 use crate::event::Approach;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};

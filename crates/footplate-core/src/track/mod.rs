@@ -4,7 +4,9 @@
 //! direction of travel, and every stretch of rail is a pair of edges. A [`LayoutPlan`] says what a file or a
 //! test says, by name; [`Layout::build`] checks it and answers from then on by small integers:
 //! - [`Layout::hops_from`]: which sensors may come next, in nanoseconds, from a table made once;
-//! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent.
+//! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent;
+//! - [`Layout::route`]: the shortest way between two nodes;
+//! - [`Position`] and [`Landmark`]: points on the rails, and the names people give them.
 
 mod build;
 mod error;
@@ -12,13 +14,19 @@ mod error;
 mod example;
 mod graph;
 mod hop;
+mod landmark;
 mod plan;
+mod position;
 mod reach;
+mod route;
 mod turnout;
 
 pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, Ways};
 pub use hop::{Hop, HopId};
+pub use landmark::{Landmark, LandmarkError};
 pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, RailEnd, Stretch, Survey};
+pub use position::{Position, WayError};
 pub use reach::{MAX_MISSED, Reach, Reaches};
+pub use route::{Route, RouteError};
 pub use turnout::{Leg, TurnoutNeed, TurnoutStates};

@@ -1,0 +1,394 @@
+//! Which law a train follows when it changes speed: all of them fitted, compared, the best named.
+//!
+//! Two unknowns a law: `a` = ln of its pace and `q`, the delay from command to effect (s). For a change with
+//! contacts at times `t` and ways `s` the law says the way `X(t)`; where the train was when it was told is not
+//! known, so `x0` is fitted to each change: r = s − x0 − X(t), weighted by 1/w, w = v(t)²·var(t) + doubt². Levenberg and
+//! Marquardt's iteration on a and q with x0 eliminated; derivatives are numerical.
+//!
+//! Laws are compared by Akaike's criterion with unknown variance (n ln(χ²/n) + 2k, corrected for small n;
+//! Hurvich and Tsai, 1989) and by the error on changes held out of the fit, one at a time. They have to agree:
+//! a law that describes but does not forecast is not reported as best.
+#![expect(clippy::indexing_slicing, reason = "two unknowns, indexed below two")]
+
+use alloc::vec::Vec;
+
+use super::law_family::{Constant, LawFamily};
+use super::speed_curve::SpeedCurve;
+use super::transient::Transient;
+use crate::kinematics::{Motion, StepRamp, StepTable};
+use crate::time::TimeSpan;
+
+/// Prior of the delay: see `LawMemory`.
+const EXPECTED_DELAY_S: f64 = 0.4;
+const DELAY_SPREAD_S: f64 = 0.6;
+/// Prior of ln pace is that of the family, this much wider, so that the data decide.
+const PRIOR_WIDENED: f64 = 2.0;
+const MOST_ITERATIONS: usize = 60;
+/// Residuals beyond this many standard deviations count linearly (Huber, 1964): the first contact of a start
+/// may be of the train's rear end when it stood astride it.
+const HUBER: f64 = 2.5;
+/// Steps of the numerical derivatives.
+const STEP: [f64; 2] = [1e-3, 1e-3];
+/// A law whose residuals are this many times what poll and scatter explain does not fit.
+const FITS: f64 = 3.0;
+/// Fewest changes from which laws are told apart: one to fit and two to hold out.
+const FEWEST_CHANGES: usize = 3;
+
+/// What may describe a change of speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum LawKind {
+    /// A law between two speeds.
+    Family(LawFamily),
+    /// So many seconds a step through the train's own speed table (momentum, CV 3 and CV 4).
+    StepRamp,
+    /// A table of the share of the change done by time, read off the data: the fall-back.
+    Table,
+}
+
+/// One law as fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedLaw {
+    /// Which.
+    pub kind: LawKind,
+    /// Its pace (m/s² or s, see [`Constant`]; s a step for a ramp) and one standard deviation; for a table the
+    /// scale of its time.
+    pub pace: [f64; 2],
+    /// Delay from command to effect and one standard deviation (s).
+    pub delay: [f64; 2],
+    /// Covariance of ln pace and delay.
+    pub covariance: [[f64; 2]; 2],
+    /// Sum of squared residuals over their variances; wild ones count linearly.
+    pub chi_square: f64,
+    /// Contacts less unknowns.
+    pub freedom: usize,
+    /// Akaike's criterion; smaller is better.
+    pub criterion: f64,
+    /// Root mean square error on changes held out of the fit (mm of way).
+    pub held_out_mm: f64,
+    /// The table, for [`LawKind::Table`].
+    pub curve: Option<SpeedCurve>,
+}
+
+/// What the comparison came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawComparison {
+    /// Every law, the best by criterion first.
+    pub laws: Vec<FittedLaw>,
+    /// The law to use; the table when none fits and it forecasts better.
+    pub best: usize,
+    /// Whether the best explains the data within [`FITS`] times what poll and scatter allow.
+    pub fits: bool,
+    /// Whether held-out error and criterion name the same law, or one within a tenth of its error.
+    pub agreed: bool,
+    /// The changes behind it.
+    pub changes: usize,
+}
+
+/// Fits and compares all laws. `table` serves the step ramp. `None` with too few changes.
+#[must_use]
+pub fn compare_laws(changes: &[Transient], table: Option<&StepTable>) -> Option<LawComparison> {
+    if changes.len() < FEWEST_CHANGES {
+        return None;
+    }
+    let kinds = LawFamily::all().map(LawKind::Family).chain(table.map(|_| LawKind::StepRamp));
+    let mut laws: Vec<FittedLaw> = kinds.filter_map(|kind| fitted(kind, changes, table)).collect();
+    let curve = fitted_curve(changes, &laws);
+    laws.extend(curve);
+    laws.sort_by(|one, other| one.criterion.total_cmp(&other.criterion));
+    let (table_last, named) = (laws.iter().position(|law| law.kind == LawKind::Table), |law: &FittedLaw| {
+        law.kind != LawKind::Table
+    });
+    let first = laws.iter().position(named)?;
+    let fits = laws[first].chi_square < FITS * laws[first].freedom.max(1) as f64;
+    // The table has more unknowns, so it has to forecast better, not only to describe better.
+    let better = |table: &usize| laws[*table].held_out_mm < laws[first].held_out_mm;
+    let best = if fits { first } else { table_last.filter(better).unwrap_or(first) };
+    let least = laws.iter().map(|law| law.held_out_mm).fold(f64::INFINITY, f64::min);
+    let agreed = laws[best].held_out_mm <= 1.1 * least;
+    Some(LawComparison { best, fits, agreed, changes: changes.len(), laws })
+}
+
+/// The motion of a change under a law, since its effect began.
+fn motion<'t>(
+    kind: LawKind,
+    pace: f64,
+    change: &Transient,
+    table: Option<&'t StepTable>,
+) -> Option<crate::kinematics::SpeedChange<'t>> {
+    let [from, to] = change.speeds;
+    match kind {
+        LawKind::Family(family) => Some(family.change(pace, from, to)),
+        LawKind::StepRamp => {
+            let [from, to] = change.steps;
+            Some(crate::kinematics::SpeedChange::StepRamp(StepRamp::new(
+                table?,
+                from,
+                to,
+                TimeSpan::from_s(pace),
+            )))
+        }
+        LawKind::Table => None,
+    }
+}
+
+/// Way and speed at a time since the command.
+fn at(motion: &impl Motion, from: f64, since_effect: f64) -> (f64, f64) {
+    if since_effect <= 0.0 {
+        return (from * since_effect, from);
+    }
+    let state = motion.state_at(TimeSpan::from_s(since_effect));
+    (state.distance.as_m(), state.speed.as_m_per_s())
+}
+
+/// Cost of a residual and the weight it leaves it with.
+fn huber(residual: f64) -> (f64, f64) {
+    let size = residual.abs();
+    if size <= HUBER {
+        (residual * residual, 1.0)
+    } else {
+        (2.0 * HUBER * size - HUBER * HUBER, HUBER / size)
+    }
+}
+
+fn total_cost(all: &[(f64, f64)]) -> f64 {
+    all.iter().map(|(r, _)| huber(*r).0).sum()
+}
+
+/// Residuals of one change over their standard deviations, and in m, `x0` eliminated.
+fn residuals(ways: &[(f64, f64)], change: &Transient) -> Vec<(f64, f64)> {
+    let weights: Vec<f64> = change
+        .points
+        .iter()
+        .zip(ways)
+        .map(|(point, (_, speed))| {
+            1.0 / (speed * speed * point.variance + change.way_doubt * change.way_doubt)
+        })
+        .collect();
+    let off = |(point, (way, _)): (&super::transient::TransientPoint, &(f64, f64))| point.way - way;
+    let sum: f64 =
+        change.points.iter().zip(ways).map(off).zip(&weights).map(|(off, weight)| off * weight).sum();
+    let x0 = sum / weights.iter().sum::<f64>();
+    change
+        .points
+        .iter()
+        .zip(ways)
+        .map(off)
+        .zip(&weights)
+        .map(|(off, weight)| ((off - x0) * libm::sqrt(*weight), off - x0))
+        .collect()
+}
+
+fn all_residuals(
+    kind: LawKind,
+    x: [f64; 2],
+    changes: &[Transient],
+    table: Option<&StepTable>,
+) -> Option<Vec<(f64, f64)>> {
+    let mut all = Vec::new();
+    for change in changes {
+        let motion = motion(kind, libm::exp(x[0]), change, table)?;
+        let [from, _] = change.speeds;
+        let ways: Vec<(f64, f64)> = change
+            .points
+            .iter()
+            .map(|point| at(&motion, from.as_m_per_s(), point.since_command - x[1].max(0.0)))
+            .collect();
+        all.extend(residuals(&ways, change));
+    }
+    Some(all)
+}
+
+struct Found {
+    x: [f64; 2],
+    covariance: [[f64; 2]; 2],
+    chi_square: f64,
+}
+
+fn minimise(kind: LawKind, changes: &[Transient], table: Option<&StepTable>) -> Option<Found> {
+    let (start, spread) = match kind {
+        LawKind::Family(family) => family.expected_ln_pace(),
+        // 14 steps in three seconds, as long as a whole change takes.
+        LawKind::StepRamp => (libm::log(3.0 / 14.0), 0.4 * 0.4),
+        LawKind::Table => return None,
+    };
+    let prior = [
+        (start, spread * PRIOR_WIDENED * PRIOR_WIDENED),
+        (EXPECTED_DELAY_S, DELAY_SPREAD_S * DELAY_SPREAD_S),
+    ];
+    let cost = |x: [f64; 2]| -> Option<(f64, Vec<(f64, f64)>)> {
+        let all = all_residuals(kind, x, changes, table)?;
+        let sum = total_cost(&all);
+        let pull: f64 = (0..2).map(|i| (x[i] - prior[i].0) * (x[i] - prior[i].0) / prior[i].1).sum();
+        let total = sum + pull;
+        total.is_finite().then_some((total, all))
+    };
+    let mut x = [prior[0].0, prior[1].0];
+    let (mut best, mut all) = cost(x)?;
+    let mut damping = 1e-3;
+    let mut information = [[0.0; 2]; 2];
+    for _ in 0..MOST_ITERATIONS {
+        let mut columns = Vec::with_capacity(2);
+        for i in 0..2 {
+            let mut moved = x;
+            moved[i] += STEP[i];
+            columns.push(all_residuals(kind, moved, changes, table)?);
+        }
+        let j = |i: usize, row: usize| (columns[i][row].0 - all[row].0) / STEP[i];
+        information = [[0.0; 2]; 2];
+        let mut gradient = [0.0; 2];
+        for (row, (residual, _)) in all.iter().enumerate() {
+            let slopes = [j(0, row), j(1, row)];
+            let (_, weight) = huber(*residual);
+            for (i, slope) in slopes.iter().enumerate() {
+                gradient[i] += weight * slope * residual;
+                for (k, other) in slopes.iter().enumerate() {
+                    information[i][k] += weight * slope * other;
+                }
+            }
+        }
+        for i in 0..2 {
+            information[i][i] += 1.0 / prior[i].1;
+            gradient[i] += (x[i] - prior[i].0) / prior[i].1;
+        }
+        let mut improved = false;
+        for _ in 0..8 {
+            let damped = [
+                [information[0][0] * (1.0 + damping), information[0][1]],
+                [information[1][0], information[1][1] * (1.0 + damping)],
+            ];
+            let inverse = inverse(damped)?;
+            let step: [f64; 2] =
+                core::array::from_fn(|i| -(inverse[i][0] * gradient[0] + inverse[i][1] * gradient[1]));
+            let tried = [x[0] + step[0].clamp(-1.0, 1.0), x[1] + step[1].clamp(-1.0, 1.0)];
+            if let Some((value, residuals)) = cost(tried).filter(|(value, _)| *value < best) {
+                improved = best - value > 1e-9 * best;
+                (best, all, x) = (value, residuals, tried);
+                damping *= 0.3;
+                break;
+            }
+            damping *= 4.0;
+        }
+        if !improved {
+            break;
+        }
+    }
+    let covariance = inverse(information)?;
+    Some(Found { x, covariance, chi_square: total_cost(&all) })
+}
+
+fn inverse(a: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+    let determinant = a[0][0] * a[1][1] - a[0][1] * a[1][0];
+    (determinant > 0.0 && determinant.is_finite()).then(|| {
+        [[a[1][1] / determinant, -a[0][1] / determinant], [-a[1][0] / determinant, a[0][0] / determinant]]
+    })
+}
+
+/// Akaike's corrected criterion for `n` residuals, `k` unknowns.
+fn criterion(chi_square: f64, n: usize, k: usize) -> f64 {
+    let (n, k) = (n as f64, k as f64);
+    let small = if n > k + 1.0 { 2.0 * k * (k + 1.0) / (n - k - 1.0) } else { f64::INFINITY };
+    n * libm::log((chi_square / n).max(1e-12)) + 2.0 * k + small
+}
+
+fn points(changes: &[Transient]) -> usize {
+    changes.iter().map(|change| change.points.len()).sum()
+}
+
+fn fitted(kind: LawKind, changes: &[Transient], table: Option<&StepTable>) -> Option<FittedLaw> {
+    let found = minimise(kind, changes, table)?;
+    let n = points(changes);
+    // The unknowns of the law and the place of each change.
+    let unknowns = 2 + changes.len();
+    let freedom = n.saturating_sub(unknowns);
+    // Where the law is not quite true the residuals say by how much the doubt has to grow.
+    let grown = (found.chi_square / freedom.max(1) as f64).max(1.0);
+    let covariance = found.covariance.map(|line| line.map(|value| value * grown));
+    let pace = libm::exp(found.x[0]);
+    let held_out = held_out(changes, |others, change| {
+        let x = minimise(kind, others, table)?.x;
+        all_residuals(kind, x, core::slice::from_ref(change), table)
+    });
+    Some(FittedLaw {
+        kind,
+        pace: [pace, pace * libm::sqrt(covariance[0][0])],
+        delay: [found.x[1].max(0.0), libm::sqrt(covariance[1][1])],
+        covariance,
+        chi_square: found.chi_square,
+        freedom,
+        criterion: criterion(found.chi_square, n, unknowns),
+        held_out_mm: held_out?,
+        curve: None,
+    })
+}
+
+/// Root mean square error (mm) over changes each forecast by a fit to all the others.
+fn held_out(
+    changes: &[Transient],
+    forecast: impl Fn(&[Transient], &Transient) -> Option<Vec<(f64, f64)>>,
+) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (place, change) in changes.iter().enumerate() {
+        let others: Vec<Transient> = changes
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != place)
+            .map(|(_, other)| other.clone())
+            .collect();
+        for (_, off) in forecast(&others, change)? {
+            sum += off * off;
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| 1e3 * libm::sqrt(sum / count))
+}
+
+fn curve_residuals(curve: &SpeedCurve, changes: &[Transient]) -> Vec<(f64, f64)> {
+    changes
+        .iter()
+        .flat_map(|change| {
+            let ways: Vec<(f64, f64)> =
+                change.points.iter().map(|point| curve.at(change.speeds, point.since_command)).collect();
+            residuals(&ways, change)
+        })
+        .collect()
+}
+
+/// The fall-back: the best law between two speeds sets the scale of time, a table the shape.
+fn fitted_curve(changes: &[Transient], laws: &[FittedLaw]) -> Option<FittedLaw> {
+    let scale = laws
+        .iter()
+        .filter(|law| matches!(law.kind, LawKind::Family(_)))
+        .min_by(|one, other| one.criterion.total_cmp(&other.criterion))?;
+    let LawKind::Family(family) = scale.kind else { return None };
+    let shape =
+        |changes: &[Transient]| SpeedCurve::of(changes, family.constant, scale.pace[0], scale.delay[0]);
+    let curve = shape(changes)?;
+    let chi_square = total_cost(&curve_residuals(&curve, changes));
+    let n = points(changes);
+    let unknowns = SpeedCurve::UNKNOWNS + 2 + changes.len();
+    let held_out = held_out(changes, |others, change| {
+        Some(curve_residuals(&shape(others)?, core::slice::from_ref(change)))
+    });
+    Some(FittedLaw {
+        kind: LawKind::Table,
+        chi_square,
+        freedom: n.saturating_sub(unknowns),
+        criterion: criterion(chi_square, n, unknowns),
+        held_out_mm: held_out?,
+        curve: Some(curve),
+        ..scale.clone()
+    })
+}
+
+impl LawKind {
+    /// What stays the same between changes, for the unit of the pace; `None` for a table.
+    #[must_use]
+    pub const fn constant(self) -> Option<Constant> {
+        match self {
+            Self::Family(family) => Some(family.constant),
+            Self::StepRamp => Some(Constant::Time),
+            Self::Table => None,
+        }
+    }
+}

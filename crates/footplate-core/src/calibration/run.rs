@@ -1,0 +1,129 @@
+//! The passages of one run, and the stretches of it in which the train ran at a settled speed.
+
+use alloc::vec::Vec;
+
+use super::passage::{Drive, Passage, PassageTracker, Sighting};
+use crate::event::{Event, EventKind};
+use crate::ids::{SensorId, SpeedStep, TrainId};
+use crate::latency::PollTimingEstimator;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Layout;
+use crate::units::Length;
+
+/// Where a run came to rest, measured by hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredStop {
+    /// When the command to stand was sent.
+    pub commanded: Timestamp,
+    /// The step before it.
+    pub from: SpeedStep,
+    /// When a person saw the train stand.
+    pub seen: Timestamp,
+    /// The contact from which the tape was laid, and how far past it the train stood.
+    pub landmark: SensorId,
+    /// See `landmark`.
+    pub offset: Length,
+    /// The entry of the run that tells it.
+    pub entry: usize,
+}
+
+/// What a run of one train tells, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunPassages {
+    /// The train.
+    pub train: TrainId,
+    /// The run's place among those given to a calibration.
+    pub run: usize,
+    /// Its passages.
+    pub passages: Vec<Passage>,
+    /// Where it was measured to stand at the end.
+    pub stop: Option<MeasuredStop>,
+}
+
+impl RunPassages {
+    /// Reads the entries of a run of `train`, which begins at `step`. `excluded` entries are passed over as if
+    /// they had not been reported. The rhythm of the link must have been learnt before: a first walk over all
+    /// runs does that.
+    #[must_use]
+    pub fn read<'e>(
+        layout: &Layout,
+        train: TrainId,
+        step: SpeedStep,
+        run: usize,
+        events: impl Iterator<Item = (&'e Event, bool)>,
+        timing: &PollTimingEstimator,
+    ) -> Self {
+        let mut timing = timing.clone();
+        timing.restart();
+        let mut tracker = PassageTracker::new(train, step, timing);
+        let mut read = Self { train, run, passages: Vec::new(), stop: None };
+        let mut standing: Option<(Timestamp, SpeedStep)> = None;
+        for (entry, (event, excluded)) in events.enumerate() {
+            if excluded {
+                tracker.skip();
+                continue;
+            }
+            if let Some(Sighting::Passage(passage)) = tracker.take(layout, event) {
+                read.passages.push(passage);
+            }
+            match event.kind {
+                EventKind::Speed { train: told, step } if told == train => {
+                    standing = (step == SpeedStep::STAND)
+                        .then_some((event.time, tracker.drive().from))
+                        .or(standing.filter(|_| step == SpeedStep::STAND));
+                }
+                EventKind::Stopped { train: told, landmark, offset } if told == train => {
+                    if let Some((commanded, from)) = standing {
+                        read.stop =
+                            Some(MeasuredStop { commanded, from, seen: event.time, landmark, offset, entry });
+                    }
+                }
+                _ => {}
+            }
+        }
+        read
+    }
+
+    /// The stretches in which the train ran settled: each a chain of passages linked by known ways, at one
+    /// step, after the change to it was over.
+    pub fn settled_stretches<'r>(
+        &'r self,
+        settle: &'r dyn Fn(Drive) -> TimeSpan,
+    ) -> impl Iterator<Item = &'r [Passage]> {
+        let settled = move |passage: &Passage| {
+            passage.drive.step != SpeedStep::STAND
+                && passage
+                    .drive
+                    .commanded
+                    .is_none_or(|commanded| passage.window.after - commanded > settle(passage.drive))
+        };
+        self.passages
+            .chunk_by(move |one, next| {
+                settled(one) && settled(next) && one.drive == next.drive && next.way.is_some()
+            })
+            .filter(|chain| chain.len() > 1)
+            .flat_map(|chain| Overlapping { chain })
+    }
+}
+
+/// Passages of one stretch at most: on longer ones the speed has wandered too far to be one number.
+const LONGEST_STRETCH: usize = 40;
+
+/// A long chain cut into stretches that share their end passages.
+struct Overlapping<'r> {
+    chain: &'r [Passage],
+}
+
+impl<'r> Iterator for Overlapping<'r> {
+    type Item = &'r [Passage];
+
+    fn next(&mut self) -> Option<&'r [Passage]> {
+        if self.chain.len() < 2 {
+            return None;
+        }
+        let cut = self.chain.len().min(LONGEST_STRETCH);
+        let stretch = self.chain.get(..cut)?;
+        self.chain = self.chain.get(cut - 1..)?;
+        Some(stretch)
+    }
+}

@@ -1,0 +1,215 @@
+//! Landmarks: known places by the names people give them, such as `C13+120mm`.
+
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use core::fmt;
+
+use crate::ids::NodeId;
+use crate::track::{Layout, Position, TurnoutStates, WayError};
+use crate::units::Length;
+
+/// A place named by a node and how far beyond it, in the direction of travel of the node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Landmark {
+    /// The node: mostly a sensor, but a turnout or track end has a name, too.
+    pub node: NodeId,
+    /// How far beyond it; before it if negative.
+    pub offset: Length,
+}
+
+/// Why a text names no landmark.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LandmarkError {
+    /// No node has that name.
+    UnknownNode {
+        /// The name.
+        name: String,
+        /// A name that the layout has, to show what one looks like.
+        example: Option<String>,
+        /// The layout.
+        layout: String,
+    },
+    /// What follows the name is no offset.
+    IllegalOffset {
+        /// The text, from the sign on.
+        found: String,
+        /// The name before it.
+        name: String,
+    },
+}
+
+impl fmt::Display for LandmarkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownNode { name, example, layout } => {
+                write!(f, "no place of {layout} is called `{}`", name.escape_debug())?;
+                example.as_ref().map_or(Ok(()), |example| {
+                    write!(f, ": write a name like `{example}` or `{example}+120mm`")
+                })
+            }
+            Self::IllegalOffset { found, name } => write!(
+                f,
+                "`{}` is no offset: write millimetres as in `{name}+120mm` or `{name}-30.5mm`",
+                found.escape_debug()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LandmarkError {}
+
+impl Layout {
+    /// Reads a landmark: a name, or a name and an offset in millimetres as in `C13+120mm` or `C13 - 30.5 mm`.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub fn landmark(&self, text: &str) -> Result<Landmark, LandmarkError> {
+        // Names hold no signs.
+        let sign = text.find(['+', '-']).unwrap_or(text.len());
+        let (name, offset) = text.split_at(sign);
+        let name = name.trim();
+        let node = self.node_named(name).ok_or_else(|| LandmarkError::UnknownNode {
+            name: name.to_owned(),
+            example: self.sensors().next().map(|(sensor, _)| self.sensor_name(sensor).to_owned()),
+            layout: self.name().to_owned(),
+        })?;
+        let illegal = || LandmarkError::IllegalOffset { found: offset.to_owned(), name: name.to_owned() };
+        let offset =
+            if offset.is_empty() { Length::ZERO } else { read_offset(offset).ok_or_else(illegal)? };
+        Ok(Landmark { node, offset })
+    }
+
+    /// Shows a landmark as [`landmark`](Self::landmark) reads it, to the nanometre.
+    #[must_use]
+    pub fn display(&self, landmark: Landmark) -> impl fmt::Display + '_ {
+        Shown { layout: self, landmark }
+    }
+
+    /// Where a landmark is while the turnouts lie as they do.
+    ///
+    /// # Errors
+    /// [`WayError`] when the way from the node cannot be followed that far.
+    pub fn locate(&self, landmark: Landmark, turnouts: &TurnoutStates) -> Result<Position, WayError> {
+        let Landmark { node, offset } = landmark;
+        let ahead = self.edge_ahead(node, turnouts);
+        match ahead.map(|edge| Position { edge, offset: Length::ZERO }) {
+            Ok(position) if offset >= Length::ZERO => self.advance(position, offset, turnouts),
+            Err(stop) if offset > Length::ZERO => Err(stop.after(offset)),
+            _ => {
+                // Back from the node: on from its reverse, seen the other way.
+                let edge = self.edge_ahead(node.reverse(), turnouts);
+                let edge = edge.map_err(|stop| stop.after(-offset))?;
+                let behind = self.advance(Position { edge, offset: Length::ZERO }, -offset, turnouts)?;
+                let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
+                self.advance(position, Length::ZERO, turnouts)
+            }
+        }
+    }
+}
+
+/// A sign, digits and `mm`, with spaces where people like them.
+fn read_offset(text: &str) -> Option<Length> {
+    let number = text.trim_end().strip_suffix("mm")?.trim_end();
+    let digits = number.strip_prefix(['+', '-'])?.trim_start();
+    // No second sign, and neither `inf` nor `nan`.
+    let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    let mm = digits.parse::<f64>().ok().filter(|mm| is_number && mm.is_finite())?;
+    Some(Length::from_mm(if number.starts_with('-') { -mm } else { mm }))
+}
+
+struct Shown<'l> {
+    layout: &'l Layout,
+    landmark: Landmark,
+}
+
+impl fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Landmark { node, offset } = self.landmark;
+        f.write_str(self.layout.node_name(node))?;
+        // So that the rounding of metres to millimetres does not show.
+        let mm = libm::round(offset.as_mm() * 1e6) / 1e6;
+        if mm == 0.0 { Ok(()) } else { write!(f, "{mm:+}mm") }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::TurnoutId;
+    use crate::track::Leg;
+    use crate::track::example::oval;
+    use std::string::ToString;
+
+    #[test]
+    fn a_landmark_reads_back_as_it_is_shown() {
+        let layout = oval();
+        for (text, shown, mm) in [
+            ("A1", "A1", 0.0),
+            ("A1+120mm", "A1+120mm", 120.0),
+            (" A1 + 120 mm ", "A1+120mm", 120.0),
+            ("D2-30.5mm", "D2-30.5mm", -30.5),
+            ("EX1-.25mm", "EX1-0.25mm", -0.25),
+            ("BR1+1e2mm", "BR1+100mm", 100.0),
+            ("A1-0mm", "A1", 0.0),
+        ] {
+            let landmark = layout.landmark(text).unwrap();
+            assert!((landmark.offset.as_mm() - mm).abs() < 1e-9, "{text}");
+            assert_eq!(layout.display(landmark).to_string(), shown);
+            assert_eq!(layout.landmark(shown).unwrap(), landmark);
+        }
+    }
+
+    #[test]
+    fn a_text_that_names_no_place_is_told_what_would() {
+        let layout = oval();
+        for (text, message) in [
+            ("Z9", "no place of oval is called `Z9`: write a name like `A1` or `A1+120mm`"),
+            ("", "no place of oval is called ``: write a name like `A1` or `A1+120mm`"),
+            ("A1+120", "`+120` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+            ("A1+-5mm", "`+-5mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+            ("A1+infmm", "`+infmm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+            ("A1-1e999mm", "`-1e999mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+            ("A1+mm", "`+mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+        ] {
+            assert_eq!(layout.landmark(text).unwrap_err().to_string(), message);
+        }
+    }
+
+    #[test]
+    fn a_landmark_is_located_ahead_of_its_node_and_behind_it() {
+        let layout = oval();
+        let turnouts = [(TurnoutId(1), Leg::Curved), (TurnoutId(2), Leg::Curved)].into_iter().collect();
+        let located = |text| {
+            let position = layout.locate(layout.landmark(text).unwrap(), &turnouts).unwrap();
+            let edge = layout.edge(position.edge).unwrap();
+            let mm = (position.offset.as_mm() * 1e6).round() / 1e6;
+            (layout.node_name(edge.from), layout.node_name(edge.to), mm)
+        };
+        assert_eq!(located("A1+120mm"), ("BR1", "C1", 20.0));
+        assert_eq!(located("D1-120mm"), ("C1", "MR2", 130.0));
+        assert_eq!(located("D1"), ("D1", "A1", 0.0));
+        assert_eq!(located("EX2"), ("E1", "EX2", 40.0));
+        assert_eq!(located("EX2-40mm"), ("E1", "EX2", 0.0));
+        assert_eq!(located("EN1"), ("EN1", "E1", 0.0));
+    }
+
+    #[test]
+    fn a_landmark_beyond_what_is_known_is_no_place() {
+        let layout = oval();
+        let unknown = TurnoutStates::unknown();
+        let refused = |text| layout.locate(layout.landmark(text).unwrap(), &unknown).unwrap_err().to_string();
+        assert_eq!(refused("EX2+1mm"), "the track ends at `EX2`, 1 mm before the way does");
+        assert_eq!(refused("EN1-7mm"), "the track ends at `EX1`, 7 mm before the way does");
+        assert_eq!(
+            refused("BR1+5mm"),
+            "it is not known how turnout 1 lies, 5 mm before the way ends: set it first"
+        );
+        let toe = layout.locate(layout.landmark("BR1").unwrap(), &unknown).unwrap();
+        assert_eq!(
+            layout.edge(toe.edge).map(|edge| edge.to),
+            layout.node_named("BR1"),
+            "the toe itself is known"
+        );
+    }
+}

@@ -1,0 +1,306 @@
+//! Positions: points on the rails with a direction of travel, and how to get from one to another.
+
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use core::fmt;
+
+use crate::ids::{EdgeId, NodeId, TurnoutId};
+use crate::track::{Edge, Layout, Leg, NodeKind, TurnoutStates, Ways};
+use crate::units::Length;
+
+/// Sums of lengths are rounded; a way that is longer than the track by no more than this ends at its end.
+const ROUNDING: Length = Length::from_mm(1e-6);
+
+/// A point on the rails, seen in one direction of travel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Position {
+    /// The edge it lies on.
+    pub edge: EdgeId,
+    /// How far from the start of the edge, from zero to the edge's length.
+    pub offset: Length,
+}
+
+/// Why a way cannot be followed to its end.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum WayError {
+    /// A node or edge of another layout.
+    NotOnLayout,
+    /// The way to go is no number.
+    NotFinite,
+    /// A turnout decides where the way leads, and nobody knows how it lies.
+    TurnoutUnknown {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// How much of the way is left when it is reached.
+        left: Length,
+    },
+    /// The track ends before the way does.
+    TrackEnds {
+        /// The name of the node where it ends.
+        node: String,
+        /// How much of the way is left.
+        left: Length,
+    },
+}
+
+impl fmt::Display for WayError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotOnLayout => f.write_str("the position is not on this layout"),
+            Self::NotFinite => f.write_str("a distance should be a finite number"),
+            Self::TurnoutUnknown { turnout, left } => write!(
+                f,
+                "it is not known how turnout {turnout} lies, {:.0} mm before the way ends: set it first",
+                left.as_mm()
+            ),
+            Self::TrackEnds { node, left } => {
+                write!(f, "the track ends at `{node}`, {:.0} mm before the way does", left.as_mm())
+            }
+        }
+    }
+}
+
+impl core::error::Error for WayError {}
+
+impl Layout {
+    /// The same point in the opposite direction of travel; `None` for a position of another layout.
+    #[must_use]
+    pub fn reversed(&self, position: Position) -> Option<Position> {
+        let length = self.edge(position.edge)?.length;
+        Some(Position { edge: position.edge.twin(), offset: (length - position.offset).max(Length::ZERO) })
+    }
+
+    /// The point `distance` further on, or back if it is negative, over turnouts as they lie.
+    ///
+    /// The result is in normal form: not at the end of an edge when it could be at the start of the next. Only
+    /// where the track ends, or a turnout is unknown, a point stays at the end of its edge. A distance of zero
+    /// normalises.
+    ///
+    /// # Errors
+    /// [`WayError`] when the way cannot be followed to its end.
+    pub fn advance(
+        &self,
+        position: Position,
+        distance: Length,
+        turnouts: &TurnoutStates,
+    ) -> Result<Position, WayError> {
+        if !distance.is_finite() || !position.offset.is_finite() {
+            return Err(WayError::NotFinite);
+        }
+        if distance < Length::ZERO {
+            let behind = self.reversed(position).ok_or(WayError::NotOnLayout)?;
+            let behind = self.advance(behind, -distance, turnouts)?;
+            let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
+            // Seen from behind it may be at the start of an edge, and so at the end of this one.
+            return self.advance(position, Length::ZERO, turnouts);
+        }
+        let (mut id, mut left) = (position.edge, position.offset + distance);
+        let mut passed = 0;
+        loop {
+            let edge = self.edge(id).ok_or(WayError::NotOnLayout)?;
+            if left < edge.length {
+                return Ok(Position { edge: id, offset: left });
+            }
+            match self.edge_ahead(edge.to, turnouts) {
+                Ok(next) => {
+                    id = next;
+                    left -= edge.length;
+                }
+                Err(_) if left - edge.length <= ROUNDING => {
+                    return Ok(Position { edge: id, offset: edge.length });
+                }
+                Err(stop) => return Err(stop.after(left - edge.length)),
+            }
+            passed += 1;
+            if passed == self.edges().len() {
+                // As many edges as there are have come by: this is a loop, and whole laps make no difference.
+                left = Length::from_m(libm::fmod(left.as_m(), self.lap(id, turnouts).as_m()));
+            }
+        }
+    }
+
+    /// The way ahead from one position to another, the shortest over turnouts that lie right or are unknown;
+    /// `None` if none leads there without turning around.
+    #[must_use]
+    pub fn distance_ahead(&self, from: Position, to: Position, turnouts: &TurnoutStates) -> Option<Length> {
+        let (from_edge, to_edge) = (self.edge(from.edge)?, self.edge(to.edge)?);
+        if from.edge == to.edge && from.offset <= to.offset {
+            return Some(to.offset - from.offset);
+        }
+        // The end of one edge is the same point as the start of the next.
+        let (from_nodes, to_nodes) = (nodes_at(from_edge, from.offset), nodes_at(to_edge, to.offset));
+        if from_nodes.iter().flatten().any(|node| to_nodes.contains(&Some(*node))) {
+            return Some(Length::ZERO);
+        }
+        let (_, between) = self.shortest(from_edge.to, to_edge.from, turnouts)?;
+        Some(from_edge.length - from.offset + between + to.offset)
+    }
+
+    /// The edge that leaves a node while the turnouts lie as they do.
+    pub(crate) fn edge_ahead(&self, node: NodeId, turnouts: &TurnoutStates) -> Result<EdgeId, Stop<'_>> {
+        let node = self.node(node).ok_or(Stop::NotOnLayout)?;
+        match (node.ways, node.kind) {
+            (Ways::Ahead(edge), _) => Ok(edge),
+            (Ways::Legs { straight, curved }, NodeKind::Branch(turnout)) => match turnouts.get(turnout) {
+                Some(Leg::Straight) => Ok(straight),
+                Some(Leg::Curved) => Ok(curved),
+                None => Err(Stop::TurnoutUnknown(turnout)),
+            },
+            _ => Err(Stop::TrackEnds(&node.name)),
+        }
+    }
+
+    /// The length of the loop that an edge lies on; no loop is without length.
+    fn lap(&self, start: EdgeId, turnouts: &TurnoutStates) -> Length {
+        let (mut id, mut lap) = (start, Length::ZERO);
+        while let Some(edge) = self.edge(id) {
+            lap += edge.length;
+            match self.edge_ahead(edge.to, turnouts) {
+                Ok(next) if next != start => id = next,
+                _ => break,
+            }
+        }
+        lap
+    }
+}
+
+/// The nodes at a point: where its edge begins, where it ends, or both if the edge is 0 mm long.
+fn nodes_at(edge: &Edge, offset: Length) -> [Option<NodeId>; 2] {
+    let begins = (offset <= ROUNDING).then_some(edge.from);
+    let ends = (edge.length - offset <= ROUNDING).then_some(edge.to);
+    [begins, ends]
+}
+
+/// Why there is no edge ahead.
+pub(crate) enum Stop<'l> {
+    NotOnLayout,
+    TurnoutUnknown(TurnoutId),
+    TrackEnds(&'l str),
+}
+
+impl Stop<'_> {
+    /// The error of a way of which this much is left.
+    pub(crate) fn after(self, left: Length) -> WayError {
+        match self {
+            Self::NotOnLayout => WayError::NotOnLayout,
+            Self::TurnoutUnknown(turnout) => WayError::TurnoutUnknown { turnout, left },
+            Self::TrackEnds(node) => WayError::TrackEnds { node: node.to_owned(), left },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::{oval, oval_plan};
+    use std::format;
+    use std::string::ToString;
+
+    /// The oval with its turnouts lying so that the loop over B is closed.
+    fn straight() -> TurnoutStates {
+        [(TurnoutId(1), Leg::Straight), (TurnoutId(2), Leg::Straight)].into_iter().collect()
+    }
+
+    fn at(layout: &Layout, from: &str, to: &str, mm: f64) -> Position {
+        let node = |name| layout.node_named(name).unwrap();
+        Position { edge: layout.edge_between(node(from), node(to)).unwrap(), offset: Length::from_mm(mm) }
+    }
+
+    fn text(layout: &Layout, position: Position) -> String {
+        let edge = layout.edge(position.edge).unwrap();
+        let (from, to) = (layout.node_name(edge.from), layout.node_name(edge.to));
+        format!("{:.3} from {from} to {to}", position.offset.as_mm())
+    }
+
+    #[test]
+    fn a_position_moves_on_and_back_over_nodes() {
+        let layout = oval();
+        let start = at(&layout, "D1", "A1", 450.0);
+        let moved = |mm| text(&layout, layout.advance(start, Length::from_mm(mm), &straight()).unwrap());
+        assert_eq!(moved(20.0), "470.000 from D1 to A1");
+        assert_eq!(moved(100.0), "50.000 from A1 to BR1");
+        assert_eq!(moved(160.0), "10.000 from BR1 to B1");
+        assert_eq!(moved(-450.0), "0.000 from D1 to A1");
+        assert_eq!(moved(-460.0), "90.000 from MR2 to D1");
+        assert_eq!(moved(-560.0), "190.000 from B1 to MR2");
+    }
+
+    #[test]
+    fn whole_laps_make_no_difference_however_many() {
+        let layout = oval();
+        let start = at(&layout, "D1", "A1", 450.0);
+        // 500 + 100 + 200 + 200 + 100.
+        for laps in [1.0, 1e3, 1e6] {
+            let moved = layout.advance(start, Length::from_mm(1_100.0 * laps), &straight()).unwrap();
+            let distance = layout.distance_ahead(start, moved, &straight()).unwrap().as_mm();
+            assert!(distance.min(1_100.0 - distance) < 1e-4, "{laps} laps: {distance}");
+        }
+        assert!(layout.advance(start, Length::from_m(f64::MAX), &straight()).is_ok());
+        assert!(layout.advance(start, Length::from_m(-f64::MAX), &straight()).is_ok());
+    }
+
+    #[test]
+    fn a_way_ends_where_the_track_does_and_where_a_turnout_is_unknown() {
+        let layout = oval();
+        let unknown = TurnoutStates::unknown();
+        let start = at(&layout, "EN1", "E1", 10.0);
+        let end = layout.advance(start, Length::from_mm(60.0), &unknown).unwrap();
+        assert_eq!(text(&layout, end), "40.000 from E1 to EX2");
+        let beyond = layout.advance(start, Length::from_mm(75.0), &unknown).unwrap_err();
+        assert_eq!(beyond.to_string(), "the track ends at `EX2`, 15 mm before the way does");
+        let start = at(&layout, "A1", "BR1", 0.0);
+        let undecided = layout.advance(start, Length::from_mm(130.0), &unknown).unwrap_err();
+        assert_eq!(
+            undecided.to_string(),
+            "it is not known how turnout 1 lies, 30 mm before the way ends: set it first"
+        );
+        assert!(layout.advance(start, Length::from_mm(100.0), &unknown).is_ok(), "up to it is known");
+        assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(WayError::NotFinite));
+        let elsewhere = Position { edge: EdgeId(999), offset: Length::ZERO };
+        assert_eq!(layout.advance(elsewhere, Length::ZERO, &unknown), Err(WayError::NotOnLayout));
+        assert_eq!(layout.reversed(elsewhere), None);
+    }
+
+    #[test]
+    fn turning_around_twice_changes_nothing() {
+        let layout = oval();
+        let here = at(&layout, "B1", "MR2", 60.0);
+        let there = layout.reversed(here).unwrap();
+        assert_eq!(text(&layout, there), "140.000 from BR2 to B2");
+        assert_eq!(text(&layout, layout.reversed(there).unwrap()), text(&layout, here));
+    }
+
+    #[test]
+    fn distances_are_ahead_and_by_the_shorter_leg() {
+        let layout = oval();
+        let ahead = |from, to, turnouts: &TurnoutStates| {
+            layout.distance_ahead(from, to, turnouts).map(|length| (length.as_mm() * 1e6).round() / 1e6)
+        };
+        let (a, d) = (at(&layout, "A1", "BR1", 30.0), at(&layout, "D1", "A1", 5.0));
+        assert_eq!(ahead(a, d, &straight()), Some(575.0));
+        assert_eq!(ahead(a, d, &TurnoutStates::unknown()), Some(545.0));
+        let further = at(&layout, "A1", "BR1", 40.0);
+        assert_eq!(ahead(a, further, &straight()), Some(10.0));
+        assert_eq!(ahead(further, a, &straight()), Some(1_090.0), "once around");
+        assert_eq!(ahead(a, at(&layout, "EN1", "E1", 0.0), &straight()), None);
+        // The end of an edge and the starts of those behind it are one point.
+        let (end, start) = (at(&layout, "A1", "BR1", 100.0), at(&layout, "BR1", "C1", 0.0));
+        assert_eq!((ahead(end, start, &straight()), ahead(start, end, &straight())), (Some(0.0), Some(0.0)));
+    }
+
+    #[test]
+    fn edges_of_no_length_are_passed() {
+        let mut plan = oval_plan();
+        plan.stretches[1].length = Length::ZERO;
+        plan.stretches[3].length = Length::ZERO;
+        let layout = Layout::build(&plan).unwrap();
+        let start = at(&layout, "A1", "BR1", 100.0);
+        let moved = layout.advance(start, Length::ZERO, &straight()).unwrap();
+        assert_eq!(text(&layout, moved), "0.000 from MR2 to D1");
+        let back = layout.advance(moved, Length::from_mm(-1.0), &straight()).unwrap();
+        assert_eq!(text(&layout, back), "99.000 from A1 to BR1");
+        assert_eq!(layout.distance_ahead(start, moved, &straight()), Some(Length::ZERO));
+    }
+}
