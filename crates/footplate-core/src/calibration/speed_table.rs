@@ -221,6 +221,15 @@ impl SpeedTable {
         }
     }
 
+    /// Takes the deviation of a run from the table from elsewhere: one standard deviation as a part of the
+    /// speed, and how many runs that figure is worth against those still to come.
+    pub fn set_run_deviation(&mut self, deviation: f64, runs: f64) {
+        if deviation.is_finite() && runs > 0.0 && runs.is_finite() {
+            self.deviation_squares = deviation * deviation * runs;
+            self.deviation_runs = runs;
+        }
+    }
+
     /// All measured speeds, by step and approach; the count is of runs.
     pub fn speeds(&self) -> impl Iterator<Item = (SpeedStep, Approach, Estimate<Speed>)> + '_ {
         (0..=SpeedStep::HIGHEST).filter_map(SpeedStep::new).flat_map(move |step| {

@@ -11,6 +11,7 @@ use crate::calibration::{
     Direction, DriftTest, Drive, Expected, Familiarity, LawFamily, LengthTable, Passage, PassageTracker,
     SectionIndex, SpeedTable,
 };
+use crate::estimate::Estimate;
 use crate::event::Approach;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::latency::UniformNormal;
@@ -135,6 +136,23 @@ impl TrainModel {
         &mut self.laws
     }
 
+    /// The steady speed of the step as the run under way has shown it up to the last contact, the table's word
+    /// included. `None` before the first hop at a settled speed. The count is of such hops.
+    #[must_use]
+    pub fn running_speed(&self) -> Option<Estimate<Speed>> {
+        if self.run.settled_hops == 0 {
+            return None;
+        }
+        let best = self.best();
+        let speed = libm::exp(best.x[U]);
+        Some(Estimate {
+            value: Speed::from_m_per_s(speed),
+            uncertainty: Speed::from_m_per_s(speed * libm::sqrt(best.p[U][U])),
+            count: self.run.settled_hops,
+            date: self.run.date,
+        })
+    }
+
     pub(super) fn begin_run(&mut self, step: SpeedStep) {
         self.run.drive = Drive { step, from: step, commanded: None };
         self.run.placed = false;
@@ -229,13 +247,15 @@ impl TrainModel {
             return hit(None, Verdict::First, None);
         };
         let forecast = self.forecast_of(passage.sensor, &way, &due, period);
+        // Judged by what was known before the hit.
+        let stated = self.foreseeable(forecast);
         let late = passage.window.middle().as_s() - due.time;
         let probability = forecast.probability_by(passage.window.until);
         let too_wild = probability.min(1.0 - probability) < GATE;
         self.remember(&way);
         if !due.changing && self.too_doubtful() {
             self.set_speed(&passage, &ahead);
-            return hit(self.foreseeable(forecast), Verdict::Learnt, None);
+            return hit(stated, Verdict::Learnt, None);
         }
         if too_wild {
             let reopened = self.run.rejected;
@@ -247,7 +267,7 @@ impl TrainModel {
                 self.place(&passage);
             }
             let verdict = if reopened { Verdict::Reopened } else { Verdict::Rejected };
-            return hit(self.foreseeable(forecast), verdict, None);
+            return hit(stated, verdict, None);
         }
         self.run.rejected = false;
         let noise = passage.window.variance_s2() + self.scatter.variance_s2(due.speed);
@@ -264,7 +284,7 @@ impl TrainModel {
         if drift.is_some() {
             self.reopen();
         }
-        hit(self.foreseeable(forecast), Verdict::Learnt, drift)
+        hit(stated, Verdict::Learnt, drift)
     }
 
     /// A forecast counts as one when something like the step was ever measured or the run has shown its speed.
