@@ -1,11 +1,12 @@
 //! Layouts, calibrations and recordings on disk, and reading them back.
 //!
 //! Files come in through [`read_sensor_log`], which turns every form of sensor log into one
-//! [`Recording`].
+//! [`Recording`]. [`score`] walks one and says how good the forecasts of it are.
 
 mod decimal;
 mod layout_file;
 mod recording;
+pub mod score;
 mod sensor_log;
 mod sensor_names;
 mod table;

@@ -3,5 +3,7 @@
 mod bad_logs;
 mod built_in_layouts;
 mod logs_round_trip;
+mod no_look_ahead;
 mod real_logs;
 mod recordings;
+mod scored_loop;

@@ -1,0 +1,180 @@
+//! The figures of one forecaster over a selection of hits.
+
+use footplate_core::TimeSpan;
+
+use super::coverage::Coverage;
+use super::rival::Rival;
+use super::scored_hit::ScoredHit;
+
+/// The levels of the intervals whose coverage is counted.
+pub const LEVELS: [f64; 3] = [0.5, 0.9, 0.99];
+
+/// How far forecasts were off. `None` where nothing was scored.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ForecastScore {
+    /// Passages in the selection.
+    pub hits: usize,
+    /// Those that there was a forecast for; the first of a run and steps never met before have none.
+    pub scored: usize,
+    /// Median distance off, in mm.
+    pub median_abs_mm: Option<f64>,
+    /// What nine in ten forecasts are at most off, in mm.
+    pub p90_abs_mm: Option<f64>,
+    /// Median time off, in ms.
+    pub median_abs_ms: Option<f64>,
+    /// Mean distance off, in mm. Where reports come in steps of a poll, a median can be next to nothing while
+    /// every third forecast is a whole step off; the mean counts those, too.
+    pub mean_abs_mm: Option<f64>,
+    /// Mean distance off with its sign, in mm: positive when trains come later than forecast.
+    pub bias_mm: Option<f64>,
+    /// How often the stated intervals held, in the order of [`LEVELS`]; `None` for forecasts without intervals.
+    pub coverage: Option<[Coverage; LEVELS.len()]>,
+}
+
+impl ForecastScore {
+    /// Our figures.
+    #[must_use]
+    pub fn of<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone) -> Self {
+        let levels: Vec<f64> = hits.clone().filter_map(ScoredHit::level).collect();
+        let coverage = |level: f64| Coverage {
+            level,
+            inside: levels.iter().filter(|found| **found <= level).count(),
+            of: levels.len(),
+        };
+        Self {
+            coverage: (!levels.is_empty()).then(|| LEVELS.map(coverage)),
+            ..Self::of_errors(hits, ScoredHit::late)
+        }
+    }
+
+    /// A rival's figures, over the hits that we forecast and it did, too.
+    #[must_use]
+    pub fn of_rival<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone, rival: Rival) -> Self {
+        Self::of_errors(hits, |hit| hit.late_by(rival))
+    }
+
+    /// Our figures over the hits that a rival forecast, too.
+    #[must_use]
+    pub fn of_us_beside<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone, rival: Rival) -> Self {
+        Self::of(hits.filter(move |hit| hit.late_by(rival).is_some()))
+    }
+
+    fn of_errors<'a>(
+        hits: impl Iterator<Item = &'a ScoredHit>,
+        late: impl Fn(&ScoredHit) -> Option<TimeSpan>,
+    ) -> Self {
+        let mut count = 0;
+        let (mut way, mut time, mut sum) = (Vec::new(), Vec::new(), 0.0);
+        for hit in hits {
+            count += 1;
+            let Some((late, mm)) = late(hit).and_then(|late| Some((late, hit.way_mm(late)?))) else {
+                continue;
+            };
+            sum += mm;
+            way.push(mm.abs());
+            time.push(late.abs().as_ms());
+        }
+        let mean = |sum: f64| (!way.is_empty()).then(|| sum / way.len() as f64);
+        let (bias_mm, mean_abs_mm) = (mean(sum), mean(way.iter().sum()));
+        way.sort_by(f64::total_cmp);
+        time.sort_by(f64::total_cmp);
+        Self {
+            hits: count,
+            scored: way.len(),
+            median_abs_mm: quantile(&way, 0.5),
+            p90_abs_mm: quantile(&way, 0.9),
+            median_abs_ms: quantile(&time, 0.5),
+            mean_abs_mm,
+            bias_mm,
+            coverage: None,
+        }
+    }
+}
+
+/// The quantile `part` of sorted values, interpolated between neighbours (Hyndman and Fan, 1996, definition 7).
+fn quantile(sorted: &[f64], part: f64) -> Option<f64> {
+    let place = part * sorted.len().checked_sub(1)? as f64;
+    let (low, high) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+    Some(low + (high - low) * place.fract())
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::calibration::{Drive, Passage};
+    use footplate_core::estimation::{Forecast, Hit, Phase, Verdict};
+    use footplate_core::latency::{ContactWindow, UniformNormal};
+    use footplate_core::{NodeId, RunId, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
+
+    use super::*;
+
+    /// A hit at 10 s that we expected `late_ms` earlier at 400 mm/s, evenly within ±50 ms, and that the last lap
+    /// expected at 9.9 s.
+    fn hit(late_ms: Option<i64>) -> ScoredHit {
+        let sensor = SensorId(0);
+        let until = Timestamp::from_s(10.0);
+        let forecast = |late_ms| Forecast {
+            sensor,
+            time: until - TimeSpan::from_ms(late_ms),
+            spread: UniformNormal { deviation: 0.0, width: 0.1 },
+            speed: Speed::from_mm_per_s(400.0),
+            phase: Phase::Steady,
+        };
+        let passage = Passage {
+            sensor,
+            node: NodeId(0),
+            window: ContactWindow { after: until - TimeSpan::from_ms(70), until },
+            way: None,
+            drive: Drive { step: SpeedStep::STAND, from: SpeedStep::STAND, commanded: None },
+            entry: 0,
+        };
+        let mut rivals = [None; Rival::ALL.len()];
+        rivals[Rival::LastLap as usize] = Some(until - TimeSpan::from_ms(100));
+        let forecast = late_ms.map(forecast);
+        let hit = Hit { passage, forecast, named: None, verdict: Verdict::Learnt, drift: None };
+        ScoredHit { run: RunId(1), line: 1, train: TrainId(1), hit, rivals }
+    }
+
+    #[test]
+    fn the_figures_are_those_worked_out_by_hand() {
+        // Given reports 5 ms early and 10, 20, 30, 60 ms late, and one that nobody expected,
+        let hits = [Some(-5), Some(10), Some(20), Some(30), Some(60), None].map(hit);
+        let score = ForecastScore::of(hits.iter());
+        // then at 400 mm/s they are off by 2, 4, 8, 12 and 24 mm.
+        assert_eq!((score.hits, score.scored), (6, 5));
+        let close = |found: Option<f64>, right: f64| (found.unwrap() - right).abs() < 1e-9;
+        assert!(close(score.median_abs_mm, 8.0) && close(score.median_abs_ms, 20.0));
+        // Place 0.9 · 4 = 3.6: 12 + 0.6 · 12.
+        assert!(close(score.p90_abs_mm, 19.2));
+        assert!(close(score.bias_mm, (-2.0 + 4.0 + 8.0 + 12.0 + 24.0) / 5.0));
+        assert!(close(score.mean_abs_mm, 10.0));
+        // ±25 ms, ±45 ms and ±49.5 ms are the central 50, 90 and 99 %.
+        assert_eq!(score.coverage.unwrap().map(|coverage| coverage.inside), [3, 4, 4]);
+    }
+
+    #[test]
+    fn a_rival_is_measured_where_we_are_and_at_our_speed() {
+        let hits = [Some(10), None].map(hit);
+        let rival = ForecastScore::of_rival(hits.iter(), Rival::LastLap);
+        assert_eq!((rival.hits, rival.scored, rival.coverage), (2, 1, None));
+        assert!((rival.median_abs_mm.unwrap() - 40.0).abs() < 1e-9);
+        assert_eq!(ForecastScore::of_us_beside(hits.iter(), Rival::Oracle).scored, 0);
+        assert_eq!(ForecastScore::of_us_beside(hits.iter(), Rival::LastLap).scored, 1);
+    }
+
+    #[test]
+    fn nothing_scored_has_no_figures() {
+        let nothing = ForecastScore::of([hit(None)].iter());
+        assert_eq!(nothing, ForecastScore { hits: 1, ..ForecastScore::default() });
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        assert_eq!(quantile(&[], 0.5), None);
+        assert_eq!(quantile(&[3.0], 0.9), Some(3.0));
+        assert_eq!(quantile(&[1.0, 2.0, 10.0], 0.5), Some(2.0));
+        assert_eq!(quantile(&[1.0, 2.0, 3.0, 10.0], 0.5), Some(2.5));
+        // 0.9 · 10 = place 9 of eleven.
+        let eleven: Vec<f64> = (0..11).map(f64::from).collect();
+        assert_eq!(quantile(&eleven, 0.9), Some(9.0));
+    }
+}

@@ -1,0 +1,163 @@
+//! Light gates against the estimator: a truth that it never sees.
+//!
+//! Two gates stand [`GATE_DISTANCE`] apart somewhere on the loop; their clock is tied to nothing, so each pair
+//! of passes gives one speed, and the pairs of a run belong to its laps in their order. Where on the loop they
+//! stand is not recorded, so they are compared with what the estimator held for the speed of the run at the end
+//! of the same lap: what is left holds the gates' own resolution and how much faster or slower than on average
+//! the train is at that place.
+
+use std::collections::BTreeMap;
+
+use footplate_core::{Estimate, Length, NodeId, RunId, Speed, SpeedStep, TimeSpan, TrainId};
+
+use crate::recording::{GatePass, Run};
+
+/// From one gate to the other, as the team that set them up states it.
+pub const GATE_DISTANCE: Length = Length::from_mm(20.0);
+/// The unit in which the gates' clock counts.
+pub const GATE_TICK: TimeSpan = TimeSpan::from_ms(1);
+
+/// A pair of gate passes beside the estimate of its lap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateCheck {
+    /// The run.
+    pub run: RunId,
+    /// The line of the file with the second pass.
+    pub line: u64,
+    /// The train.
+    pub train: TrainId,
+    /// The step it ran at.
+    pub step: SpeedStep,
+    /// The lap, counted from 1.
+    pub lap: usize,
+    /// Speed between the gates.
+    pub spot: Speed,
+    /// One standard deviation of `spot` from the resolution of the gates' clock alone.
+    pub resolution: Speed,
+    /// What the estimator held for the train's speed at the end of the lap.
+    pub estimated: Estimate<Speed>,
+}
+
+impl GateCheck {
+    /// How much faster than the gates say the estimate is.
+    #[must_use]
+    pub fn excess(&self) -> Speed {
+        self.estimated.value - self.spot
+    }
+}
+
+/// Many checks in five figures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateAgreement {
+    /// Pairs.
+    pub count: usize,
+    /// Mean excess of the estimates over the gates, in mm/s and as a part of the speed.
+    pub bias_mm_per_s: f64,
+    /// The same, as a part of the speed.
+    pub bias: f64,
+    /// Standard deviation of the excess about its mean, in mm/s; 0 for one pair.
+    pub spread_mm_per_s: f64,
+    /// The same, as a part of the speed.
+    pub spread: f64,
+    /// The same about the mean of each train and step, in mm/s; `None` where none has two pairs.
+    pub spread_within_mm_per_s: Option<f64>,
+    /// The same, as a part of the speed.
+    pub spread_within: Option<f64>,
+    /// The spread that the resolution of the gates' clock alone makes, in mm/s (root mean square).
+    pub resolution_mm_per_s: f64,
+    /// The same, as a part of the speed.
+    pub resolution: f64,
+}
+
+impl GateAgreement {
+    /// Sums up; `None` without a check.
+    #[must_use]
+    pub fn of<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> Option<Self> {
+        let checks: Vec<&GateCheck> = checks.collect();
+        let column =
+            |value: fn(&GateCheck) -> f64| checks.iter().map(|check| value(check)).collect::<Vec<_>>();
+        let (bias_mm_per_s, spread_mm_per_s) = mean_and_deviation(&column(|c| c.excess().as_mm_per_s()))?;
+        let (bias, spread) = mean_and_deviation(&column(|c| c.excess() / c.spot))?;
+        Some(Self {
+            count: checks.len(),
+            bias_mm_per_s,
+            bias,
+            spread_mm_per_s,
+            spread,
+            spread_within_mm_per_s: deviation_within(&checks, |check| check.excess().as_mm_per_s()),
+            spread_within: deviation_within(&checks, |check| check.excess() / check.spot),
+            resolution_mm_per_s: root_mean_square(&column(|c| c.resolution.as_mm_per_s())),
+            resolution: root_mean_square(&column(|c| c.resolution / c.spot)),
+        })
+    }
+}
+
+fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
+    let degrees = values.len().checked_sub(1)?;
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    Some((mean, (squares / degrees.max(1) as f64).sqrt()))
+}
+
+/// Standard deviation about the mean of each train and step, pooled.
+fn deviation_within(checks: &[&GateCheck], value: fn(&GateCheck) -> f64) -> Option<f64> {
+    let mut groups: BTreeMap<(TrainId, SpeedStep), Vec<f64>> = BTreeMap::new();
+    for check in checks {
+        groups.entry((check.train, check.step)).or_default().push(value(check));
+    }
+    let (mut squares, mut degrees) = (0.0, 0);
+    for values in groups.values() {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        squares += values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+        degrees += values.len() - 1;
+    }
+    (degrees > 0).then(|| (squares / degrees as f64).sqrt())
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// What the estimator held for the speed at the end of each lap of a run.
+#[derive(Debug, Default)]
+pub(super) struct LapSpeeds {
+    first: Option<NodeId>,
+    laps: Vec<Estimate<Speed>>,
+    latest: Option<Estimate<Speed>>,
+}
+
+impl LapSpeeds {
+    /// A passage, and the estimate after it.
+    pub(super) fn take(&mut self, node: NodeId, speed: Option<Estimate<Speed>>) {
+        self.latest = speed.or(self.latest);
+        match self.first {
+            None => self.first = Some(node),
+            Some(first) if first == node => self.laps.extend(self.latest),
+            Some(_) => {}
+        }
+    }
+
+    /// The pairs of gate passes of the run beside the estimates of their laps; the last lap, which no return to
+    /// its beginning ends, ends with the run.
+    pub(super) fn checks(&self, run: &Run, train: TrainId, step: SpeedStep) -> Vec<GateCheck> {
+        let mut checks = Vec::new();
+        for (place, (second, took)) in pairs(&run.gates).enumerate() {
+            let Some(estimated) = self.laps.get(place).copied().or(self.latest) else { continue };
+            let spot = GATE_DISTANCE / took;
+            // Each stamp is off by up to half a tick, evenly: tick/√12, and √2 times that for a difference.
+            let resolution = spot * (GATE_TICK.as_s() / took.as_s() / 6.0_f64.sqrt());
+            let (run, line, lap) = (run.id, second.line, place + 1);
+            checks.push(GateCheck { run, line, train, step, lap, spot, resolution, estimated });
+        }
+        checks
+    }
+}
+
+/// The second pass of every pair, and the time between the two.
+fn pairs(gates: &[GatePass]) -> impl Iterator<Item = (GatePass, TimeSpan)> {
+    gates.chunks_exact(2).filter_map(|pair| {
+        let [first, second] = pair else { return None };
+        let took = second.time - first.time;
+        (first.gate != second.gate && took > TimeSpan::ZERO).then_some((*second, took))
+    })
+}
