@@ -4,7 +4,7 @@
 //! [`MAX_MISSED`] + 1 hops in a row; all but its last sensor were missed.
 
 use crate::ids::{EdgeId, NodeId, SensorId};
-use crate::track::{HopId, Layout, TurnoutStates};
+use crate::track::{Hop, HopId, Layout, Position, TurnoutStates};
 use crate::units::Length;
 
 /// Most sensors in a row that can be looked past. With one report in a hundred missed, three in a row are one
@@ -50,11 +50,23 @@ impl Layout {
     #[inline]
     #[must_use]
     pub fn reaches<'l>(&'l self, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Reaches<'l> {
-        let mut levels = [Level::default(); MAX_HOPS];
-        if let Some(first) = levels.first_mut() {
-            first.open = self.hops.range_from(from);
-        }
-        Reaches { layout: self, turnouts, deepest: missed.min(MAX_MISSED), levels, level: 0 }
+        Reaches::new(self, from, None, turnouts, missed)
+    }
+
+    /// The same for a train that is under way, with lengths from where it is: every sensor and track end that
+    /// it may reach next. The turnout at the start of its edge has been decided by its being there. A position
+    /// of another layout reaches nothing.
+    #[inline]
+    #[must_use]
+    pub fn reaches_ahead<'l>(
+        &'l self,
+        position: Position,
+        turnouts: &'l TurnoutStates,
+        missed: usize,
+    ) -> Reaches<'l> {
+        // No hop of any node begins on an edge that is not there.
+        let from = self.edge(position.edge).map_or(NodeId(0), |edge| edge.from);
+        Reaches::new(self, from, Some(position), turnouts, missed)
     }
 
     /// The edges of a reach in the order of travel.
@@ -72,12 +84,14 @@ pub struct Reaches<'l> {
     turnouts: &'l TurnoutStates,
     /// The level of the last hop that may be added.
     deepest: usize,
+    /// The edge on which every way begins, if it is given.
+    first_edge: Option<EdgeId>,
     levels: [Level; MAX_HOPS],
     level: usize,
 }
 
 /// Where the search stands after so many hops.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Level {
     /// The hops still to be tried here, from the first to before the second.
     open: (u32, u32),
@@ -85,6 +99,39 @@ struct Level {
     length: Length,
     /// The hop tried last.
     last: HopId,
+}
+
+impl<'l> Reaches<'l> {
+    #[inline]
+    fn new(
+        layout: &'l Layout,
+        from: NodeId,
+        position: Option<Position>,
+        turnouts: &'l TurnoutStates,
+        missed: usize,
+    ) -> Self {
+        let open = layout.hops.range_from(from);
+        let length = position.map_or(Length::ZERO, |position| -position.offset);
+        Self {
+            layout,
+            turnouts,
+            deepest: missed.min(MAX_MISSED),
+            first_edge: position.map(|position| position.edge),
+            levels: [Level { open, length, last: HopId::default() }; MAX_HOPS],
+            level: 0,
+        }
+    }
+
+    /// Whether a hop at the present level can be taken.
+    #[inline]
+    fn is_open(&self, hop: &Hop<'_>) -> bool {
+        let Some(first) = self.first_edge.filter(|_| self.level == 0) else {
+            return hop.is_open(self.turnouts);
+        };
+        let is_decided = self.layout.edge(first).is_some_and(|edge| edge.leg.is_some());
+        let mut needs = hop.needs.iter().skip(usize::from(is_decided));
+        hop.edges.first() == Some(&first) && needs.all(|need| self.turnouts.allow(*need))
+    }
 }
 
 impl Iterator for Reaches<'_> {
@@ -100,11 +147,12 @@ impl Iterator for Reaches<'_> {
             }
             level.last = HopId(level.open.0);
             level.open.0 += 1;
+            let begins_at = level.length;
             let hop = self.layout.hop(level.last)?;
-            if !hop.is_open(self.turnouts) {
+            if !self.is_open(&hop) {
                 continue;
             }
-            let length = level.length + hop.length;
+            let length = begins_at + hop.length;
             let reach = Reach {
                 to: hop.to,
                 sensor: hop.sensor,
@@ -164,6 +212,29 @@ mod tests {
     fn the_end_of_the_track_ends_a_reach() {
         assert_eq!(reaches("EN1", &TurnoutStates::unknown(), 3), ["E1 30 past 0", "EX2 70 past 1"]);
         assert!(reaches("EX2", &TurnoutStates::unknown(), 3).is_empty());
+    }
+
+    #[test]
+    fn a_train_under_way_reaches_what_is_ahead_of_it() {
+        let layout = oval();
+        let node = |name| layout.node_named(name).unwrap();
+        let edge = layout.edge_between(node("BR1"), node("C1")).unwrap();
+        let position = Position { edge, offset: Length::from_mm(50.0) };
+        // It is on the curved leg, however the turnout lies by now.
+        let straight: TurnoutStates = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
+        let ways: Vec<_> = layout
+            .reaches_ahead(position, &straight, 1)
+            .map(|reach| format!("{} {:.0}", layout.node_name(reach.to), reach.length.as_mm()))
+            .collect();
+        assert_eq!(ways, ["C1 170", "D1 420"]);
+
+        let edge = layout.edge_between(node("A1"), node("BR1")).unwrap();
+        let position = Position { edge, offset: Length::from_mm(90.0) };
+        let sensors: Vec<_> =
+            layout.reaches_ahead(position, &straight, 0).map(|reach| layout.node_name(reach.to)).collect();
+        assert_eq!(sensors, ["B1"], "the turnout still decides");
+        let elsewhere = Position { edge: EdgeId(999), offset: Length::ZERO };
+        assert_eq!(layout.reaches_ahead(elsewhere, &straight, 3).count(), 0);
     }
 
     #[test]

@@ -66,7 +66,7 @@ type Fault = (usize, LayoutProblem);
 fn read_text(text: &str) -> Result<LayoutFile, Fault> {
     let written: Written = toml::from_str(text).map_err(|error| {
         let byte = error.span().map_or(0, |span| span.start);
-        (byte, LayoutProblem::Toml(error.message().trim_end().replace('\n', "; ")))
+        (byte, LayoutProblem::Toml(in_words(error.message())))
     })?;
     let found = *written.format.get_ref();
     if found != FORMAT {
@@ -87,6 +87,14 @@ fn read_text(text: &str) -> Result<LayoutFile, Fault> {
         }
     }
     Ok(LayoutFile { layout, about: written.about.trim().to_owned(), drawing })
+}
+
+/// A message of the TOML reader on one line, with numbers called what people call them.
+fn in_words(message: &str) -> String {
+    let line = message.trim_end().replace('\n', "; ");
+    line.replace("expected f64", "expected a number")
+        .replace("expected u16", "expected a whole number from 0 to 65535")
+        .replace("expected i64", "expected a whole number")
 }
 
 /// The file as it is written.

@@ -1,7 +1,10 @@
 //! What the store promises, a file a promise.
 
+mod bad_layouts;
 mod bad_logs;
 mod built_in_layouts;
+mod layout_tables;
+mod layouts_of_any_text;
 mod logs_round_trip;
 mod no_look_ahead;
 mod real_logs;
