@@ -5,3 +5,4 @@ mod motion_checks;
 mod profiles;
 mod speed_change_laws;
 mod stopping;
+mod ways_on_tracks;
