@@ -1,17 +1,21 @@
 //! Layouts, calibrations and recordings on disk, and reading them back.
 //!
 //! Files come in through [`read_sensor_log`], which turns every form of sensor log into one
-//! [`Recording`]. [`score`] walks one and says how good the forecasts of it are.
+//! [`Recording`]. [`score`] walks one and says how good the forecasts of it are. What was measured is
+//! kept for ever in a [`Store`].
 
+mod content_hash;
 mod decimal;
 mod layout_file;
 mod recording;
 pub mod score;
 mod sensor_log;
 mod sensor_names;
+mod store;
 mod table;
 mod whole_file;
 
+pub use content_hash::{ContentHash, HashingReader};
 pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
     LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
@@ -22,5 +26,9 @@ pub use sensor_log::{
     LogContext, RecordingError, WriteLogError, parse_sensor_log, read_sensor_log, write_sensor_log,
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
+pub use store::{
+    Calibration, Change, EventKey, Import, Mark, MarkKind, NewCalibration, RecordingKey, RunKey, Salvaged,
+    SalvagedTable, Store, StoreError, StoredEvent, StoredRecording, StoredRun, salvage,
+};
 pub use table::{LONGEST_LINE, TableError};
 pub use whole_file::write_whole;

@@ -3,6 +3,7 @@
 mod bad_layouts;
 mod bad_logs;
 mod built_in_layouts;
+mod child_process;
 mod layout_tables;
 mod layouts_of_any_text;
 mod logs_round_trip;
@@ -10,3 +11,8 @@ mod no_look_ahead;
 mod real_logs;
 mod recordings;
 mod scored_loop;
+mod store_damaged;
+mod store_remembers;
+mod store_shared;
+mod store_survives;
+mod stores;

@@ -1,118 +1,15 @@
-//! The rows of a CSV file, one bounded line at a time, every field with its place.
-//!
-//! Quotes as in RFC 4180, except that a field may not run over several lines: a quote that someone forgot to
-//! close is then found where it is, and a file of any size is read in constant memory. A byte order mark,
-//! CRLF and empty lines are passed over.
+//! A CSV file that is being read, row by row.
 
 use std::fmt;
-use std::io::{self, BufRead, ErrorKind};
+use std::io::{BufRead, ErrorKind};
 
-use csv_core::{ReadRecordResult, Terminator};
+use super::error::{TableError, shown};
+use super::fields::{Fields, SplitError};
 
 /// The longest line that is read. A row of any recording has some hundred bytes; the limit keeps a file that
 /// is no table at all from filling the memory.
 pub const LONGEST_LINE: usize = 64 * 1024;
-/// How much of a wrong value a message repeats, in characters.
-const LONGEST_SHOWN: usize = 60;
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
-
-/// Why a table could not be read: where, what stands there and what would be right.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TableError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The file has no line at all.
-    #[error("{file}: the file is empty; its first line should name the columns")]
-    Empty {
-        /// The file.
-        file: String,
-    },
-    /// A line longer than [`LONGEST_LINE`].
-    #[error(
-        "{file}, line {line}: the line is longer than {LONGEST_LINE} bytes; is this a CSV file with a row a line?"
-    )]
-    LineTooLong {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-    },
-    /// Bytes that are no UTF-8.
-    #[error("{file}, line {line}: byte {byte} of the line is no UTF-8 text; save the file as UTF-8")]
-    NotText {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-        /// The byte in the line, counted from 1.
-        byte: usize,
-    },
-    /// A quote without its partner.
-    #[error("{file}, line {line}: a quote is opened and not closed on the same line")]
-    QuoteNotClosed {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-    },
-    /// A row with too few or too many fields.
-    #[error("{file}, line {line}: {found} fields where the header names {expected} columns")]
-    FieldCount {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-        /// How many fields it has.
-        found: usize,
-        /// How many columns there are.
-        expected: usize,
-    },
-    /// Two columns of one name.
-    #[error("{file}, line {line}: two columns are called `{name}`; give each its own name")]
-    ColumnTwice {
-        /// The file.
-        file: String,
-        /// The line of the header.
-        line: u64,
-        /// The name.
-        name: String,
-    },
-    /// A row of this kind needs a column that the file does not have.
-    #[error("{file}, line {line}: {row} needs the column `{column}`, which the header does not name")]
-    RowNeedsColumn {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-        /// What kind of row it is, with its article.
-        row: &'static str,
-        /// The column.
-        column: &'static str,
-    },
-    /// A field that is not what it should be.
-    #[error("{file}, line {line}, column {number} ({column}): `{value}` should be {expected}")]
-    Field {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-        /// The column, counted from 1.
-        number: usize,
-        /// The name of the column.
-        column: String,
-        /// What stands there, shortened if long.
-        value: String,
-        /// What would be right.
-        expected: String,
-    },
-}
 
 /// A column of a table that is known to be there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -350,73 +247,6 @@ impl<'t> Row<'t> {
     pub(crate) fn lacks(&self, column: &'static str, row: &'static str) -> TableError {
         TableError::RowNeedsColumn { file: self.file.to_owned(), line: self.line, row, column }
     }
-}
-
-/// The fields of one line, unquoted.
-#[derive(Default)]
-struct Fields {
-    text: String,
-    /// Where each field ends in `text`.
-    ends: Vec<usize>,
-    /// Buffers of the parser, kept for the next line.
-    parsed: Vec<u8>,
-}
-
-enum SplitError {
-    NotText { byte: usize },
-    QuoteNotClosed,
-}
-
-impl Fields {
-    /// Splits a line that ends with a line feed.
-    fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
-        self.text.clear();
-        self.ends.clear();
-        let text = std::str::from_utf8(line)
-            .map_err(|error| SplitError::NotText { byte: error.valid_up_to() + 1 })?;
-        if text.trim().is_empty() {
-            return Ok(());
-        }
-        // Unquoting only removes bytes, and a line of n commas has at most n + 1 fields.
-        self.parsed.resize(line.len(), 0);
-        self.ends.resize(line.iter().filter(|byte| **byte == b',').count() + 1, 0);
-        let mut parser = csv_core::ReaderBuilder::new().terminator(Terminator::Any(b'\n')).build();
-        let (result, _, written, fields) = parser.read_record(line, &mut self.parsed, &mut self.ends);
-        self.ends.truncate(fields);
-        if !matches!(result, ReadRecordResult::Record) {
-            return Err(SplitError::QuoteNotClosed);
-        }
-        // Quotes are ASCII: without them the text is still text.
-        self.text.push_str(std::str::from_utf8(&self.parsed[..written]).unwrap_or_default());
-        Ok(())
-    }
-
-    fn is_empty(&self) -> bool {
-        self.ends.is_empty()
-    }
-
-    fn len(&self) -> usize {
-        self.ends.len()
-    }
-
-    fn get(&self, index: usize) -> &str {
-        let begin = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
-        let end = self.ends.get(index).copied().unwrap_or(begin);
-        self.text.get(begin..end).unwrap_or_default().trim()
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &str> {
-        (0..self.len()).map(|index| self.get(index))
-    }
-}
-
-/// A value as messages repeat it: on one line and not too long.
-pub(crate) fn shown(value: &str) -> String {
-    let mut text: String = value.chars().take(LONGEST_SHOWN).flat_map(char::escape_debug).collect();
-    if value.chars().nth(LONGEST_SHOWN).is_some() {
-        text.push('…');
-    }
-    text
 }
 
 impl<R> fmt::Debug for Table<R> {

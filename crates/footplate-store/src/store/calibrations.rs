@@ -1,0 +1,84 @@
+//! What models made of the events: kept beside them, with the date of the events they saw.
+
+use footplate_core::{Timestamp, TrainId};
+use rusqlite::{ErrorCode, Row};
+
+use super::error::StoreError;
+use super::file::Store;
+
+/// A calibration to be kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NewCalibration<'a> {
+    /// Of which train.
+    pub train: TrainId,
+    /// It saw the events that were there, and not excluded, at this date: so it can be made again.
+    pub as_of: Timestamp,
+    /// The version of the model that made it.
+    pub model_version: &'a str,
+    /// What it says, as JSON.
+    pub body: &'a str,
+}
+
+/// A calibration that was kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Calibration {
+    /// Of which train.
+    pub train: TrainId,
+    /// When it was made.
+    pub made_at: Timestamp,
+    /// It saw the events that were there, and not excluded, at this date.
+    pub as_of: Timestamp,
+    /// The version of the model that made it.
+    pub model_version: String,
+    /// What it says, as JSON.
+    pub body: String,
+}
+
+const COLUMNS: &str = "train, made_at_ns, as_of_ns, model_version, body";
+
+impl Store {
+    /// Keeps a calibration; those before it stay.
+    pub fn keep_calibration(&mut self, new: NewCalibration<'_>, now: Timestamp) -> Result<(), StoreError> {
+        let sql = format!("INSERT INTO calibrations ({COLUMNS}) VALUES (?1, ?2, ?3, ?4, ?5)");
+        let row = (new.train.0, now.as_ns(), new.as_of.as_ns(), new.model_version, new.body);
+        match self.connection.execute(&sql, row) {
+            Ok(_) => Ok(()),
+            // The only constraint that a value of these types can break.
+            Err(error) if error.sqlite_error_code() == Some(ErrorCode::ConstraintViolation) => {
+                Err(StoreError::NotJson { train: new.train })
+            }
+            Err(error) => Err(self.error(error)),
+        }
+    }
+
+    /// The calibration of a train that was in force at a date: the last one made until then.
+    pub fn calibration(&self, train: TrainId, at: Timestamp) -> Result<Option<Calibration>, StoreError> {
+        let sql = format!(
+            "SELECT {COLUMNS} FROM calibrations WHERE train = ?1 AND made_at_ns <= ?2 ORDER BY id DESC LIMIT 1"
+        );
+        Ok(self.rows(&sql, (train.0, at.as_ns()), read)?.pop())
+    }
+
+    /// All calibrations of a train in the order in which they were made.
+    pub fn calibrations(&self, train: TrainId) -> Result<Vec<Calibration>, StoreError> {
+        let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE train = ?1 ORDER BY id");
+        self.rows(&sql, [train.0], read)
+    }
+
+    /// The trains that were ever calibrated.
+    pub fn calibrated_trains(&self) -> Result<Vec<TrainId>, StoreError> {
+        self.rows("SELECT DISTINCT train FROM calibrations ORDER BY train", [], |row| {
+            Ok(TrainId(row.get(0)?))
+        })
+    }
+}
+
+fn read(row: &Row<'_>) -> rusqlite::Result<Calibration> {
+    Ok(Calibration {
+        train: TrainId(row.get(0)?),
+        made_at: Timestamp::from_ns(row.get(1)?),
+        as_of: Timestamp::from_ns(row.get(2)?),
+        model_version: row.get(3)?,
+        body: row.get(4)?,
+    })
+}

@@ -1,0 +1,249 @@
+//! The file of a store: opening and creating it, bringing it up to date, and who may write.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
+
+use super::error::StoreError;
+
+/// Marks the file as ours for tools that look: `Foot` in ASCII (`PRAGMA application_id`).
+const APPLICATION_ID: i64 = 0x466F_6F74;
+
+/// What turns an empty file into version 1, version 1 into version 2 and so on. Entries are appended and never
+/// changed: files out there were made by them. `testdata/compat` keeps a file of every version.
+const MIGRATIONS: &[&str] = &[include_str!("migrations/1_begin.sql")];
+
+/// How long we wait for another process to finish writing, chosen: an import of a million events takes less.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A store that is open.
+///
+/// Several processes may have it open. Readers see what was there when they began; one writes at a time, the
+/// others wait for a while and then say who is in the way.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    pub(super) connection: Connection,
+}
+
+impl Store {
+    /// Opens the store at `path`, and brings it up to date if an older Footplate made it.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        if !path.try_exists().unwrap_or(true) {
+            return Err(StoreError::Missing { file: path.to_owned() });
+        }
+        Self::open_with(path, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)
+    }
+
+    /// Opens the store at `path`, or makes an empty one there.
+    pub fn open_or_create(path: &Path) -> Result<Self, StoreError> {
+        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
+        Self::open_with(path, flags, MIGRATIONS)
+    }
+
+    /// The same store, waiting this long for others to finish writing.
+    pub fn with_patience(self, patience: Duration) -> Result<Self, StoreError> {
+        self.connection.busy_timeout(patience).map_err(|error| self.error(error))?;
+        Ok(self)
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Looks at every page and every reference, and says what is wrong. Takes as long as reading the file.
+    pub fn check(&self) -> Result<(), StoreError> {
+        let check = || {
+            let mut statement = self.connection.prepare("PRAGMA integrity_check(1)")?;
+            let found: String = statement.query_row([], |row| row.get(0))?;
+            let mut orphans = self.connection.prepare("PRAGMA foreign_key_check")?;
+            let orphan = orphans.query([])?.next()?.map(|row| row.get::<_, String>(0)).transpose()?;
+            Ok((found, orphan))
+        };
+        let (found, orphan) = check().map_err(|error| self.error(error))?;
+        let what = match orphan {
+            _ if found != "ok" => found.replace('\n', ", "),
+            Some(table) => format!("rows of {table} belong to nothing"),
+            None => return Ok(()),
+        };
+        Err(StoreError::Damaged { file: self.path.clone(), what })
+    }
+
+    fn open_with(path: &Path, flags: OpenFlags, migrations: &[&str]) -> Result<Self, StoreError> {
+        let connection = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)
+            .map_err(|error| StoreError::of(path, error))?;
+        let mut store = Self { path: path.to_owned(), connection };
+        store.set_up().map_err(|error| store.error(error))?;
+        store.migrate(migrations)?;
+        // Only a store of ours is switched to a journal that stays in the file.
+        let journal: Result<String, _> =
+            store.connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0));
+        journal.map_err(|error| store.error(error))?;
+        Ok(store)
+    }
+
+    /// What holds for a connection and not for the file.
+    fn set_up(&self) -> rusqlite::Result<()> {
+        self.connection.busy_timeout(PATIENCE)?;
+        // A commit has reached the disk before it is acknowledged.
+        self.connection.pragma_update(None, "synchronous", "FULL")?;
+        self.connection.pragma_update(None, "foreign_keys", true)?;
+        // Nothing in a file that came from elsewhere runs with our rights, and bent pages are noticed early.
+        self.connection.pragma_update(None, "trusted_schema", false)?;
+        self.connection.pragma_update(None, "cell_size_check", true)
+    }
+
+    /// Brings the file up to date in one step: it has the old version or the newest, nothing between.
+    fn migrate(&mut self, migrations: &[&str]) -> Result<(), StoreError> {
+        let known = migrations.len() as i64;
+        if self.version(known)? == known {
+            return Ok(());
+        }
+        let path = self.path.clone();
+        let transaction = self.write()?;
+        // Another process may have been quicker.
+        let from = version_of(&transaction).map_err(|error| StoreError::of(&path, error))?;
+        let pending = migrations.iter().skip(usize::try_from(from).unwrap_or(usize::MAX));
+        let migrated = pending
+            .map(|migration| transaction.execute_batch(migration))
+            .collect::<rusqlite::Result<Vec<()>>>()
+            .and_then(|_| transaction.pragma_update(None, "application_id", APPLICATION_ID))
+            .and_then(|()| transaction.pragma_update(None, "user_version", known))
+            .and_then(|()| transaction.commit());
+        migrated.map_err(|error| self.error(error))
+    }
+
+    /// The version of the file, if it is ours and not newer than we are; 0 for one that is still empty.
+    fn version(&self, known: i64) -> Result<i64, StoreError> {
+        let read = || {
+            let application: i64 =
+                self.connection.pragma_query_value(None, "application_id", |row| row.get(0))?;
+            let tables: i64 =
+                self.connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))?;
+            Ok((application, tables, version_of(&self.connection)?))
+        };
+        let file = || self.path.clone();
+        match read().map_err(|error| self.error(error))? {
+            (0, 0, 0) => Ok(0),
+            (APPLICATION_ID, _, found) if found > known => {
+                Err(StoreError::Newer { file: file(), found, known })
+            }
+            (APPLICATION_ID, _, found) if found > 0 => Ok(found),
+            _ => Err(StoreError::NotAStore { file: file() }),
+        }
+    }
+
+    /// A transaction that may write: nobody else writes until it ends, and it is undone unless committed.
+    pub(super) fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
+        let begun = self.connection.transaction_with_behavior(TransactionBehavior::Immediate);
+        begun.map_err(|error| StoreError::of(&self.path, error))
+    }
+
+    /// What SQLite said, in our words.
+    pub(super) fn error(&self, source: rusqlite::Error) -> StoreError {
+        StoreError::of(&self.path, source)
+    }
+}
+
+fn version_of(connection: &Connection) -> rusqlite::Result<i64> {
+    connection.pragma_query_value(None, "user_version", |row| row.get(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLAGS: OpenFlags = OpenFlags::SQLITE_OPEN_READ_WRITE.union(OpenFlags::SQLITE_OPEN_CREATE);
+    const ONE: &str = "CREATE TABLE ledger (entry TEXT);";
+    const TWO: &str = "ALTER TABLE ledger ADD COLUMN amount INTEGER DEFAULT 7;";
+
+    fn folder() -> tempfile::TempDir {
+        tempfile::tempdir().unwrap()
+    }
+
+    #[test]
+    fn a_file_of_an_older_version_keeps_what_it_has() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        let old = Store::open_with(&path, FLAGS, &[ONE]).unwrap();
+        old.connection.execute("INSERT INTO ledger VALUES ('kept')", []).unwrap();
+        drop(old);
+        let new = Store::open_with(&path, FLAGS, &[ONE, TWO]).unwrap();
+        let row = new.connection.query_row("SELECT entry, amount FROM ledger", [], |row| {
+            Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))
+        });
+        assert_eq!(row.unwrap(), ("kept".to_owned(), 7));
+        assert_eq!(version_of(&new.connection).unwrap(), 2);
+    }
+
+    #[test]
+    fn a_migration_that_fails_leaves_the_old_version() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        drop(Store::open_with(&path, FLAGS, &[ONE]).unwrap());
+        let broken = Store::open_with(&path, FLAGS, &[ONE, TWO, "CREATE TABLE ledger (again TEXT);"]);
+        assert!(matches!(broken, Err(StoreError::Refused { .. })));
+        let old = Store::open_with(&path, FLAGS, &[ONE]).unwrap();
+        assert_eq!(version_of(&old.connection).unwrap(), 1);
+        assert!(old.connection.prepare("SELECT amount FROM ledger").is_err());
+    }
+
+    #[test]
+    fn a_file_of_a_newer_version_is_refused_with_both_versions() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        drop(Store::open_with(&path, FLAGS, &[ONE, TWO]).unwrap());
+        let refused = Store::open_with(&path, FLAGS, &[ONE]).unwrap_err();
+        assert!(matches!(refused, StoreError::Newer { found: 2, known: 1, .. }), "{refused}");
+        assert!(
+            refused
+                .to_string()
+                .contains("has version 2 of the store, and this Footplate knows versions up to 1")
+        );
+    }
+
+    #[test]
+    fn a_file_of_somebody_else_is_left_alone() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        Connection::open(&path).unwrap().execute_batch("CREATE TABLE theirs (x)").unwrap();
+        let before = std::fs::read(&path).unwrap();
+        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+        std::fs::write(
+            &path,
+            "This is a letter, and a long one, with more than the hundred bytes a header has, \
+            so that nobody takes it for an empty file.",
+        )
+        .unwrap();
+        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));
+    }
+
+    #[test]
+    fn opening_makes_no_file_where_there_is_none() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        assert!(matches!(Store::open(&path), Err(StoreError::Missing { .. })));
+        assert!(!path.exists());
+        let nowhere = folder.path().join("no folder/railway.db");
+        assert!(matches!(Store::open_or_create(&nowhere), Err(StoreError::ReadOnly { .. })));
+    }
+
+    #[test]
+    fn measurements_are_on_the_disk_before_they_are_acknowledged() {
+        let folder = folder();
+        let store = Store::open_or_create(&folder.path().join("railway.db")).unwrap();
+        let pragma = |name: &str| -> String {
+            store
+                .connection
+                .query_row(&format!("SELECT CAST({name} AS TEXT) FROM pragma_{name}"), [], |row| row.get(0))
+                .unwrap()
+        };
+        assert_eq!(pragma("journal_mode"), "wal");
+        assert_eq!(pragma("synchronous"), "2", "FULL");
+        assert_eq!(pragma("foreign_keys"), "1");
+    }
+}

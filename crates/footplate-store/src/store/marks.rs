@@ -1,0 +1,118 @@
+//! What a person thinks of an event: excluding it and restoring it, each with a reason and a date.
+
+use footplate_core::Timestamp;
+use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
+use rusqlite::{OptionalExtension, Transaction};
+
+use super::error::StoreError;
+use super::file::Store;
+use super::recordings::EventKey;
+
+/// A mark on an event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mark {
+    /// The event.
+    pub event: EventKey,
+    /// Excluded or restored.
+    pub kind: MarkKind,
+    /// Why.
+    pub reason: String,
+    /// When.
+    pub made_at: Timestamp,
+}
+
+/// What a mark does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkKind {
+    /// No calibration uses the event from here on.
+    Excluded,
+    /// Calibrations use it again.
+    Restored,
+}
+
+impl MarkKind {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Excluded => "exclude",
+            Self::Restored => "restore",
+        }
+    }
+}
+
+impl FromSql for MarkKind {
+    fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
+        match value.as_str()? {
+            "exclude" => Ok(Self::Excluded),
+            "restore" => Ok(Self::Restored),
+            _ => Err(FromSqlError::InvalidType),
+        }
+    }
+}
+
+impl ToSql for MarkKind {
+    fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
+        Ok(self.name().into())
+    }
+}
+
+impl Store {
+    /// Excludes events from every calibration from now on. All of them, or none if one cannot be.
+    pub fn exclude(&mut self, events: &[EventKey], reason: &str, now: Timestamp) -> Result<(), StoreError> {
+        self.mark(events, MarkKind::Excluded, reason, now)
+    }
+
+    /// Takes events in again that were excluded. All of them, or none if one cannot be.
+    pub fn restore(&mut self, events: &[EventKey], reason: &str, now: Timestamp) -> Result<(), StoreError> {
+        self.mark(events, MarkKind::Restored, reason, now)
+    }
+
+    fn mark(
+        &mut self,
+        events: &[EventKey],
+        kind: MarkKind,
+        reason: &str,
+        now: Timestamp,
+    ) -> Result<(), StoreError> {
+        let reason = reason.trim();
+        if reason.is_empty() {
+            return Err(StoreError::NoReason);
+        }
+        let path = self.path().to_owned();
+        let error = |source| StoreError::of(&path, source);
+        let transaction = self.write()?;
+        for event in events {
+            if let Some(objection) = objection(&transaction, *event, kind).map_err(error)? {
+                return Err(objection);
+            }
+            let insert = "INSERT INTO marks (event, mark, reason, made_at_ns) VALUES (?1, ?2, ?3, ?4)";
+            transaction
+                .prepare_cached(insert)
+                .and_then(|mut statement| statement.execute((event.0, kind, reason, now.as_ns())))
+                .map_err(error)?;
+        }
+        transaction.commit().map_err(error)
+    }
+}
+
+/// Why an event cannot be marked so, if there is a reason.
+fn objection(
+    transaction: &Transaction<'_>,
+    event: EventKey,
+    kind: MarkKind,
+) -> rusqlite::Result<Option<StoreError>> {
+    let known = transaction.prepare_cached("SELECT 1 FROM events WHERE id = ?1")?.exists([event.0])?;
+    if !known {
+        return Ok(Some(StoreError::NoEvent { event }));
+    }
+    let newest = transaction
+        .prepare_cached("SELECT mark, reason FROM marks WHERE event = ?1 ORDER BY id DESC LIMIT 1")?
+        .query_row([event.0], |row| Ok((row.get::<_, MarkKind>(0)?, row.get(1)?)))
+        .optional()?;
+    Ok(match newest {
+        Some((now, reason)) if now == kind => {
+            Some(StoreError::MarkedAlready { event, excluded: kind == MarkKind::Excluded, reason })
+        }
+        None if kind == MarkKind::Restored => Some(StoreError::NeverExcluded { event }),
+        _ => None,
+    })
+}

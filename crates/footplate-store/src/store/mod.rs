@@ -1,0 +1,31 @@
+//! One SQLite file that keeps every measurement for ever, and what people and models made of them.
+//!
+//! Raw events are appended and never changed: triggers in the file refuse it, whoever asks. What a person thinks of
+//! an event is a mark beside it, a calibration is a row beside them, both with their date; so the state of any
+//! date can be had again, and every change since be listed. Time is an argument: the program knows what time it is.
+//!
+//! ```text
+//! file          opening, creating, migrating; who may write
+//! recordings    importing a recording, appending the events of a live session
+//! history       reading back what was there at a date, and what changed between two
+//! marks         excluding events and restoring them
+//! calibrations  keeping them and finding the one in force
+//! salvage       what can still be read of a damaged file, into a new one
+//! ```
+
+mod calibrations;
+mod error;
+mod file;
+mod history;
+mod marks;
+mod recordings;
+mod row;
+mod salvage;
+
+pub use calibrations::{Calibration, NewCalibration};
+pub use error::StoreError;
+pub use file::Store;
+pub use history::{Change, StoredEvent, StoredRecording, StoredRun};
+pub use marks::{Mark, MarkKind};
+pub use recordings::{EventKey, Import, RecordingKey, RunKey};
+pub use salvage::{Salvaged, SalvagedTable, salvage};

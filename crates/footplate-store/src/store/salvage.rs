@@ -1,0 +1,302 @@
+//! What can still be read of a damaged store, copied into a new one.
+//!
+//! The damaged file is not touched: a copy of it is read, row after row by number, passing over rows whose page does not
+//! make sense any more. Events whose run or recording is lost get a stand-in, so that nothing readable is dropped.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rusqlite::types::Value;
+use rusqlite::{Connection, Statement, Transaction, params_from_iter};
+
+use super::error::StoreError;
+use super::file::Store;
+
+/// What came over into the new store.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Salvaged {
+    /// Table by table, in the order in which they depend on each other.
+    pub tables: Vec<SalvagedTable>,
+}
+
+/// What came over of one table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SalvagedTable {
+    /// The table.
+    pub name: &'static str,
+    /// Rows that were read and make sense.
+    pub rows: u64,
+    /// Rows that were there, by the gaps in their numbers, and cannot be read. Rows lost at the end leave no gap
+    /// and are not counted.
+    pub lost: u64,
+    /// Lost rows of other tables that got a stand-in, because rows of this one belong to them.
+    pub stand_ins: u64,
+}
+
+/// Tables with what they belong to, parents first.
+const TABLES: [(&str, Option<Parent>); 7] = [
+    ("recordings", None),
+    ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
+    ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
+    ("events", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
+    ("gate_passes", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
+    // A mark says nothing without its event.
+    ("marks", None),
+    ("calibrations", None),
+];
+
+/// Where a row belongs.
+#[derive(Clone, Copy)]
+struct Parent {
+    column: &'static str,
+    table: &'static str,
+    /// Makes the row `?1` of the parent table.
+    stand_in: &'static str,
+}
+
+const STAND_IN_RECORDING: &str = "INSERT INTO recordings (id, name, form, layout, stored_at_ns) \
+     VALUES (?1, 'lost recording', 'salvaged', 'unknown', 0)";
+/// Every lost run goes to one recording, under its number in the store.
+const STAND_IN_RUN: &str = "INSERT INTO runs (id, recording, number) \
+     SELECT ?1, id, ?1 FROM recordings WHERE form = 'salvaged runs'";
+/// The recording for them, behind all numbers that were read.
+const RECORDING_OF_LOST_RUNS: &str = "INSERT INTO recordings (name, form, layout, stored_at_ns) \
+     SELECT 'lost runs', 'salvaged runs', 'unknown', 0 \
+     WHERE NOT EXISTS (SELECT 1 FROM recordings WHERE form = 'salvaged runs')";
+
+/// No row takes less than this in the file: header and key of a cell (SQLite file format, section 1.6).
+const LEAST_ROW_BYTES: u64 = 4;
+/// Where the header keeps the size of the file in pages; zero has it counted anew (SQLite file format, 1.3).
+const SIZE_IN_HEADER: std::ops::Range<usize> = 28..32;
+
+/// Copies what can be read of the store at `damaged` into a new store at `into`, where no file may be.
+pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
+    let exists = |path: &Path| path.try_exists().unwrap_or(true);
+    if !exists(damaged) {
+        return Err(StoreError::Missing { file: damaged.to_owned() });
+    }
+    if exists(into) {
+        return Err(StoreError::Exists { file: into.to_owned() });
+    }
+    let beside = into.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = tempfile::tempdir_in(beside).map_err(system(into, "write beside"))?;
+    let fresh = folder.path().join("new.db");
+    drop(Store::open_or_create(&fresh)?);
+
+    let copy = copy_of(damaged, folder.path())?;
+    let salvaged = match copy_rows(&copy, &fresh) {
+        Ok(salvaged) if !salvaged.is_empty() => salvaged,
+        // Without its first pages a file has lost the list of its tables; a new one has the same list.
+        _ => {
+            let copy = copy_of(damaged, folder.path())?;
+            replace_list_of_tables(&copy, &fresh)?;
+            let salvaged = copy_rows(&copy, &fresh)?;
+            if salvaged.is_empty() {
+                return Err(StoreError::NotAStore { file: damaged.to_owned() });
+            }
+            salvaged
+        }
+    };
+    fs::rename(&fresh, into).map_err(system(into, "write"))?;
+    Ok(salvaged)
+}
+
+impl Salvaged {
+    fn is_empty(&self) -> bool {
+        self.tables.iter().all(|table| table.rows == 0)
+    }
+}
+
+fn system(file: &Path, doing: &'static str) -> impl FnOnce(std::io::Error) -> StoreError {
+    let file = file.to_owned();
+    move |source| StoreError::System { file, doing, source }
+}
+
+/// A copy of a store with what its journal still holds.
+fn copy_of(damaged: &Path, folder: &Path) -> Result<PathBuf, StoreError> {
+    let with = |path: &Path, suffix: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(suffix);
+        PathBuf::from(name)
+    };
+    let copy = folder.join("damaged.db");
+    let _ = fs::remove_file(with(&copy, "-shm"));
+    fs::copy(damaged, &copy).map_err(system(damaged, "read"))?;
+    let journal = with(damaged, "-wal");
+    if journal.exists() {
+        fs::copy(&journal, with(&copy, "-wal")).map_err(system(&journal, "read"))?;
+    }
+    Ok(copy)
+}
+
+/// Replaces the pages that list the tables by those of a new store, which lists the same tables in the same places.
+fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
+    let pages = || {
+        let fresh = Connection::open(fresh)?;
+        let size = fresh.pragma_query_value(None, "page_size", |row| row.get(0))?;
+        let mut statement = fresh.prepare("SELECT pageno - 1 FROM dbstat WHERE name = 'sqlite_schema'")?;
+        let pages = statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<Vec<usize>>>()?;
+        Ok((pages, size))
+    };
+    let (pages, size): (_, usize) = pages().map_err(|error| StoreError::of(fresh, error))?;
+    let good = fs::read(fresh).map_err(system(fresh, "read"))?;
+    let mut bytes = fs::read(copy).map_err(system(copy, "read"))?;
+    for page in pages {
+        let range = page * size..(page + 1) * size;
+        if let (Some(bytes), Some(good)) = (bytes.get_mut(range.clone()), good.get(range)) {
+            bytes.copy_from_slice(good);
+        }
+    }
+    if let Some(pages) = bytes.get_mut(SIZE_IN_HEADER) {
+        pages.fill(0);
+    }
+    fs::write(copy, bytes).map_err(system(copy, "write"))
+}
+
+fn copy_rows(copy: &Path, fresh: &Path) -> Result<Salvaged, StoreError> {
+    let from = Connection::open(copy).map_err(|error| StoreError::of(copy, error))?;
+    // Lets SQLite read a file that is shorter than its header says.
+    from.pragma_update(None, "writable_schema", true).map_err(|error| StoreError::of(copy, error))?;
+    let mut store = Store::open(fresh)?;
+    let path = store.path().to_owned();
+    let transaction = store.write()?;
+    let most = fs::metadata(copy).map_or(0, |file| file.len() / LEAST_ROW_BYTES);
+    let copied = TABLES
+        .iter()
+        .map(|(name, parent)| copy_table(&from, &transaction, name, *parent, most))
+        .collect::<rusqlite::Result<Vec<SalvagedTable>>>()
+        .and_then(|tables| transaction.commit().map(|()| Salvaged { tables }));
+    copied.map_err(|error| StoreError::of(&path, error))
+}
+
+/// Copies the rows of a table by number, from the first to the last that can be found, or to number `most`.
+/// Fails only if the new store does.
+fn copy_table(
+    from: &Connection,
+    into: &Transaction<'_>,
+    name: &'static str,
+    parent: Option<Parent>,
+    most: u64,
+) -> rusqlite::Result<SalvagedTable> {
+    let empty = SalvagedTable { name, rows: 0, lost: 0, stand_ins: 0 };
+    // An older store has fewer columns, and the names in a damaged one may be anything.
+    let known = columns_of(into, name);
+    let columns: Vec<String> =
+        columns_of(from, name).into_iter().filter(|column| known.contains(column)).collect();
+    if columns.first().is_none_or(|first| first != "id") {
+        return Ok(empty);
+    }
+    let (names, places) = (columns.join(", "), vec!["?"; columns.len()].join(", "));
+    let select = format!("SELECT {names} FROM {name} NOT INDEXED WHERE id >= ?1 ORDER BY id");
+    let Ok(select) = from.prepare(&select) else { return Ok(empty) };
+    let insert = format!("INSERT INTO {name} ({names}) VALUES ({places})");
+    let Ok(insert) = into.prepare(&insert) else { return Ok(empty) };
+    let parent = parent.and_then(|parent| {
+        let column = columns.iter().position(|column| column == parent.column)?;
+        Some((parent, column))
+    });
+    let newest =
+        from.query_row(&format!("SELECT max(id) FROM {name}"), [], |row| row.get::<_, Option<i64>>(0));
+    let last = match &newest {
+        Ok(newest) => newest.unwrap_or(0),
+        Err(_) => i64::try_from(most).unwrap_or(i64::MAX),
+    };
+
+    let mut copy = TableCopy { select, columns: columns.len(), insert, into, parent, table: empty };
+    let mut next = 1;
+    let mut last_known = newest.ok().flatten().unwrap_or(0);
+    while next <= last {
+        let stretch = copy.copy_from(next)?;
+        last_known = last_known.max(stretch.last_read.unwrap_or(0));
+        if stretch.ended {
+            break;
+        }
+        // The row behind cannot be read: go on with the next.
+        next = stretch.last_read.unwrap_or(next).saturating_add(1);
+    }
+    copy.table.lost = u64::try_from(last_known).unwrap_or(0).saturating_sub(copy.table.rows);
+    Ok(copy.table)
+}
+
+/// The columns of a table as far as their names can be read.
+fn columns_of(connection: &Connection, table: &str) -> Vec<String> {
+    let names = |connection: &Connection| {
+        connection
+            .prepare("SELECT name FROM pragma_table_info(?1)")?
+            .query_map([table], |row| row.get(0))?
+            .collect::<rusqlite::Result<Vec<String>>>()
+    };
+    names(connection).unwrap_or_default()
+}
+
+/// A table on its way into the new store.
+struct TableCopy<'a> {
+    /// Reads the rows from a number on, in order.
+    select: Statement<'a>,
+    columns: usize,
+    insert: Statement<'a>,
+    into: &'a Transaction<'a>,
+    /// Where the rows belong, and in which column they say so.
+    parent: Option<(Parent, usize)>,
+    table: SalvagedTable,
+}
+
+/// How far rows could be read.
+struct Stretch {
+    last_read: Option<i64>,
+    /// Whether that was the last row of the table.
+    ended: bool,
+}
+
+impl TableCopy<'_> {
+    /// Copies the rows from number `first` on as far as they can be read.
+    fn copy_from(&mut self, first: i64) -> rusqlite::Result<Stretch> {
+        let mut stretch = Stretch { last_read: None, ended: false };
+        let Ok(mut rows) = self.select.query([first]) else { return Ok(stretch) };
+        loop {
+            let row = match rows.next() {
+                Ok(Some(row)) => row,
+                Ok(None) => {
+                    stretch.ended = true;
+                    return Ok(stretch);
+                }
+                Err(_) => return Ok(stretch),
+            };
+            let values: rusqlite::Result<Vec<Value>> =
+                (0..self.columns).map(|column| row.get(column)).collect();
+            let Ok(values) = values else { return Ok(stretch) };
+            let Some(Value::Integer(id)) = values.first() else { return Ok(stretch) };
+            stretch.last_read = Some(*id);
+            if let Some((parent, column)) = self.parent
+                && let Some(Value::Integer(key)) = values.get(column)
+            {
+                self.table.stand_ins += u64::from(stand_in(self.into, parent, *key)?);
+            }
+            self.table.rows += u64::from(accepted(&mut self.insert, &values)?);
+        }
+    }
+}
+
+/// Inserts a row if it makes sense.
+fn accepted(insert: &mut Statement<'_>, values: &[Value]) -> rusqlite::Result<bool> {
+    match insert.execute(params_from_iter(values)) {
+        Ok(_) => Ok(true),
+        Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::ConstraintViolation) => {
+            Ok(false)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Makes the row `key` of the parent table if it is lost, and says whether it did.
+fn stand_in(into: &Transaction<'_>, parent: Parent, key: i64) -> rusqlite::Result<bool> {
+    let there = format!("SELECT 1 FROM {} WHERE id = ?1", parent.table);
+    if into.prepare_cached(&there)?.exists([key])? {
+        return Ok(false);
+    }
+    if parent.table == "runs" {
+        into.execute(RECORDING_OF_LOST_RUNS, [])?;
+    }
+    // A number that cannot be is a bent row, which its own insertion refuses.
+    Ok(into.execute(parent.stand_in, [key]).is_ok())
+}

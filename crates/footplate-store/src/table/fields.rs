@@ -1,0 +1,62 @@
+//! The fields of one line of CSV.
+
+use csv_core::{ReadRecordResult, Terminator};
+
+/// The fields of one line, unquoted.
+#[derive(Default)]
+pub(super) struct Fields {
+    text: String,
+    /// Where each field ends in `text`.
+    ends: Vec<usize>,
+    /// Buffers of the parser, kept for the next line.
+    parsed: Vec<u8>,
+}
+
+/// Why a line has no fields.
+pub(super) enum SplitError {
+    NotText { byte: usize },
+    QuoteNotClosed,
+}
+
+impl Fields {
+    /// Splits a line that ends with a line feed.
+    pub(super) fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
+        self.text.clear();
+        self.ends.clear();
+        let text = std::str::from_utf8(line)
+            .map_err(|error| SplitError::NotText { byte: error.valid_up_to() + 1 })?;
+        if text.trim().is_empty() {
+            return Ok(());
+        }
+        // Unquoting only removes bytes, and a line of n commas has at most n + 1 fields.
+        self.parsed.resize(line.len(), 0);
+        self.ends.resize(line.iter().filter(|byte| **byte == b',').count() + 1, 0);
+        let mut parser = csv_core::ReaderBuilder::new().terminator(Terminator::Any(b'\n')).build();
+        let (result, _, written, fields) = parser.read_record(line, &mut self.parsed, &mut self.ends);
+        self.ends.truncate(fields);
+        if !matches!(result, ReadRecordResult::Record) {
+            return Err(SplitError::QuoteNotClosed);
+        }
+        // Quotes are ASCII: without them the text is still text.
+        self.text.push_str(std::str::from_utf8(&self.parsed[..written]).unwrap_or_default());
+        Ok(())
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    pub(super) fn get(&self, index: usize) -> &str {
+        let begin = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
+        let end = self.ends.get(index).copied().unwrap_or(begin);
+        self.text.get(begin..end).unwrap_or_default().trim()
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &str> {
+        (0..self.len()).map(|index| self.get(index))
+    }
+}
