@@ -41,7 +41,7 @@ fn append_digit(number: i64, digit: u8) -> Option<i64> {
 }
 
 fn scaled_float(text: &str, decimals: u32) -> Option<i64> {
-    let scaled = (text.parse::<f64>().ok()? * 10_f64.powi(i32::try_from(decimals).ok()?)).round();
+    let scaled = (text.parse::<f64>().ok()? * 10_u64.pow(decimals) as f64).round();
     // The next float below 2^63 is the largest that an i64 holds.
     (scaled.abs() < i64::MAX as f64).then_some(scaled as i64)
 }
