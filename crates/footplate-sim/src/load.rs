@@ -6,8 +6,8 @@ use crate::train::Train;
 
 /// Time in which a train's speed takes in a change of the rail under it (chosen: a coach length at mid speed).
 const RAIL_LAG_S: f64 = 0.15;
-/// How often the wander of speed is drawn anew (chosen: well below the time over which it forgets).
-const WANDER_STEP_S: f64 = 0.02;
+/// How often the slow influences, wander and warmth, move on (chosen: well below the times they take).
+const SLOW_STEP_S: f64 = 0.02;
 /// Speed while the shoe crosses a dirty spot over speed before (chosen; the lag lets little of it through).
 const DIRTY_FACTOR: f64 = 0.85;
 /// Length of a dirty spot (chosen).
@@ -24,7 +24,7 @@ pub(crate) struct Load<'train> {
     draws: Draws,
     run: f64,
     wander: f64,
-    until_wander: f64,
+    until_slow: f64,
     /// 0 cold, 1 warm.
     warmth: f64,
     /// The factor after the lag.
@@ -36,7 +36,7 @@ impl<'train> Load<'train> {
     pub(crate) fn new(train: &'train Train, warmth: f64, rail: f64, mut draws: Draws) -> Self {
         let run = draws.normal(1.0, train.run_deviation.as_parts());
         let wander = draws.normal(0.0, train.wander.as_parts());
-        let mut load = Self { train, draws, run, wander, until_wander: WANDER_STEP_S, warmth, factor: 1.0 };
+        let mut load = Self { train, draws, run, wander, until_slow: SLOW_STEP_S, warmth, factor: 1.0 };
         load.factor = load.goal(rail);
         load
     }
@@ -58,17 +58,17 @@ impl<'train> Load<'train> {
 
     /// The factor one integration step later, on a rail with a factor.
     pub(crate) fn advance(&mut self, rail: f64, is_dirty: bool, moves: bool) -> f64 {
-        self.warmth = warmth_after(self.train, self.warmth, moves, STEP_S);
-        self.until_wander -= STEP_S;
-        if self.until_wander <= 0.0 {
-            self.until_wander += WANDER_STEP_S;
+        self.until_slow -= STEP_S;
+        if self.until_slow <= 0.0 {
+            self.until_slow += SLOW_STEP_S;
+            self.warmth = warmth_after(self.train, self.warmth, moves, SLOW_STEP_S);
             // An autoregression of first order: it keeps its spread whatever the step.
-            let kept = 1.0 - WANDER_STEP_S / self.train.wander_time.as_s().max(WANDER_STEP_S);
+            let kept = 1.0 - SLOW_STEP_S / self.train.wander_time.as_s().max(SLOW_STEP_S);
             let fresh = self.train.wander.as_parts() * libm::sqrt(1.0 - kept * kept);
             self.wander = kept * self.wander + self.draws.normal(0.0, fresh);
         }
         let goal = self.goal(rail) * if is_dirty { DIRTY_FACTOR } else { 1.0 };
-        self.factor += (goal - self.factor) * STEP_S / RAIL_LAG_S;
+        self.factor += (goal - self.factor) * (STEP_S / RAIL_LAG_S);
         self.factor
     }
 

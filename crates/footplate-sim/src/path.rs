@@ -25,10 +25,12 @@ pub(crate) struct Origin {
 }
 
 /// The way ahead, round and round a circuit, long enough for one run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Path {
     /// Edges by where they begin.
     pub(crate) edges: Vec<Mark<EdgeId>>,
+    /// What the rails of each edge make of a speed, as a factor.
+    factors: Vec<f64>,
     /// Contacts by where they close, in order.
     pub(crate) contacts: Vec<Mark<SensorId>>,
     /// Nodes of sensors by where they are, in order: where a person lays the tape.
@@ -54,13 +56,7 @@ impl Path {
             .copied()
             .max_by(|a, b| length_mm(*a).total_cmp(&length_mm(*b)))
             .filter(|_| has_gates);
-        let mut path = Self {
-            edges: Vec::new(),
-            contacts: Vec::new(),
-            landmarks: Vec::new(),
-            dirty: Vec::new(),
-            gates: Vec::new(),
-        };
+        let mut path = Self::default();
         let mut begins_mm = -origin.past_mm;
         for place in first.. {
             if begins_mm > reach_mm || edges.is_empty() {
@@ -74,6 +70,7 @@ impl Path {
                     .push(Mark { at_mm: begins_mm + track.contact_offset(sensor).as_mm(), what: sensor });
             }
             path.edges.push(Mark { at_mm: begins_mm, what: edge });
+            path.factors.push(track.speed_factor(edge).as_parts());
             path.dirty.extend(
                 track.dirty_mm(edge).into_iter().map(|spot| Mark { at_mm: begins_mm + spot, what: () }),
             );
@@ -87,6 +84,11 @@ impl Path {
         // Contacts a few millimetres apart may close in another order than their nodes lie.
         path.contacts.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
         path
+    }
+
+    /// What the rails make of a speed once `begun` edges have been begun.
+    pub(crate) fn factor(&self, begun: usize) -> f64 {
+        begun.checked_sub(1).and_then(|last| self.factors.get(last)).copied().unwrap_or(1.0)
     }
 
     /// The edge at a distance and how far along it that is.

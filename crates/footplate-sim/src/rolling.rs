@@ -1,19 +1,17 @@
 //! A train on its way: the motor's speed, what the rails make of it, and what the shoe touches.
 
-use footplate_core::{EdgeId, SpeedStep};
+use footplate_core::SpeedStep;
 
 use crate::contacts::Contacts;
 use crate::draws::Draws;
 use crate::load::{DIRTY_MM, Load};
 use crate::motor::{Motor, STEP_S};
 use crate::path::{Mark, Path};
-use crate::track::TrueTrack;
 use crate::train::Train;
 
 /// A train under way on a path. Its distance is that of the leading end of its shoe.
 #[derive(Debug)]
 pub(crate) struct Rolling<'w> {
-    track: &'w TrueTrack,
     path: &'w Path,
     train: &'w Train,
     motor: Motor<'w>,
@@ -38,45 +36,26 @@ struct Passed {
 }
 
 impl<'w> Rolling<'w> {
-    /// A train at the start of its path. The shoe may stand on a contact; `closed_at`, in s before the run,
-    /// is when it closed the last one, which the station may remember.
+    /// A train at the start of its path.
     pub(crate) fn new(
-        (track, path): (&'w TrueTrack, &'w Path),
+        path: &'w Path,
         train: &'w Train,
         motor: Motor<'w>,
         warmth: f64,
-        (contacts, closed_at): (&mut Contacts<'_>, f64),
         mut draws: Draws,
     ) -> Self {
         let shoe_mm = train.shoe.as_mm();
-        let mut passed = Passed::default();
-        let behind = |mark: &&Mark<_>| mark.at_mm <= 0.0;
-        while let Some(mark) = path.contacts.get(passed.closed).filter(behind) {
-            let held = mark.at_mm > -shoe_mm;
-            contacts.remember(mark.what, closed_at, held);
-            passed.closed += 1;
-            passed.left += usize::from(!held);
-        }
-        passed.edges = path.edges.partition_point(|mark| mark.at_mm <= 0.0);
-        passed.dirty = path.dirty.partition_point(|mark| mark.at_mm <= 0.0);
-        passed.gates = path.gates.partition_point(|mark| mark.at_mm <= 0.0);
-        let rail = rail(track, path.edges.get(passed.edges.saturating_sub(1)));
-        let load = Load::new(train, warmth, rail, draws.split());
+        let passed = Passed {
+            edges: path.edges.partition_point(|mark| mark.at_mm <= 0.0),
+            closed: path.contacts.partition_point(|mark| mark.at_mm <= 0.0),
+            left: path.contacts.partition_point(|mark| mark.at_mm <= -shoe_mm),
+            dirty: path.dirty.partition_point(|mark| mark.at_mm <= 0.0),
+            gates: path.gates.partition_point(|mark| mark.at_mm <= 0.0),
+        };
+        let load = Load::new(train, warmth, path.factor(passed.edges), draws.split());
         let speed_mm_per_s = motor.wheel_speed() * load.factor();
         let (distance_mm, rested_at, commands) = (0.0, None, Vec::new());
-        Self {
-            track,
-            path,
-            train,
-            motor,
-            load,
-            draws,
-            distance_mm,
-            speed_mm_per_s,
-            rested_at,
-            commands,
-            passed,
-        }
+        Self { path, train, motor, load, draws, distance_mm, speed_mm_per_s, rested_at, commands, passed }
     }
 
     /// Distance in mm and speed in mm/s.
@@ -130,7 +109,7 @@ impl<'w> Rolling<'w> {
         let here = self.distance_mm;
         let dirt_mm = self.passed.dirty.checked_sub(1).and_then(|last| self.path.dirty.get(last));
         let is_dirty = dirt_mm.is_some_and(|dirt| here < dirt.at_mm + DIRTY_MM);
-        let rail = rail(self.track, self.path.edges.get(self.passed.edges.saturating_sub(1)));
+        let rail = self.path.factor(self.passed.edges);
         let speed = wheel * self.load.advance(rail, is_dirty, wheel > 0.0);
         let there = here + 0.5 * (self.speed_mm_per_s + speed) * STEP_S;
         self.distance_mm = there;
@@ -166,9 +145,4 @@ fn passed<'path, T>(marks: &'path [Mark<T>], behind: &mut usize, to_mm: f64) -> 
     let count = ahead.iter().take_while(|mark| mark.at_mm <= to_mm).count();
     *behind += count;
     &ahead[..count]
-}
-
-/// What the rails at an edge make of a speed.
-fn rail(track: &TrueTrack, edge: Option<&Mark<EdgeId>>) -> f64 {
-    edge.map_or(1.0, |mark| track.speed_factor(mark.what).as_parts())
 }

@@ -83,16 +83,12 @@ impl World<'_> {
         let path = self.path(script, Origin { sensor, past_mm });
         let sensors = self.railway.layout.sensors().map(|(sensor, _)| sensor).collect();
         let mut contacts = Contacts::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
-        let remembered = (&mut contacts, draws.uniform(REMEMBERED_S));
+        let closed_at = draws.uniform(REMEMBERED_S);
+        for mark in path.contacts.iter().take_while(|mark| mark.at_mm <= 0.0) {
+            contacts.remember(mark.what, closed_at, mark.at_mm > -self.train.shoe.as_mm());
+        }
         let motion_draws = Draws::new(seed, Purpose::Motion);
-        let mut rolling = Rolling::new(
-            (&self.railway.track, &path),
-            self.train,
-            motor,
-            conditions.warmth,
-            remembered,
-            motion_draws,
-        );
+        let mut rolling = Rolling::new(&path, self.train, motor, conditions.warmth, motion_draws);
         let run_factor = rolling.load().run();
         let mut line = Line::new(self.link, Draws::new(seed, Purpose::Line));
         let gate_clock = GateClock::new(&mut draws);
