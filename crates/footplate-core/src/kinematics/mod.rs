@@ -3,23 +3,28 @@
 //! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
 //! - [`Trapezoid`] and [`SCurve`] are planned: built from the current state, the target and the [`Limits`].
 //! - [`SpeedChange`] is what a decoder makes of a new throttle step.
+//! - [`TwoSensorRun`] is how an acceleration is measured.
 //! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
+//! - [`ShortMove`] puts a start and a stop together: "go, wait, stop".
 
 mod bracket;
 mod limits;
 mod motion;
 mod phase;
 mod s_curve;
+mod short_move;
 mod slow_end;
 mod speed_change;
 mod stopping_distance;
 mod stopping_law;
 mod stretch;
 mod trapezoid;
+mod two_sensor;
 
 pub use limits::{Limits, ProfileError};
 pub use motion::{Motion, MotionState};
 pub use s_curve::{Playback, SCurve};
+pub use short_move::{ShortMove, ShortMoveError};
 pub use speed_change::{
     ConstantAcceleration, ConstantJerk, Lag, MidStep, Smooth, SpeedChange, SpeedLaw, StepRamp, StepTable,
     StepTableError,
@@ -28,3 +33,4 @@ pub use stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDistan
 pub use stopping_law::{Braking, StoppingError, StoppingLaw};
 pub use stretch::{Running, Stretch};
 pub use trapezoid::Trapezoid;
+pub use two_sensor::{TwoSensorError, TwoSensorRun, TwoSensorVerdict};

@@ -32,6 +32,12 @@ impl Draw {
         low * (high / low).powf(self.share())
     }
 
+    /// With mean 0 and standard deviation 1 (Box and Muller, 1958).
+    pub(crate) fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.share()).ln()).sqrt();
+        radius * (core::f64::consts::TAU * self.share()).cos()
+    }
+
     pub(crate) fn one_in(&mut self, n: u64) -> bool {
         self.bits().is_multiple_of(n)
     }

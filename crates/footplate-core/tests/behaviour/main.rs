@@ -3,6 +3,8 @@
 mod draw;
 mod motion_checks;
 mod profiles;
+mod short_moves;
 mod speed_change_laws;
 mod stopping;
+mod two_sensors;
 mod ways_on_tracks;
