@@ -4,6 +4,8 @@
 //! [`Recording`]. [`score`] walks one and says how good the forecasts of it are. What was measured is
 //! kept for ever in a [`Store`].
 
+mod batch;
+mod calibration_file;
 mod content_hash;
 mod decimal;
 mod layout_file;
@@ -15,6 +17,11 @@ mod store;
 mod table;
 mod whole_file;
 
+pub use batch::{Batch, BatchError, BatchEvent, BatchRun, Polling};
+pub use calibration_file::{
+    CalibrationFile, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION, PollingForm, Quantity,
+    SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm, TrainForm,
+};
 pub use content_hash::{ContentHash, HashingReader};
 pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,

@@ -187,6 +187,14 @@ impl JointFit {
         Some(report(&stretches, &unknowns, &x, &solution?, run_deviation, &scatter))
     }
 
+    /// What to add to the surveyed length of the way that led to a passage.
+    #[must_use]
+    pub fn correction(&self, sections: &SectionIndex, train: TrainId, passage: &Passage) -> Option<Length> {
+        let own =
+            |hop: &crate::track::HopId| Some(self.sections.get(&(train, sections.section(*hop)?))?.value);
+        Some(passage.way.as_ref()?.hops().iter().filter_map(own).sum())
+    }
+
     /// The speed expected of a train at a step, from the side given or else any.
     #[must_use]
     pub fn speed(&self, train: TrainId, step: SpeedStep, approach: Approach) -> Option<Estimate<Speed>> {

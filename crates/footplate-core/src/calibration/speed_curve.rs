@@ -92,6 +92,12 @@ impl SpeedCurve {
         }
     }
 
+    /// What makes the unit of time: the same mean acceleration or the same time for all changes.
+    #[must_use]
+    pub const fn constant(&self) -> Constant {
+        self.constant
+    }
+
     /// From command to effect (s).
     #[must_use]
     pub const fn delay(&self) -> f64 {

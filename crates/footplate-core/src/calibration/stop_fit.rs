@@ -127,7 +127,8 @@ fn measurement(
         if reached {
             break;
         }
-        way += corrected(sections, run.train, passage, fit)?;
+        let correction = fit.correction(sections, run.train, passage)?;
+        way += (passage.way?.length + correction).as_m();
         reached = passage.node == landmark;
     }
     if !reached {
@@ -152,17 +153,6 @@ fn measurement(
         uncertainty: Length::from_m(libm::sqrt(variance)),
         time: stop.seen - stop.commanded - TimeSpan::from_s(HUMAN_DELAY_S),
     })
-}
-
-fn corrected(sections: &SectionIndex, train: TrainId, passage: &Passage, fit: &JointFit) -> Option<f64> {
-    let way = passage.way?;
-    let correction: f64 = way
-        .hops()
-        .iter()
-        .filter_map(|hop| fit.sections.get(&(train, sections.section(*hop)?)))
-        .map(|correction| correction.value.as_m())
-        .sum();
-    Some(way.length.as_m() + correction)
 }
 
 /// Speed of the run when it passed `last`, and its uncertainty as a part of it.

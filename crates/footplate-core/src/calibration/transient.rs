@@ -8,7 +8,7 @@ use super::passage::{Drive, Passage};
 use super::run::RunPassages;
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::TimeSpan;
-use crate::units::Speed;
+use crate::units::{Length, Speed};
 
 /// Contacts after the change was over that are kept with it: they pin down where the train was.
 const SETTLED_KEPT: usize = 3;
@@ -124,12 +124,7 @@ fn of_change(
     let mut points = Vec::new();
     for (place, passage) in chain.iter().enumerate() {
         if let (true, Some(reach)) = (place > 0, &passage.way) {
-            let correction: f64 = reach
-                .hops()
-                .iter()
-                .filter_map(|hop| fit.sections.get(&(run.train, sections.section(*hop)?)))
-                .map(|correction| correction.value.as_m())
-                .sum();
+            let correction = fit.correction(sections, run.train, passage).map_or(0.0, Length::as_m);
             way += reach.length.as_m() + correction;
         }
         let since = passage.window.middle() - commanded;

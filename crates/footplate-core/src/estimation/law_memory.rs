@@ -32,6 +32,17 @@ pub struct KnownLaw {
     pub evidence: f64,
 }
 
+impl KnownLaw {
+    /// Takes over pace (m/s² or s), delay (s), the covariance of ln pace and delay, and evidence from
+    /// elsewhere, such as a calibration. A pace that is none leaves the law as it was.
+    pub fn take_over(&mut self, pace: f64, delay: f64, covariance: [[f64; 2]; 2], evidence: f64) {
+        let all = covariance.iter().flatten().chain([&delay, &evidence]);
+        if pace > 0.0 && pace.is_finite() && all.into_iter().all(|value| value.is_finite()) {
+            *self = Self { ln_pace_and_delay: [libm::log(pace), delay], covariance, evidence, ..*self };
+        }
+    }
+}
+
 /// The laws of both directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawMemory {

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{completions, layout, simulate};
+use super::{calibrate, completions, layout, simulate};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -28,6 +28,7 @@ macro_rules! verbs {
 }
 
 verbs! {
+    Calibrate: calibrate,
     Completions: completions,
     Layout: layout,
     Simulate: simulate,

@@ -4,9 +4,11 @@
 //! has `fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome>`, name the file below and in the list of
 //! `command.rs`. A verb writes its result to `output` and what it has to say about itself to standard error.
 
+mod calibrate;
 mod command;
 mod completions;
 mod layout;
+mod recordings;
 mod simulate;
 
 pub(crate) use command::{Command, Outcome};

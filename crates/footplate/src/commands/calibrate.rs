@@ -1,0 +1,127 @@
+//! `footplate calibrate`: recordings in, speeds, laws, stops and lengths with their uncertainty out.
+
+mod explain;
+mod table;
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use footplate_core::track::Layout;
+use footplate_core::{Timestamp, TrainId};
+use footplate_store::{
+    Batch, CalibrationFile, Import, MODEL_VERSION, ModuleLetters, NewCalibration, Recording, Store,
+    layout_named, write_whole,
+};
+
+use super::Outcome;
+use super::recordings::read_all;
+use explain::Question;
+
+/// Calibrate trains from recorded sensor reports.
+///
+/// Prints speeds by throttle step, the laws by which each train changes speed, stopping distances and corrected
+/// lengths, every number with one standard deviation and the number of measurements behind it.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
+  footplate calibrate --from session.csv --layout track-a --store railway.db
+  footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
+pub(crate) struct Arguments {
+    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
+    #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present = "store")]
+    from: Vec<PathBuf>,
+    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    #[arg(long, value_name = "LAYOUT")]
+    layout: String,
+    /// Only this train; also the train of logs that name none.
+    #[arg(long, value_name = "N")]
+    train: Option<u16>,
+    /// Keep recordings and calibration in this store, and calibrate from all that it holds of the layout.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+    /// Calibrate as of this moment, in seconds since the Unix epoch: from what the store held then.
+    #[arg(long, value_name = "SECONDS", requires = "store", conflicts_with = "from")]
+    as_of: Option<f64>,
+    /// Write the calibration to a file, TOML or JSON by its ending.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// List the measurements behind a number instead: SPEED:STEP, STOP:STEP, LAW:up, LAW:down or
+    /// LENGTH:FROM-TO.
+    #[arg(long, value_name = "NUMBER")]
+    explain: Option<Question>,
+    /// Print the calibration as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let train = self.train.map(TrainId);
+        let recordings = read_all(&self.from, &ModuleLetters, train)?;
+        let (batch, mut store) = match &self.store {
+            None => (Batch::of_recordings(&layout, &recordings, train)?, None),
+            Some(path) => {
+                let mut store = Store::open_or_create(path)?;
+                self.import(&layout, &recordings, &mut store)?;
+                let as_of = self.as_of.map_or_else(now, Timestamp::from_s);
+                (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))
+            }
+        };
+        let file = CalibrationFile::of(&layout, &batch);
+        if let Some((store, as_of)) = &mut store {
+            keep(&file, store, *as_of)?;
+        }
+        if let Some(path) = &self.out {
+            write_calibration(&file, path)?;
+        }
+        match &self.explain {
+            Some(question) => question.answer(&layout, &batch, self.json, output)?,
+            None if self.json => writeln!(output, "{}", serde_json::to_string_pretty(&file)?)?,
+            None => table::write(&file, &batch, output)?,
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn import(&self, layout: &Layout, recordings: &[Recording], store: &mut Store) -> anyhow::Result<()> {
+        for (path, recording) in self.from.iter().zip(recordings) {
+            let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+            let content = footplate_store::ContentHash::of(&bytes);
+            if let Import::AlreadyThere { .. } = store.import(recording, content, layout.name(), now())? {
+                eprintln!("{}: in the store already, not added again", path.display());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn keep(file: &CalibrationFile, store: &mut Store, as_of: Timestamp) -> anyhow::Result<()> {
+    for form in &file.trains {
+        let body = serde_json::to_string(&file.of_one(form.train))?;
+        let new = NewCalibration { train: form.train, as_of, model_version: MODEL_VERSION, body: &body };
+        store.keep_calibration(new, now())?;
+    }
+    Ok(())
+}
+
+fn write_calibration(file: &CalibrationFile, path: &std::path::Path) -> anyhow::Result<()> {
+    let text = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("toml") => toml::to_string_pretty(file)?,
+        Some("json") => serde_json::to_string_pretty(file)?,
+        _ => {
+            bail!("{}: a calibration is written as .toml or .json, by the ending of the file", path.display())
+        }
+    };
+    write_whole(path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))
+}
+
+/// What the program's clock says; nothing below the program asks it.
+#[expect(clippy::disallowed_methods, reason = "the program is where the time comes from")]
+fn now() -> Timestamp {
+    let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    Timestamp::from_ns(i64::try_from(since_epoch.as_nanos()).unwrap_or(i64::MAX))
+}
