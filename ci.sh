@@ -109,6 +109,13 @@ check_example() {
 step_examples() {
   need_compiler
   each_example check_example
+  local expected name
+  for expected in "$EXPECTED_EXAMPLES"/*.txt; do
+    name=$(basename "$expected" .txt)
+    compgen -G "crates/*/examples/$name.rs" >/dev/null && continue
+    echo "$expected is there and the example that prints it is not"
+    return 1
+  done
 }
 
 refresh_example() {
