@@ -1,6 +1,6 @@
 //! Draws a layout as SVG: rails as lines, sensors, turnouts and track ends as marks with their names.
 
-use std::fmt::Write;
+use std::fmt;
 
 use footplate_core::NodeId;
 use footplate_core::track::{Layout, NodeKind};
@@ -34,48 +34,48 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
     // A single place still needs a canvas around it.
     let side = (right - left).max(bottom - top).max(1.0);
     let margin = side * MARGIN;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{} {} {} {}\" font-family=\"sans-serif\" \
-         font-size=\"{}\" text-anchor=\"middle\">\n<title>{}</title>\n",
-        left - margin,
-        top - margin,
-        right - left + 2.0 * margin,
-        bottom - top + 2.0 * margin,
-        side * LETTER,
-        escaped(layout.name()),
-    );
-    let rail =
-        format_args!("stroke=\"#555\" stroke-width=\"{}\" stroke-linecap=\"round\"", side * RAIL).to_string();
+    let (x, y) = (left - margin, top - margin);
+    let (width, height) = (right - left + 2.0 * margin, bottom - top + 2.0 * margin);
+    let (rail, letter) = (side * RAIL, side * LETTER);
+    let mut svg = String::new();
+    let mut line = |text: fmt::Arguments<'_>| svg.push_str(&format!("{text}\n"));
+    line(format_args!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{x} {y} {width} {height}\">"));
+    line(format_args!("<title>{}</title>", escaped(layout.name())));
+    line(format_args!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"));
+    line(format_args!("<g stroke=\"#555\" stroke-width=\"{rail}\" stroke-linecap=\"round\">"));
     for (_, edge) in layout.edges().step_by(2) {
         if let (Some([x1, y1]), Some([x2, y2])) = (drawing.point(edge.from), drawing.point(edge.to)) {
             let (from, to) = (layout.node_name(edge.from), layout.node_name(edge.to));
-            let title = format!("{from} to {to}: {:.0} mm", edge.length.as_mm());
-            line(
-                &mut svg,
-                format_args!(
-                    "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" {rail}><title>{title}</title></line>"
-                ),
-            );
+            let mm = edge.length.as_mm();
+            line(format_args!(
+                "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"><title>{from} to {to}: {mm:.0} mm</title></line>"
+            ));
         }
     }
-    for (id, kind, [x, y]) in places() {
+    line(format_args!("</g>"));
+    // A white edge around the letters keeps them readable where they lie over rails.
+    line(format_args!(
+        "<g font-family=\"sans-serif\" font-size=\"{letter}\" text-anchor=\"middle\" paint-order=\"stroke\" \
+         stroke-width=\"{}\">",
+        2.0 * rail
+    ));
+    let mut drawn: Vec<[f64; 2]> = Vec::new();
+    for (id, kind, point) in places() {
         let (radius, colour) = match kind {
             NodeKind::Sensor(_) => (SENSOR, "#c33"),
             NodeKind::Branch(_) | NodeKind::Merge(_) => (TURNOUT, "#36c"),
             NodeKind::Enter | NodeKind::Exit => (TURNOUT, "#555"),
         };
         let radius = side * radius;
-        line(&mut svg, format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{colour}\"/>"));
-        let above = y - 2.0 * radius;
-        line(
-            &mut svg,
-            format_args!(
-                "<text x=\"{x}\" y=\"{above}\" fill=\"{colour}\">{}</text>",
-                label(layout, id, kind)
-            ),
-        );
+        // The names of places at one point stand one above the other.
+        let below = drawn.iter().filter(|other| **other == point).count() as f64;
+        drawn.push(point);
+        let ([x, y], name) = (point, label(layout, id, kind));
+        let above = y - 2.0 * radius - below * letter;
+        line(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{colour}\"/>"));
+        line(format_args!("<text x=\"{x}\" y=\"{above}\" fill=\"{colour}\" stroke=\"#fff\">{name}</text>"));
     }
-    svg += "</svg>\n";
+    line(format_args!("</g>\n</svg>"));
     Ok(svg)
 }
 
@@ -92,11 +92,43 @@ fn join(one: [f64; 2], other: [f64; 2], pick: fn(f64, f64) -> f64) -> [f64; 2] {
     [pick(one[0], other[0]), pick(one[1], other[1])]
 }
 
-fn line(svg: &mut String, text: std::fmt::Arguments<'_>) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(svg, "{text}");
-}
-
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout_file::{Drawing, built_in, parse_layout, write_layout};
+
+    #[test]
+    fn every_place_and_stretch_of_track_a_is_drawn_once() {
+        let file = built_in("track-a").unwrap();
+        let svg = draw_layout(&file).unwrap();
+        assert_eq!(svg.matches("<circle").count(), 72);
+        assert_eq!(svg.matches("<line").count(), 78);
+        assert!(svg.contains("<title>C13 to E7: 875 mm</title>"), "{svg}");
+        assert!(svg.contains(">C13 C14</text>"), "{svg}");
+        assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
+        // The four turnouts at one point have four names above each other.
+        let heights = ["153", "154", "155", "156"].map(|turnout| {
+            let line = svg.lines().find(|line| line.ends_with(&format!(">{turnout}</text>"))).unwrap();
+            line.split('"').nth(3).unwrap().parse::<f64>().unwrap()
+        });
+        assert!(heights.windows(2).all(|pair| pair[1] < pair[0] - 10.0), "{heights:?}");
+    }
+
+    #[test]
+    fn a_layout_without_points_cannot_be_drawn() {
+        let file = LayoutFile { drawing: Drawing::default(), ..built_in("track-b").unwrap() };
+        assert_eq!(draw_layout(&file), Err(NothingToDraw));
+    }
+
+    #[test]
+    fn a_name_is_no_markup() {
+        let text =
+            write_layout(&built_in("track-b").unwrap()).replace("name = \"track-b\"", "name = \"<b>&\"");
+        let svg = draw_layout(&parse_layout("b.toml", text.as_bytes()).unwrap()).unwrap();
+        assert!(svg.contains("<title>&lt;b>&amp;</title>"));
+    }
 }
