@@ -49,6 +49,16 @@ fn the_oval_is_right() {
 }
 
 #[test]
+fn the_layout_in_the_documentation_is_right() {
+    let page = include_str!("../../../../docs/formats/layout.md");
+    let (_, example) = page.split_once("```toml\n").unwrap();
+    let (example, _) = example.split_once("```").unwrap();
+    let file = parse_layout("docs/formats/layout.md", example.as_bytes()).unwrap();
+    assert_eq!(file.layout.name(), "oval with a siding");
+    assert_eq!(file.layout.edges().len(), 12);
+}
+
+#[test]
 fn what_is_no_toml_is_named() {
     assert_eq!(
         complaint("mm = 900 }", "mm = 900 "),
