@@ -164,9 +164,9 @@ impl<'w> Host<'w> {
     /// Lays the tape from the landmark that the script or the way suggests.
     fn measure(&mut self, now: f64, rolling: &Rolling<'_>, path: &Path) {
         let [here, _] = rolling.state();
-        let passed = path.landmarks.partition_point(|mark| mark.at_mm <= here);
+        let passed = path.landmarks.partition_point(|point| point.at_mm <= here);
         let behind = path.landmarks.get(..passed).unwrap_or_default();
-        let triggered = behind.iter().rev().find(|mark| Some(mark.what) == self.trigger);
+        let triggered = behind.iter().rev().find(|point| Some(point.what) == self.trigger);
         let Some(landmark) = triggered.or(behind.last()) else { return };
         let true_mm = here - landmark.at_mm;
         let read_mm = self.draws.normal(true_mm, TAPE_SD_MM);

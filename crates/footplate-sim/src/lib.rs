@@ -8,7 +8,7 @@
 //! One seed is one world, on every machine and in every release: see [`World::run`].
 //!
 //! ```text
-//! session  scenario   what a person would record in an hour, by name
+//! recording scenario  what a person would record in an hour, by name
 //! run  truth          a script happens in a world: events and what is behind them
 //! host  script        the program that polls and the person with the tape
 //! rolling  load       a train on rails       poller  contacts  gates
@@ -27,11 +27,11 @@ mod motor;
 mod path;
 mod poller;
 mod railway;
+mod recording;
 mod rolling;
 mod run;
 mod scenario;
 mod script;
-mod session;
 mod speed_table;
 mod track;
 mod train;
@@ -43,10 +43,10 @@ pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use poller::Link;
 pub use railway::Railway;
+pub use recording::SimulatedRecording;
 pub use run::{Conditions, SimulatedRun, World};
 pub use scenario::Scenario;
 pub use script::{Order, Script, Start, What, When};
-pub use session::Session;
 pub use speed_table::{Shape, SpeedTable};
 pub use track::TrueTrack;
 pub use train::{StopScatter, Train};

@@ -8,7 +8,7 @@ use crate::railway::Railway;
 
 /// Something at a point of the rails.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Mark<T> {
+pub(crate) struct Point<T> {
     /// Where, in mm from the start of the run; negative behind it.
     pub(crate) at_mm: f64,
     /// What.
@@ -28,17 +28,17 @@ pub(crate) struct Origin {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Path {
     /// Edges by where they begin.
-    pub(crate) edges: Vec<Mark<EdgeId>>,
+    pub(crate) edges: Vec<Point<EdgeId>>,
     /// What the rails of each edge make of a speed, as a factor.
     factors: Vec<f64>,
     /// Contacts by where they close, in order.
-    pub(crate) contacts: Vec<Mark<SensorId>>,
+    pub(crate) contacts: Vec<Point<SensorId>>,
     /// Nodes of sensors by where they are, in order: where a person lays the tape.
-    pub(crate) landmarks: Vec<Mark<SensorId>>,
+    pub(crate) landmarks: Vec<Point<SensorId>>,
     /// Dirty spots.
-    pub(crate) dirty: Vec<Mark<()>>,
+    pub(crate) dirty: Vec<Point<()>>,
     /// Light gates by number.
-    pub(crate) gates: Vec<Mark<u8>>,
+    pub(crate) gates: Vec<Point<u8>>,
 }
 
 impl Path {
@@ -65,19 +65,19 @@ impl Path {
             let place = place % edges.len();
             let edge = edges[place];
             if let Some(sensor) = sensor_before(layout, edges, place) {
-                path.landmarks.push(Mark { at_mm: begins_mm, what: sensor });
+                path.landmarks.push(Point { at_mm: begins_mm, what: sensor });
                 path.contacts
-                    .push(Mark { at_mm: begins_mm + track.contact_offset(sensor).as_mm(), what: sensor });
+                    .push(Point { at_mm: begins_mm + track.contact_offset(sensor).as_mm(), what: sensor });
             }
-            path.edges.push(Mark { at_mm: begins_mm, what: edge });
+            path.edges.push(Point { at_mm: begins_mm, what: edge });
             path.factors.push(track.speed_factor(edge).as_parts());
             path.dirty.extend(
-                track.dirty_mm(edge).into_iter().map(|spot| Mark { at_mm: begins_mm + spot, what: () }),
+                track.dirty_mm(edge).into_iter().map(|spot| Point { at_mm: begins_mm + spot, what: () }),
             );
             if gated == Some(edge) {
                 let middle_mm = begins_mm + 0.5 * length_mm(edge);
-                path.gates.push(Mark { at_mm: middle_mm, what: 1 });
-                path.gates.push(Mark { at_mm: middle_mm + GATE_SPACING_MM, what: 0 });
+                path.gates.push(Point { at_mm: middle_mm, what: 1 });
+                path.gates.push(Point { at_mm: middle_mm + GATE_SPACING_MM, what: 0 });
             }
             begins_mm += length_mm(edge);
         }
@@ -93,9 +93,9 @@ impl Path {
 
     /// The edge at a distance and how far along it that is.
     pub(crate) fn place(&self, at_mm: f64) -> Option<(EdgeId, Length)> {
-        let after = self.edges.partition_point(|mark| mark.at_mm <= at_mm);
-        let mark = self.edges.get(after.checked_sub(1)?)?;
-        Some((mark.what, Length::from_mm(at_mm - mark.at_mm)))
+        let after = self.edges.partition_point(|point| point.at_mm <= at_mm);
+        let point = self.edges.get(after.checked_sub(1)?)?;
+        Some((point.what, Length::from_mm(at_mm - point.at_mm)))
     }
 }
 

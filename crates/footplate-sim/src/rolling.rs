@@ -6,7 +6,7 @@ use crate::contacts::Contacts;
 use crate::draws::Draws;
 use crate::load::{DIRTY_MM, Load};
 use crate::motor::{Motor, STEP_S};
-use crate::path::{Mark, Path};
+use crate::path::{Path, Point};
 use crate::train::Train;
 
 /// A train under way on a path. Its distance is that of the leading end of its shoe.
@@ -25,7 +25,7 @@ pub(crate) struct Rolling<'w> {
     passed: Passed,
 }
 
-/// How many of the marks on the path lie behind.
+/// How many of the points on the path lie behind.
 #[derive(Debug, Default)]
 struct Passed {
     edges: usize,
@@ -46,11 +46,11 @@ impl<'w> Rolling<'w> {
     ) -> Self {
         let shoe_mm = train.shoe.as_mm();
         let passed = Passed {
-            edges: path.edges.partition_point(|mark| mark.at_mm <= 0.0),
-            closed: path.contacts.partition_point(|mark| mark.at_mm <= 0.0),
-            left: path.contacts.partition_point(|mark| mark.at_mm <= -shoe_mm),
-            dirty: path.dirty.partition_point(|mark| mark.at_mm <= 0.0),
-            gates: path.gates.partition_point(|mark| mark.at_mm <= 0.0),
+            edges: path.edges.partition_point(|point| point.at_mm <= 0.0),
+            closed: path.contacts.partition_point(|point| point.at_mm <= 0.0),
+            left: path.contacts.partition_point(|point| point.at_mm <= -shoe_mm),
+            dirty: path.dirty.partition_point(|point| point.at_mm <= 0.0),
+            gates: path.gates.partition_point(|point| point.at_mm <= 0.0),
         };
         let load = Load::new(train, warmth, path.factor(passed.edges), draws.split());
         let speed_mm_per_s = motor.wheel_speed() * load.factor();
@@ -122,15 +122,15 @@ impl<'w> Rolling<'w> {
 
         // Within a millisecond the speed is as good as constant.
         let when = |at_mm: f64| now + STEP_S * ((at_mm - here) / (there - here)).clamp(0.0, 1.0);
-        for mark in passed(&self.path.contacts, &mut self.passed.closed, there) {
-            contacts.close(mark.what, when(mark.at_mm));
+        for point in passed(&self.path.contacts, &mut self.passed.closed, there) {
+            contacts.close(point.what, when(point.at_mm));
         }
         let shoe_mm = self.train.shoe.as_mm();
-        for mark in passed(&self.path.contacts, &mut self.passed.left, there - shoe_mm) {
-            contacts.leave(mark.what, when(mark.at_mm + shoe_mm));
+        for point in passed(&self.path.contacts, &mut self.passed.left, there - shoe_mm) {
+            contacts.leave(point.what, when(point.at_mm + shoe_mm));
         }
-        for mark in passed(&self.path.gates, &mut self.passed.gates, there) {
-            at_gate(mark.what, when(mark.at_mm));
+        for point in passed(&self.path.gates, &mut self.passed.gates, there) {
+            at_gate(point.what, when(point.at_mm));
         }
         passed(&self.path.edges, &mut self.passed.edges, there);
         if !passed(&self.path.dirty, &mut self.passed.dirty, there).is_empty() && self.load.stalls(wheel) {
@@ -139,10 +139,10 @@ impl<'w> Rolling<'w> {
     }
 }
 
-/// The marks that a train which has come to `to_mm` has newly passed; the count of those behind moves on.
-fn passed<'path, T>(marks: &'path [Mark<T>], behind: &mut usize, to_mm: f64) -> &'path [Mark<T>] {
-    let ahead = marks.get(*behind..).unwrap_or_default();
-    let count = ahead.iter().take_while(|mark| mark.at_mm <= to_mm).count();
+/// The points that a train which has come to `to_mm` has newly passed; the count of those behind moves on.
+fn passed<'path, T>(points: &'path [Point<T>], behind: &mut usize, to_mm: f64) -> &'path [Point<T>] {
+    let ahead = points.get(*behind..).unwrap_or_default();
+    let count = ahead.iter().take_while(|point| point.at_mm <= to_mm).count();
     *behind += count;
     &ahead[..count]
 }

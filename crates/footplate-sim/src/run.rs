@@ -44,7 +44,7 @@ pub struct World<'w> {
     pub train: &'w Train,
 }
 
-/// What runs of one session hand on to each other.
+/// What one run hands on to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
     /// What the host's clock shows when the run begins.
@@ -84,8 +84,8 @@ impl World<'_> {
         let sensors = self.railway.layout.sensors().map(|(sensor, _)| sensor).collect();
         let mut contacts = Contacts::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
         let closed_at = draws.uniform(REMEMBERED_S);
-        for mark in path.contacts.iter().take_while(|mark| mark.at_mm <= 0.0) {
-            contacts.remember(mark.what, closed_at, mark.at_mm > -self.train.shoe.as_mm());
+        for point in path.contacts.iter().take_while(|point| point.at_mm <= 0.0) {
+            contacts.remember(point.what, closed_at, point.at_mm > -self.train.shoe.as_mm());
         }
         let motion_draws = Draws::new(seed, Purpose::Motion);
         let mut rolling = Rolling::new(&path, self.train, motor, conditions.warmth, motion_draws);

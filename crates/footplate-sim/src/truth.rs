@@ -3,7 +3,7 @@
 use footplate_core::{Approach, EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp};
 
 use crate::contacts::Cause;
-use crate::path::{Mark, Path};
+use crate::path::{Path, Point};
 
 /// How densely motion is kept; between samples it is a cubic through places and speeds, good to micrometres.
 pub(crate) const SAMPLE_STEPS: usize = 10;
@@ -121,7 +121,7 @@ impl Motion {
 
     /// Every contact on the way, passed or still ahead, with its distance from the start of the run.
     pub fn contacts(&self) -> impl ExactSizeIterator<Item = (SensorId, Length)> + '_ {
-        self.path.contacts.iter().map(|Mark { at_mm, what }| (*what, Length::from_mm(*at_mm)))
+        self.path.contacts.iter().map(|Point { at_mm, what }| (*what, Length::from_mm(*at_mm)))
     }
 
     /// When the train had gone a distance; `None` if it never did.

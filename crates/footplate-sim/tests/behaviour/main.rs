@@ -4,6 +4,6 @@ mod continuity;
 mod oval;
 mod reports;
 mod same_seed;
-mod sessions;
+mod scenarios;
 mod speeds;
 mod stops;

@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_sim::{LawFamily, Railway, Scenario, Session};
+use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
 use footplate_store::{layout_named, write_sensor_log, write_whole};
 
 use super::super::Outcome;
@@ -68,8 +68,8 @@ impl Arguments {
             // Trains of one seed share the rails; seeds of neighbouring worlds share no train.
             let seed = self.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
             let law = self.law.unwrap_or_else(|| nth_law(seed));
-            let session = Session::draw(&railway, self.scenario, TrainId(number), law, seed);
-            self.write(&layout, &railway, &session, output)?;
+            let simulated = SimulatedRecording::draw(&railway, self.scenario, TrainId(number), law, seed);
+            self.write(&layout, &railway, &simulated, output)?;
         }
         Ok(Outcome::Done)
     }
@@ -78,27 +78,27 @@ impl Arguments {
         &self,
         layout: &Layout,
         railway: &Railway<'_>,
-        session: &Session,
+        simulated: &SimulatedRecording,
         output: &mut dyn Write,
     ) -> anyhow::Result<()> {
-        let name = format!("train-{}", session.train_id);
+        let name = format!("train-{}", simulated.train_id);
         let mut log = Vec::new();
-        let recording = recording::of(session, &name);
+        let recording = recording::of(simulated, &name);
         write_sensor_log(&recording, layout, &mut log)?;
         let path = self.out.join(format!("{name}.csv"));
         write_file(&path, &log)?;
-        write_file(&self.out.join(format!("{name}-truth.csv")), truth::csv(layout, session).as_bytes())?;
-        let parameters = serde_json::to_vec_pretty(&truth::parameters(railway, session, self.scenario))?;
+        write_file(&self.out.join(format!("{name}-truth.csv")), truth::csv(layout, simulated).as_bytes())?;
+        let parameters = serde_json::to_vec_pretty(&truth::parameters(railway, simulated, self.scenario))?;
         write_file(&self.out.join(format!("{name}-truth.json")), &parameters)?;
 
-        let reports: usize = session.runs.iter().map(|run| run.truth.reports.len()).sum();
-        let lasted = session.runs.iter().map(|run| run.truth.motion.ends() - run.truth.motion.begins());
+        let reports: usize = simulated.runs.iter().map(|run| run.truth.reports.len()).sum();
+        let lasted = simulated.runs.iter().map(|run| run.truth.motion.ends() - run.truth.motion.begins());
         let lasted_s = lasted.fold(0.0, |total, span| total + span.as_s());
-        let runs = session.runs.len();
-        let law = session.train.law.family();
+        let runs = simulated.runs.len();
+        let law = simulated.train.law.family();
         if self.json {
             let line = serde_json::json!({
-                "train": session.train_id.0, "law": law.name(), "log": path, "runs": runs, "reports": reports,
+                "train": simulated.train_id.0, "law": law.name(), "log": path, "runs": runs, "reports": reports,
                 "simulated_s": lasted_s,
             });
             writeln!(output, "{line}")?;

@@ -1,12 +1,12 @@
-//! A simulated session as a recording: what a program at a real railway would have written down, and no more.
+//! A simulated recording as a sensor log has it: what a program at a real railway would have written down, no more.
 
 use footplate_core::RunId;
-use footplate_sim::{Session, SimulatedRun};
+use footplate_sim::{SimulatedRecording, SimulatedRun};
 use footplate_store::{Form, GatePass, RawEvent, Recording, Run, TrainAtStart};
 
-/// The recording of a session. There is no file yet, so that no event has a line.
-pub(super) fn of(session: &Session, name: &str) -> Recording {
-    let runs = (1..).zip(&session.runs).map(|(number, simulated)| run(RunId(number), simulated)).collect();
+/// The recording without its truth. There is no file yet, so that no event has a line.
+pub(super) fn of(simulated: &SimulatedRecording, name: &str) -> Recording {
+    let runs = (1..).zip(&simulated.runs).map(|(number, simulated)| run(RunId(number), simulated)).collect();
     Recording { name: name.to_owned(), form: Form::SensorLog, runs, notes: Vec::new() }
 }
 

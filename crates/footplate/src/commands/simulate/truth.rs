@@ -1,10 +1,10 @@
-//! The truth of a simulated session as files for a scorer; `docs/formats/simulated-truth.md` describes them.
+//! The truth of a simulated recording as files for a scorer; `docs/formats/simulated-truth.md` describes them.
 
 use std::fmt::Write;
 
 use footplate_core::track::Layout;
 use footplate_core::{Approach, EventKind, SpeedStep, TimeSpan, Timestamp};
-use footplate_sim::{Cause, Law, Railway, Scenario, Session, SimulatedRun, Train};
+use footplate_sim::{Cause, Law, Railway, Scenario, SimulatedRecording, SimulatedRun, Train};
 use serde_json::{Value, json};
 
 /// Between two rows of motion (chosen: half a poll, so that a straight line between them is off by 0.3 mm at most).
@@ -13,9 +13,9 @@ const MOTION_SPACING: TimeSpan = TimeSpan::from_ms(50);
 const HEADER: &str = "run,t_s,kind,name,cause,first,true_t_s,distance_mm,speed_mm_s,offset_mm\n";
 
 /// A row for every report, command and hand measurement of the log, and rows of motion every 50 ms.
-pub(super) fn csv(layout: &Layout, session: &Session) -> String {
+pub(super) fn csv(layout: &Layout, simulated: &SimulatedRecording) -> String {
     let mut text = HEADER.to_owned();
-    for (number, run) in (1..).zip(&session.runs) {
+    for (number, run) in (1..).zip(&simulated.runs) {
         let mut rows = behind_events(layout, run);
         rows.extend(motion(layout, run));
         rows.sort_by_key(|(time, _)| *time);
@@ -87,8 +87,8 @@ const fn cause_name(cause: Cause) -> &'static str {
 }
 
 /// The numbers that an estimator would have to find.
-pub(super) fn parameters(railway: &Railway<'_>, session: &Session, scenario: Scenario) -> Value {
-    let Session { train, link, faults, .. } = session;
+pub(super) fn parameters(railway: &Railway<'_>, simulated: &SimulatedRecording, scenario: Scenario) -> Value {
+    let SimulatedRecording { train, link, faults, .. } = simulated;
     let layout = railway.layout;
     let name = |node| layout.node_name(node);
     let edges: Vec<Value> = railway
@@ -115,7 +115,7 @@ pub(super) fn parameters(railway: &Railway<'_>, session: &Session, scenario: Sce
     json!({
         "layout": layout.name(),
         "scenario": scenario.name(),
-        "train": session.train_id.0,
+        "train": simulated.train_id.0,
         "circuit": edges,
         "circuit_length_mm": railway.circuit_length().as_mm(),
         "sensors": sensors,
@@ -143,7 +143,7 @@ pub(super) fn parameters(railway: &Railway<'_>, session: &Session, scenario: Sce
         "missed": faults.missed.as_parts(),
         "stuck": faults.stuck.as_parts(),
         "spurious_per_minute": faults.spurious_per_minute,
-        "runs": runs(session),
+        "runs": runs(simulated),
     })
 }
 
@@ -187,7 +187,7 @@ fn law(law: Law) -> Value {
 }
 
 /// What differed from run to run.
-fn runs(session: &Session) -> Vec<Value> {
+fn runs(simulated: &SimulatedRecording) -> Vec<Value> {
     let row = |(number, run): (u32, &SimulatedRun)| {
         let approach = (run.running_at > SpeedStep::STAND).then_some(match run.truth.approach_at_start {
             Approach::Above => "above",
@@ -198,5 +198,5 @@ fn runs(session: &Session) -> Vec<Value> {
             "stalled": run.truth.stalled,
         })
     };
-    (1..).zip(&session.runs).map(row).collect()
+    (1..).zip(&simulated.runs).map(row).collect()
 }

@@ -2,16 +2,17 @@
 
 use footplate_core::{Acceleration, EventKind, Length, Speed, SpeedStep, TimeSpan, TrainId};
 use footplate_sim::{
-    Cause, Law, LawFamily, Railway, Scenario, Script, Session, SimulatedRun, SpeedTable, Train, What, When,
+    Cause, Law, LawFamily, Railway, Scenario, Script, SimulatedRecording, SimulatedRun, SpeedTable, Train,
+    What, When,
 };
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_oneof, proptest};
 
 use crate::oval::{Yard, oval, step};
 
-fn session(name: &str, law: LawFamily, seed: u64) -> Session {
+fn recorded(name: &str, law: LawFamily, seed: u64) -> SimulatedRecording {
     let layout = oval();
     let railway = Railway::draw(&layout, seed).unwrap();
-    Session::draw(&railway, Scenario::named(name).unwrap(), TrainId(1), law, seed)
+    SimulatedRecording::draw(&railway, Scenario::named(name).unwrap(), TrainId(1), law, seed)
 }
 
 /// How many reports, speed commands and hand measurements a run recorded.
@@ -34,9 +35,9 @@ proptest! {
     #[test]
     fn no_seed_breaks_a_scenario(seed in any::<u64>(), scenario in 0..Scenario::all().len(), law in 0..6_usize) {
         let scenario = Scenario::all()[scenario];
-        let session = session(scenario.name(), LawFamily::ALL[law], seed);
-        prop_assert!(!session.runs.is_empty());
-        for run in &session.runs {
+        let recording = recorded(scenario.name(), LawFamily::ALL[law], seed);
+        prop_assert!(!recording.runs.is_empty());
+        for run in &recording.runs {
             let truth = &run.truth;
             prop_assert!(run.events.is_sorted_by_key(|event| event.time));
             let written = [truth.reports.len(), truth.commands.len(), truth.stops.len()];
@@ -100,9 +101,9 @@ fn names_are_unique_and_found() {
 
 #[test]
 fn a_start_begins_with_the_contact_that_the_station_still_remembers() {
-    let session = session("starts", LawFamily::Lag, 5);
-    assert_eq!(session.runs.len(), 22);
-    for run in &session.runs {
+    let recording = recorded("starts", LawFamily::Lag, 5);
+    assert_eq!(recording.runs.len(), 22);
+    for run in &recording.runs {
         assert_eq!(run.running_at, SpeedStep::STAND);
         assert_eq!(run.truth.reports[0].cause, Cause::Stale);
     }
@@ -110,8 +111,8 @@ fn a_start_begins_with_the_contact_that_the_station_still_remembers() {
 
 #[test]
 fn steady_runs_begin_running_and_say_so_but_not_from_which_side() {
-    let session = session("steady", LawFamily::Lag, 5);
-    for run in &session.runs {
+    let recording = recorded("steady", LawFamily::Lag, 5);
+    for run in &recording.runs {
         assert!(run.running_at > SpeedStep::STAND);
         assert!(run.truth.commands.is_empty());
     }
@@ -120,24 +121,24 @@ fn steady_runs_begin_running_and_say_so_but_not_from_which_side() {
 #[test]
 fn nearly_every_stop_is_measured_and_low_steps_stall_sometimes() {
     let measured: usize = (0..10)
-        .map(|seed| session("stops", LawFamily::ALL[seed % 6], seed as u64))
-        .map(|session| session.runs.iter().filter(|run| run.truth.stops.len() == 1).count())
+        .map(|seed| recorded("stops", LawFamily::ALL[seed % 6], seed as u64))
+        .map(|recording| recording.runs.iter().filter(|run| run.truth.stops.len() == 1).count())
         .sum();
     assert!(measured > 300, "{measured} of 330");
     let stalled: usize = (0..10)
-        .map(|seed| session("stalls", LawFamily::ALL[seed % 6], seed as u64))
-        .map(|session| session.runs.iter().filter(|run| run.truth.stalled).count())
+        .map(|seed| recorded("stalls", LawFamily::ALL[seed % 6], seed as u64))
+        .map(|recording| recording.runs.iter().filter(|run| run.truth.stalled).count())
         .sum();
     assert!((2..100).contains(&stalled), "{stalled} of 150");
 }
 
 #[test]
 fn faults_show_and_truth_tells_them_apart() {
-    let session = session("faults", LawFamily::Constant, 2);
-    let all = || session.runs.iter().flat_map(|run| &run.truth.reports);
+    let recording = recorded("faults", LawFamily::Constant, 2);
+    let all = || recording.runs.iter().flat_map(|run| &run.truth.reports);
     assert!(all().any(|report| report.cause == Cause::Spurious));
     assert!(all().any(|report| report.cause == Cause::Train));
-    let passed: usize = session
+    let passed: usize = recording
         .runs
         .iter()
         .map(|run| {
@@ -154,8 +155,8 @@ fn faults_show_and_truth_tells_them_apart() {
 #[test]
 fn clocks_start_anew_between_some_runs() {
     let restarts = |seed| {
-        let session = session("starts", LawFamily::Constant, seed);
-        session
+        let recording = recorded("starts", LawFamily::Constant, seed);
+        recording
             .runs
             .windows(2)
             .filter(|pair| pair[1].truth.motion.begins() < pair[0].truth.motion.begins())

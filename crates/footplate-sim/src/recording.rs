@@ -1,4 +1,4 @@
-//! A session: one train, one link, the runs of one scenario, and pauses in which the train cools down.
+//! What a person would record in an evening: one train, one link, the runs of one scenario, pauses between them.
 
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 
@@ -21,9 +21,9 @@ const CLOCK_RESTARTS: f64 = 0.06;
 /// Pauses are cooled through in steps of this.
 const COOLING_STEP_S: f64 = 0.1;
 
-/// Everything of one session, recorded and true.
+/// What was recorded of one train in one scenario, and everything that is true of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Session {
+pub struct SimulatedRecording {
     /// What the station calls the train.
     pub train_id: TrainId,
     /// The train as it is.
@@ -36,7 +36,7 @@ pub struct Session {
     pub runs: Vec<SimulatedRun>,
 }
 
-impl Session {
+impl SimulatedRecording {
     /// Draws a train that obeys a law and lets it go through a scenario; the same for the same seed.
     #[must_use]
     pub fn draw(
