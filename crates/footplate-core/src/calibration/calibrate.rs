@@ -60,7 +60,7 @@ impl Calibration {
             let change = SPEED_A_STEP * f64::from(drive.step.get().abs_diff(drive.from.get()));
             TimeSpan::from_s(LONG_DELAY_S + change / SLOW_ACCELERATION)
         };
-        let mut fit = JointFit::of(layout, sections, runs, &slow)?;
+        let mut fit = JointFit::of(sections, runs, &slow)?;
         let mut laws = BTreeMap::new();
         let mut seen = Vec::new();
         for _ in 0..ROUNDS {
@@ -72,7 +72,7 @@ impl Calibration {
             let settle = |train: TrainId, drive: Drive| {
                 settle_time(&fit, &compared, train, drive).unwrap_or_else(|| slow(train, drive))
             };
-            let Some(refitted) = JointFit::of(layout, sections, runs, &settle) else { break };
+            let Some(refitted) = JointFit::of(sections, runs, &settle) else { break };
             (fit, laws, seen) = (refitted, compared, found);
         }
         let stops = stop_tables(layout, sections, runs, &fit);

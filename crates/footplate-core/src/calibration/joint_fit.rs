@@ -22,7 +22,6 @@ use crate::ids::{SpeedStep, TrainId};
 use crate::latency::UniformNormal;
 use crate::linalg::{Group, NormalEquations, Solution};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Layout;
 use crate::units::{Length, Speed};
 
 /// What a train adds to the correction of a section: see `LengthTable`.
@@ -136,7 +135,6 @@ impl JointFit {
     /// `None` when no run has two linked contacts at a settled speed.
     #[must_use]
     pub fn of(
-        layout: &Layout,
         sections: &SectionIndex,
         runs: &[RunPassages],
         settle: &dyn Fn(TrainId, Drive) -> TimeSpan,
@@ -144,7 +142,6 @@ impl JointFit {
         let mut stretches = collect(sections, runs, settle);
         let unknowns = Unknowns::of(&stretches)?;
         let mut x = unknowns.start(&stretches);
-        let survey = layout.survey().uncertainty.as_m();
         let mut run_deviation: BTreeMap<TrainId, f64> = BTreeMap::new();
         let mut scatter: BTreeMap<TrainId, f64> = BTreeMap::new();
         for stretch in &stretches {
@@ -154,7 +151,7 @@ impl JointFit {
         let mut solution = None;
         for iteration in 0..ITERATIONS {
             let mut system = NormalEquations::new(unknowns.count);
-            unknowns.add_priors(&mut system, &x, survey);
+            unknowns.add_priors(&mut system, &x, sections);
             let groups: Vec<Group<2>> = stretches
                 .iter()
                 .map(|stretch| {
@@ -290,12 +287,12 @@ impl Unknowns {
         x
     }
 
-    fn add_priors(&self, system: &mut NormalEquations, x: &[f64], survey: f64) {
+    fn add_priors(&self, system: &mut NormalEquations, x: &[f64], sections: &SectionIndex) {
         for (key, place) in &self.speeds {
             system.add(&[(*place, 1.0)], prior_ln_speed(*key) - x[*place], SPEED_SPREAD * SPEED_SPREAD);
         }
-        for place in self.shared.values() {
-            system.add(&[(*place, 1.0)], -x[*place], survey * survey + 1e-12);
+        for (section, place) in &self.shared {
+            system.add(&[(*place, 1.0)], -x[*place], sections.survey_variance(*section).max(1e-12));
         }
         for place in self.own.values() {
             system.add(&[(*place, 1.0)], -x[*place], OWN_DEVIATION_M * OWN_DEVIATION_M);

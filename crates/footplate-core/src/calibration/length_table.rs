@@ -18,7 +18,8 @@ const OWN_DEVIATION_M: f64 = 0.008;
 #[derive(Debug, Clone)]
 pub struct SectionIndex {
     of_hop: Vec<u32>,
-    count: usize,
+    /// By section, surveyed length (m) and the variance of its survey (m²).
+    surveyed: Vec<(f64, f64)>,
 }
 
 impl SectionIndex {
@@ -27,7 +28,8 @@ impl SectionIndex {
     pub fn of(layout: &Layout) -> Self {
         let hops: Vec<_> = layout.hops().collect();
         let mut of_hop = vec![u32::MAX; hops.len()];
-        let mut count = 0;
+        let mut surveyed: Vec<(f64, f64)> = Vec::new();
+        let edge_variance = layout.survey().uncertainty.as_m() * layout.survey().uncertainty.as_m();
         for hop in &hops {
             let back = layout.hops().find(|other| {
                 other.edges.len() == hop.edges.len()
@@ -36,14 +38,17 @@ impl SectionIndex {
             let known =
                 back.and_then(|back| of_hop.get(back.id.index()).copied()).filter(|known| *known != u32::MAX);
             let section = known.unwrap_or_else(|| {
-                count += 1;
-                count - 1
+                // Every edge was measured apart; one of no length was not measured at all.
+                let lengths = hop.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length);
+                let measured = lengths.filter(|length| *length > Length::ZERO).count().max(1);
+                surveyed.push((hop.length.as_m(), edge_variance * measured as f64));
+                surveyed.len() as u32 - 1
             });
             if let Some(slot) = of_hop.get_mut(hop.id.index()) {
                 *slot = section;
             }
         }
-        Self { of_hop, count: count as usize }
+        Self { of_hop, surveyed }
     }
 
     /// The section of a hop.
@@ -56,13 +61,30 @@ impl SectionIndex {
     /// How many sections there are.
     #[must_use]
     pub const fn len(&self) -> usize {
-        self.count
+        self.surveyed.len()
     }
 
     /// Whether the layout has no hops.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
-        self.count == 0
+        self.surveyed.is_empty()
+    }
+
+    /// Variance of the surveyed length of a section (m²).
+    #[inline]
+    #[must_use]
+    pub fn survey_variance(&self, section: usize) -> f64 {
+        self.surveyed.get(section).map_or(0.0, |(_, variance)| *variance)
+    }
+
+    /// How well the survey knows the way over some sections as a whole: variance of its logarithm. No timing
+    /// of trains can narrow it, so every speed found on these sections shares it.
+    #[must_use]
+    pub fn scale_variance(&self, sections: impl Iterator<Item = usize>) -> f64 {
+        let known = sections.filter_map(|section| self.surveyed.get(section));
+        let (length, variance) =
+            known.fold((0.0, 0.0), |(l, v), (length, variance)| (l + length, v + variance));
+        if length > 0.0 { variance / (length * length) } else { 0.0 }
     }
 }
 
@@ -88,6 +110,11 @@ impl LengthTable {
         self.entries.get(section).copied().flatten().map(|entry| (entry.by, entry.variance))
     }
 
+    /// The sections on which the train was.
+    pub fn known(&self) -> impl Iterator<Item = usize> + '_ {
+        self.entries.iter().enumerate().filter_map(|(section, entry)| entry.map(|_| section))
+    }
+
     /// Keeps a correction (m) and its variance (m²).
     #[inline]
     pub fn set(&mut self, section: usize, by: f64, variance: f64) {
@@ -105,11 +132,10 @@ impl LengthTable {
     pub fn pooled<'t>(
         others: impl Iterator<Item = &'t Self>,
         section: usize,
-        survey_uncertainty: Length,
+        survey_variance: f64,
     ) -> (f64, f64) {
         let own = OWN_DEVIATION_M * OWN_DEVIATION_M;
-        let survey = survey_uncertainty.as_m() * survey_uncertainty.as_m();
-        let (mut weight, mut sum) = (1.0 / survey.max(1e-12), 0.0);
+        let (mut weight, mut sum) = (1.0 / survey_variance.max(1e-12), 0.0);
         for (by, variance) in others.filter_map(|other| other.get(section)) {
             weight += 1.0 / (variance + own);
             sum += by / (variance + own);
@@ -128,7 +154,7 @@ mod tests {
         for other in &mut others {
             other.set(3, 0.02, 1e-8);
         }
-        let survey = Length::from_mm(10.0);
+        let survey = 0.010 * 0.010;
         let alone = LengthTable::pooled(core::iter::empty(), 3, survey);
         assert_eq!(alone.0, 0.0);
         assert!((libm::sqrt(alone.1) - 0.0128).abs() < 1e-4);

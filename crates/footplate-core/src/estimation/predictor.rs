@@ -93,7 +93,7 @@ impl Predictor {
         match tracker.take(layout, event) {
             Some(Sighting::Passage(passage)) => {
                 let place = *place;
-                let prior = self.lengths_ahead(layout, place, &passage);
+                let prior = self.lengths_ahead(place, &passage);
                 let model = self.trains.get_mut(place)?;
                 Some(model.pass(layout, &self.sections, passage, period, &prior))
             }
@@ -111,7 +111,7 @@ impl Predictor {
 
     /// What other trains found on the sections of a way on which this train never was, as (section, by,
     /// variance) rows that its own table takes over. Empty on every later pass.
-    fn lengths_ahead(&self, layout: &Layout, place: usize, passage: &Passage) -> Vec<(usize, f64, f64)> {
+    fn lengths_ahead(&self, place: usize, passage: &Passage) -> Vec<(usize, f64, f64)> {
         let (Some(way), Some(model)) = (&passage.way, self.trains.get(place)) else { return Vec::new() };
         let own = model.lengths();
         way.hops()
@@ -120,7 +120,8 @@ impl Predictor {
             .filter(|section| own.get(*section).is_none())
             .map(|section| {
                 let others = self.trains.iter().map(TrainModel::lengths);
-                let (by, variance) = LengthTable::pooled(others, section, layout.survey().uncertainty);
+                let (by, variance) =
+                    LengthTable::pooled(others, section, self.sections.survey_variance(section));
                 (section, by, variance)
             })
             .collect()

@@ -109,6 +109,20 @@ impl TrainModel {
         &self.speeds
     }
 
+    /// Its steady speeds with all that makes them uncertain: the survey's scale, which no timing narrows, is in
+    /// it.
+    pub fn calibrated_speeds<'s>(
+        &'s self,
+        sections: &'s SectionIndex,
+    ) -> impl Iterator<Item = (SpeedStep, Approach, Estimate<Speed>)> + 's {
+        let scale = sections.scale_variance(self.lengths.known());
+        self.speeds.speeds().map(move |(step, approach, speed)| {
+            let shared = speed.value.as_m_per_s() * libm::sqrt(scale);
+            let uncertainty = libm::hypot(speed.uncertainty.as_m_per_s(), shared);
+            (step, approach, Estimate { uncertainty: Speed::from_m_per_s(uncertainty), ..speed })
+        })
+    }
+
     /// The same, to take over a calibration.
     pub const fn speeds_mut(&mut self) -> &mut SpeedTable {
         &mut self.speeds
