@@ -30,13 +30,7 @@ impl Layout {
         }
         let places = place_nodes(&plan.places)?;
         let (nodes, edges) = join(plan, &places)?;
-        for (pair, turnouts) in plan.never_both_curved.iter().enumerate() {
-            let [one, other] = *turnouts;
-            let unknown = turnouts.iter().find(|turnout| !places.turnouts.contains_key(turnout));
-            if let Some(&turnout) = unknown.or((one == other).then_some(&one)) {
-                return Err(LayoutError::IllegalPair { pair, turnout });
-            }
-        }
+        let partners = pair_turnouts(&plan.never_both_curved, &places)?;
         let mut layout = Self {
             name: plan.name.clone(),
             survey: plan.survey.clone(),
@@ -46,6 +40,7 @@ impl Layout {
             sensors: places.sensors,
             turnouts: places.turnouts,
             never_both_curved: plan.never_both_curved.clone(),
+            partners,
             hops: Hops::default(),
         };
         let place_and_name = |node: NodeId| (node.pair(), layout.node_name(node).to_owned());
@@ -166,6 +161,23 @@ impl Places {
     }
 }
 
+/// The other turnout of each pair, both ways.
+fn pair_turnouts(
+    pairs: &[[TurnoutId; 2]],
+    places: &Places,
+) -> Result<BTreeMap<TurnoutId, TurnoutId>, LayoutError> {
+    let mut partners = BTreeMap::new();
+    for (pair, [one, other]) in pairs.iter().enumerate() {
+        for (turnout, partner) in [(*one, *other), (*other, *one)] {
+            let is_new = partners.insert(turnout, partner).is_none();
+            if !is_new || !places.turnouts.contains_key(&turnout) {
+                return Err(LayoutError::IllegalPair { pair, turnout });
+            }
+        }
+    }
+    Ok(partners)
+}
+
 /// Letters, digits, `_` and `.`: no sign, so that `C13-20mm` can only be a landmark, and no space, so that
 /// `BR6 curved` can only be a leg.
 fn is_legal_name(name: &str) -> bool {
@@ -239,7 +251,7 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
 mod tests {
     use super::*;
     use crate::ids::SensorId;
-    use crate::track::example::{oval_plan, stretch};
+    use crate::track::example::{end, oval_plan, stretch, turnout};
     use crate::track::{PlanEntry, RailEnd, Stretch};
     use std::format;
     use std::string::ToString;
@@ -361,11 +373,27 @@ mod tests {
                 (
                     PlanEntry::Pair(0),
                     format!(
-                        "turnout {turnout} makes no pair: it takes two different turnouts of this layout"
+                        "turnout {turnout} makes no pair: it takes two different turnouts of this layout, each \
+                         in one pair"
                     )
                 )
             );
         }
+    }
+
+    #[test]
+    fn a_turnout_is_in_one_pair_at_most() {
+        let (entry, text) = refusal(|plan| {
+            plan.places.extend([turnout(3), end(3), end(4), end(5)]);
+            plan.stretches.extend([
+                stretch("EN3", "BR3", 1.0),
+                stretch("BR3 straight", "EX4", 1.0),
+                stretch("BR3 curved", "EX5", 1.0),
+            ]);
+            plan.never_both_curved = vec![[TurnoutId(1), TurnoutId(2)], [TurnoutId(3), TurnoutId(2)]];
+        });
+        assert_eq!(entry, PlanEntry::Pair(1));
+        assert!(text.starts_with("turnout 2 makes no pair"), "{text}");
     }
 
     #[test]

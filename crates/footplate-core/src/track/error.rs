@@ -118,7 +118,7 @@ pub enum LayoutError {
         /// The leg, at a branch.
         leg: Option<Leg>,
     },
-    /// A pair that is never both curved names a turnout that is nowhere, or one turnout twice.
+    /// A pair that is never both curved names a turnout that is nowhere, or in a pair already.
     IllegalPair {
         /// The pair.
         pair: usize,
@@ -250,9 +250,10 @@ impl fmt::Display for LayoutError {
                 "no edge leads on from {}: join it to another node, or to an end if the track ends there",
                 Named(node, *leg)
             ),
-            Self::IllegalPair { turnout, .. } => {
-                write!(f, "turnout {turnout} makes no pair: it takes two different turnouts of this layout")
-            }
+            Self::IllegalPair { turnout, .. } => write!(
+                f,
+                "turnout {turnout} makes no pair: it takes two different turnouts of this layout, each in one pair"
+            ),
             Self::LoopWithoutLength { node, .. } => {
                 write!(f, "the edges from `{node}` come back to it after 0 mm: at least one must be longer")
             }

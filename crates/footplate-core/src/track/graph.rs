@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
 use crate::track::hop::Hops;
-use crate::track::{Leg, Survey};
+use crate::track::{Leg, Survey, TurnoutStates};
 use crate::units::Length;
 
 impl NodeId {
@@ -126,6 +126,8 @@ pub struct Layout {
     /// The branch of each turnout.
     pub(crate) turnouts: BTreeMap<TurnoutId, NodeId>,
     pub(crate) never_both_curved: Vec<[TurnoutId; 2]>,
+    /// The other turnout of each pair, both ways.
+    pub(crate) partners: BTreeMap<TurnoutId, TurnoutId>,
     pub(crate) hops: Hops,
 }
 
@@ -217,6 +219,19 @@ impl Layout {
         &self.never_both_curved
     }
 
+    /// The turnout in the same place that has to lie straight before this one may lie curved.
+    #[must_use]
+    pub fn never_curved_with(&self, turnout: TurnoutId) -> Option<TurnoutId> {
+        self.partners.get(&turnout).copied()
+    }
+
+    /// A pair of turnouts that are known to lie curved both, which no pair in one place may.
+    #[must_use]
+    pub fn illegal_pair(&self, turnouts: &TurnoutStates) -> Option<[TurnoutId; 2]> {
+        let is_curved = |turnout: &TurnoutId| turnouts.get(*turnout) == Some(Leg::Curved);
+        self.never_both_curved.iter().find(|pair| pair.iter().all(is_curved)).copied()
+    }
+
     /// An edge.
     #[inline]
     #[must_use]
@@ -263,7 +278,8 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::example::oval;
+    use crate::track::example::{oval, oval_plan};
+    use alloc::vec;
 
     #[test]
     fn every_node_has_a_reverse_and_every_edge_an_equally_long_twin() {
@@ -280,6 +296,20 @@ mod tests {
             assert!(layout.ways(edge.from).edges().any(|way| way == id));
         }
         assert!((layout.total_length().as_mm() - 1_540.0).abs() < 1e-9, "{:?}", layout.total_length());
+    }
+
+    #[test]
+    fn turnouts_in_one_place_are_never_both_curved() {
+        let mut plan = oval_plan();
+        plan.never_both_curved = vec![[TurnoutId(1), TurnoutId(2)]];
+        let layout = Layout::build(&plan).unwrap();
+        assert_eq!(layout.never_curved_with(TurnoutId(2)), Some(TurnoutId(1)));
+        assert_eq!(layout.never_curved_with(TurnoutId(3)), None);
+        let mut states: TurnoutStates = [(TurnoutId(1), Leg::Curved)].into_iter().collect();
+        assert_eq!(layout.illegal_pair(&states), None);
+        states.set(TurnoutId(2), Leg::Curved);
+        assert_eq!(layout.illegal_pair(&states), Some([TurnoutId(1), TurnoutId(2)]));
+        assert_eq!(oval().illegal_pair(&states), None);
     }
 
     #[test]

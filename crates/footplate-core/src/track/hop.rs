@@ -233,10 +233,11 @@ impl Layout {
 
     /// Whether turnouts met at the toe would have to lie curved that may not both do so.
     pub(crate) fn needs_both_curved(&self, needs: &[TurnoutNeed]) -> bool {
-        let curved = |turnout| {
-            needs.iter().any(|need| need.facing && need.leg == Leg::Curved && need.turnout == turnout)
-        };
-        self.never_both_curved().iter().any(|[one, other]| curved(*one) && curved(*other))
+        let curved = || needs.iter().filter(|need| need.facing && need.leg == Leg::Curved);
+        curved().any(|need| {
+            let partner = self.never_curved_with(need.turnout);
+            partner.is_some_and(|partner| curved().any(|other| other.turnout == partner))
+        })
     }
 }
 

@@ -140,7 +140,7 @@ fn places_are_named_with_what_is_wrong() {
     );
     assert_eq!(
         complaint("[[1, 2]]", "[[1, 3]]"),
-        "oval.toml, line 13, column 22: turnout 3 makes no pair: it takes two different turnouts of this layout"
+        "oval.toml, line 13, column 22: turnout 3 makes no pair: it takes two different turnouts of this layout, each in one pair"
     );
 }
 

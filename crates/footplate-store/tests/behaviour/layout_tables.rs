@@ -208,7 +208,7 @@ fn what_is_no_layout_is_named_with_its_row() {
     let pair = ImportContext { never_both_curved: vec![[TurnoutId(1), TurnoutId(9)]], ..context() };
     assert_eq!(
         import_layout(tables, &pair).unwrap_err().to_string(),
-        "turnout 9 makes no pair: it takes two different turnouts of this layout"
+        "turnout 9 makes no pair: it takes two different turnouts of this layout, each in one pair"
     );
 }
 

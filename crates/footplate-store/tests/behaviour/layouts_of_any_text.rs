@@ -187,6 +187,14 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
     )
 }
 
+#[test]
+fn brackets_without_end_are_no_panic() {
+    for bracket in ["[", "{a=", "[[", "\"\"\"", "a."] {
+        let text = format!("edges = {}", bracket.repeat(100_000));
+        assert!(parse_layout("deep.toml", text.as_bytes()).is_err());
+    }
+}
+
 proptest! {
     #[test]
     fn damage_to_a_layout_file_is_never_a_panic(damages in vec(damage(), 1..6)) {
