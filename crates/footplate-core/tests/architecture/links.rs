@@ -82,10 +82,33 @@ impl Targets {
     fn contains(&self, path: &str) -> bool {
         self.0.contains(path.trim_end_matches('/'))
     }
+
+    /// Whether the end of some path reads like this: how a page that said where it is names what is there.
+    fn contains_end(&self, end: &str) -> bool {
+        let end = format!("/{end}");
+        self.0.iter().any(|path| path.ends_with(&end))
+    }
+
+    /// What is wrong with something that a page shows as code, if it is a path.
+    fn objection(&self, span: &str) -> Option<String> {
+        if span.contains(['*', '{', '…', ' ', '<']) {
+            return None;
+        }
+        let from_top = span.split_once('/').is_some_and(|(first, _)| self.contains(first));
+        let missing =
+            if from_top { !self.contains(span) } else { span.ends_with(".rs") && !self.contains_end(span) };
+        missing.then(|| format!("names {span}, which is not there"))
+    }
 }
 
 fn pages() -> Vec<TextFile> {
     text_files(&[".md"])
+}
+
+/// The pages of `docs` that a line of code or a message names.
+fn pages_named(line: &str) -> impl Iterator<Item = &str> {
+    let parts = line.split(|c: char| !c.is_alphanumeric() && !"/._-".contains(c));
+    parts.filter(|part| part.starts_with("docs/") && part.ends_with(".md"))
 }
 
 fn link_objection(pages: &[TextFile], targets: &Targets, page: &str, link: &str) -> Option<String> {
@@ -124,11 +147,23 @@ fn every_path_named_in_passing_exists() {
     // What a change log tells of may be gone by now.
     for file in pages().into_iter().filter(|file| file.path != "CHANGELOG.md") {
         for span in Page::read(&file.text).code_spans {
-            let is_path = span.target.split_once('/').is_some_and(|(first, _)| targets.contains(first));
-            if is_path && !span.target.contains(['*', '{', '…', ' ', '<']) && !targets.contains(&span.target)
-            {
-                let what = format!("names {}, which is not there", span.target);
+            if let Some(what) = targets.objection(&span.target) {
                 faults.push(Fault { path: file.path.clone(), line: span.line, what });
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn every_page_that_code_sends_people_to_exists() {
+    let targets = Targets::read();
+    let mut faults = Vec::new();
+    for file in text_files(&[".rs", ".toml", ".sh"]) {
+        for (at, line) in file.text.lines().enumerate() {
+            for page in pages_named(line).filter(|page| !targets.contains(page)) {
+                let what = format!("sends people to {page}, which is not there");
+                faults.push(Fault { path: file.path.clone(), line: at + 1, what });
             }
         }
     }
@@ -152,7 +187,7 @@ fn every_page_has_its_place_in_the_reading_order() {
 
 #[test]
 fn a_dead_link_and_a_missing_heading_are_noticed() {
-    assert_eq!(follow("docs/guides/start.md", "../glossary.md").as_deref(), Some("docs/glossary.md"));
+    assert_eq!(follow("docs/wire/marklin_serial.md", "../glossary.md").as_deref(), Some("docs/glossary.md"));
     assert_eq!(follow("README.md", "../elsewhere.md"), None);
     assert_eq!(anchor("Why `f64`, and not decimals?"), "why-f64-and-not-decimals");
 
@@ -160,6 +195,15 @@ fn a_dead_link_and_a_missing_heading_are_noticed() {
     assert_eq!(page.links.iter().map(|l| (l.line, l.target.as_str())).collect::<Vec<_>>(), [(3, "two.md")]);
     assert_eq!(page.code_spans.len(), 1);
     assert!(page.anchors.contains("one"));
+    let targets = Targets(["crates", "crates/core/src/track/graph.rs"].map(String::from).into());
+    assert!(targets.objection("crates/none.rs").is_some());
+    assert!(targets.objection("track/none.rs").is_some());
+    assert!(targets.objection("track/graph.rs").is_none());
+    assert!(targets.objection("loop.toml").is_none(), "a file of the user's");
+    assert_eq!(
+        pages_named("see `docs/glossary.md` (docs/formats)").collect::<Vec<_>>(),
+        ["docs/glossary.md"]
+    );
     let targets = Targets(BTreeSet::new());
     assert!(link_objection(&[], &targets, "README.md", "no-such-page.md").is_some());
     assert!(link_objection(&[], &targets, "README.md", "https://example.org").is_none());
