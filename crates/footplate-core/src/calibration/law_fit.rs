@@ -77,7 +77,7 @@ pub struct LawComparison {
     pub laws: Vec<FittedLaw>,
     /// The law to use; the table when none fits and it forecasts better.
     pub best: usize,
-    /// Whether the best explains the data within [`FITS`] times what poll and scatter allow.
+    /// Whether the best explains the data within three times what poll and scatter allow.
     pub fits: bool,
     /// Whether held-out error and criterion name the same law, or one within a tenth of its error.
     pub agreed: bool,
