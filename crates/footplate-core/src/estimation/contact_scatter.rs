@@ -10,7 +10,7 @@ const MEMORY: f64 = 120.0;
 const SMALLEST_M: f64 = 0.001;
 const LARGEST_M: f64 = 0.025;
 /// One hit counts for at most this many times what was expected, so that an outlier is no scatter.
-const HELD_AT: f64 = 9.0;
+const HELD_AT: f64 = 4.0;
 
 /// Scatter of a train's contacts about their usual place, learnt from how far forecasts miss beyond what
 /// poll and motion explain.
