@@ -1,6 +1,11 @@
-//! The program as a person in a shell sees it: what it prints, and the status it ends with.
+//! The program as a person in a shell sees it, what it prints and the status it ends with, and what its numbers
+//! promise, checked against trains whose truth is known.
 
+mod calibrate;
+mod calibrations_are_true;
+mod forecasts_hold;
 mod layout;
 mod program;
 mod simulate;
+mod simulated;
 mod usage;
