@@ -9,6 +9,7 @@
 #   bare-metal   core and wire link into a program that has no std
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
 #   examples     the numbered examples print what is committed in testdata/examples
+#   scenarios    the tables in docs/tables are what the program prints
 #
 # And one that changes files, never part of "every step":
 #
@@ -21,8 +22,9 @@ shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")"
 export PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 
-readonly ALL_STEPS=(lint test bare-metal docs examples)
+readonly ALL_STEPS=(lint test bare-metal docs examples scenarios)
 readonly EXPECTED_EXAMPLES=testdata/examples
+readonly TABLES=docs/tables
 readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
 
 if [[ -z ${FOOTPLATE_DATA:-} && -d ../shared/data ]]; then
@@ -123,10 +125,41 @@ refresh_example() {
   mv "$TARGET/$1.txt" "$EXPECTED_EXAMPLES/$1.txt"
 }
 
+# Calls $1 with the name of each table and the arguments of the program that print it.
+each_table() {
+  "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
+}
+
+# What is odd in the logs is said in testdata/sensor-logs/README.md.
+print_table() {
+  shift
+  cargo run --quiet --profile test -p footplate -- "$@" 2>/dev/null
+}
+
+check_table() {
+  local expected="$TABLES/$1.md"
+  if ! print_table "$@" | diff --unified --label "$expected" --label "printed now" "$expected" -; then
+    echo "table $1 is no longer what is committed; if the new one is right: ./ci.sh expected"
+    return 1
+  fi
+  echo "table $1 is what the program prints"
+}
+
+step_scenarios() {
+  need_compiler
+  each_table check_table
+}
+
+refresh_table() {
+  print_table "$@" >"$TARGET/$1.md"
+  mv "$TARGET/$1.md" "$TABLES/$1.md"
+}
+
 step_expected() {
   need_compiler
   each_example refresh_example
-  git status --short -- testdata
+  each_table refresh_table
+  git status --short -- testdata "$TABLES"
 }
 
 # ---- running them -------------------------------------------------------------------------------------------

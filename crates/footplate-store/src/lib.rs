@@ -9,6 +9,7 @@ mod calibration_file;
 mod content_hash;
 mod decimal;
 mod layout_file;
+mod published_table;
 mod recording;
 pub mod score;
 mod sensor_log;
@@ -27,6 +28,10 @@ pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
     LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
     layout_named, parse_layout, read_layout, write_layout,
+};
+pub use published_table::{
+    CheckedFigure, CountedFrom, CrossCheck, NothingToCompare, PublishedFigure, PublishedQuantity,
+    PublishedTableError, TeamSummary, read_published_table,
 };
 pub use recording::{Form, GatePass, Note, Oddity, RawEvent, Recording, Run, TrainAtStart};
 pub use sensor_log::{

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{calibrate, completions, layout, simulate};
+use super::{calibrate, compare, completions, layout, simulate};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -29,6 +29,7 @@ macro_rules! verbs {
 
 verbs! {
     Calibrate: calibrate,
+    Compare: compare,
     Completions: completions,
     Layout: layout,
     Simulate: simulate,

@@ -6,6 +6,7 @@
 
 mod calibrate;
 mod command;
+mod compare;
 mod completions;
 mod layout;
 mod recordings;

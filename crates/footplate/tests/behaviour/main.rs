@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod calibrations_are_true;
+mod compare;
 mod forecasts_hold;
 mod layout;
 mod program;

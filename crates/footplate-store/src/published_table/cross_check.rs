@@ -1,0 +1,350 @@
+//! How far a calibration agrees with what others measured of trains of the same number.
+//!
+//! Two teams met the same locomotive years apart, on other rails, with other wear. How much that alone moves a figure is
+//! read off the teams themselves: over all pairs of teams that measured the same step, the median of |ln(a/b)| is
+//! 0.6745 √2 s for a scatter s of one team. A median, because some published figures are slips. Ours is one team more, so a
+//! difference is expected to have σ² = 2 s² + u² + u'² with the doubt of both figures, relative to them.
+
+use std::collections::BTreeMap;
+
+use footplate_core::{Approach, SpeedStep, TrainId};
+
+use super::read::{CountedFrom, PublishedFigure, PublishedQuantity};
+use crate::calibration_file::{CalibrationFile, TrainForm};
+
+/// The upper quartile of the standard normal distribution: half of all values lie within.
+const QUARTILE: f64 = 0.674_489_750_196_081_7;
+/// Differences up to so many σ count as agreement: 95 of 100 when there is nothing but chance.
+const AGREES_WITHIN: f64 = 2.0;
+/// Between the report of a contact and the command it releases pass up to two polls of 70 ms; a team that does not say
+/// from which of them it counts leaves this much time in doubt, one standard deviation (s).
+const NOT_STATED_S: f64 = 0.07;
+
+/// A published figure beside ours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedFigure {
+    /// What it is of.
+    pub quantity: PublishedQuantity,
+    /// The train.
+    pub train: TrainId,
+    /// The throttle step.
+    pub step: SpeedStep,
+    /// From which side the team reached the step.
+    pub approach: Approach,
+    /// Who published it.
+    pub team: String,
+    /// When.
+    pub term: String,
+    /// The mean of what the team measured, in mm/s or mm.
+    pub theirs: f64,
+    /// How many figures that is the mean of.
+    pub readings: usize,
+    /// Ours, and one standard deviation.
+    pub ours: [f64; 2],
+    /// One standard deviation of the difference, relative to the figures.
+    pub sigma: f64,
+}
+
+impl CheckedFigure {
+    /// How much larger ours is, in percent of theirs.
+    #[must_use]
+    pub fn difference_percent(&self) -> f64 {
+        100.0 * (self.ours[0] / self.theirs - 1.0)
+    }
+
+    /// The difference in standard deviations.
+    #[must_use]
+    pub fn sigmas(&self) -> f64 {
+        libm::log(self.ours[0] / self.theirs) / self.sigma
+    }
+
+    /// Whether chance explains the difference.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.sigmas().abs() <= AGREES_WITHIN
+    }
+}
+
+/// One team as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TeamSummary {
+    /// Who.
+    pub team: String,
+    /// Figures that have a counterpart among ours.
+    pub compared: usize,
+    /// Those that agree.
+    pub agree: usize,
+    /// The median of the differences, in percent of theirs.
+    pub median_percent: f64,
+}
+
+/// All published figures that have a counterpart among ours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossCheck {
+    /// Speeds, by train, step and team.
+    pub speeds: Vec<CheckedFigure>,
+    /// Stopping distances.
+    pub stops: Vec<CheckedFigure>,
+    /// How much one team's speeds scatter about what all found, one standard deviation (%); `None` where no two
+    /// teams measured the same.
+    pub speed_spread_percent: Option<f64>,
+    /// The same for stopping distances.
+    pub stop_spread_percent: Option<f64>,
+    /// Published figures, and those of them without a counterpart among ours.
+    pub without_counterpart: [usize; 2],
+}
+
+/// Why there is nothing to compare.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NothingToCompare {
+    /// No two teams measured the same step of a train.
+    #[error(
+        "no two teams have a figure of the same step of a train, so nothing tells how far teams differ; give the \
+         figures of more teams"
+    )]
+    OneTeam,
+    /// None of the trains or steps is ours.
+    #[error("none of the {figures} published figures is of a train and step that the recordings show")]
+    NoCounterpart {
+        /// How many there are.
+        figures: usize,
+    },
+}
+
+/// What one team found of one step: the key of the grouping.
+type Key<'a> = (PublishedQuantity, TrainId, SpeedStep, Approach, &'a str, &'a str);
+
+impl CrossCheck {
+    /// Compares a calibration with published figures.
+    ///
+    /// # Errors
+    /// [`NothingToCompare`].
+    pub fn of(file: &CalibrationFile, figures: &[PublishedFigure]) -> Result<Self, NothingToCompare> {
+        let mut teams: BTreeMap<Key<'_>, Vec<f64>> = BTreeMap::new();
+        for figure in figures {
+            let PublishedFigure { quantity, train, step, approach, ref team, ref term, value } = *figure;
+            teams.entry((quantity, train, step, approach, team, term)).or_default().push(value);
+        }
+        let of_speeds = |quantity| quantity == PublishedQuantity::Speed;
+        let speed_spread = spread(&teams, of_speeds);
+        let stop_spread = spread(&teams, |quantity| !of_speeds(quantity));
+        if speed_spread.or(stop_spread).is_none() {
+            return Err(NothingToCompare::OneTeam);
+        }
+        let mut check = Self {
+            speeds: Vec::new(),
+            stops: Vec::new(),
+            speed_spread_percent: speed_spread.map(|spread| 100.0 * spread),
+            stop_spread_percent: stop_spread.map(|spread| 100.0 * spread),
+            without_counterpart: [teams.len(), 0],
+        };
+        for (key, values) in &teams {
+            let (kind, between) = match key.0 {
+                PublishedQuantity::Speed => (&mut check.speeds, speed_spread),
+                PublishedQuantity::Stop(_) => (&mut check.stops, stop_spread),
+            };
+            match between.and_then(|between| checked(file, key, values, between)) {
+                Some(figure) => kind.push(figure),
+                None => check.without_counterpart[1] += 1,
+            }
+        }
+        for kind in [&mut check.speeds, &mut check.stops] {
+            kind.sort_by(|one, other| {
+                (one.train, one.step, &one.team, one.approach as u8).cmp(&(
+                    other.train,
+                    other.step,
+                    &other.team,
+                    other.approach as u8,
+                ))
+            });
+        }
+        if check.speeds.is_empty() && check.stops.is_empty() {
+            return Err(NothingToCompare::NoCounterpart { figures: figures.len() });
+        }
+        Ok(check)
+    }
+
+    /// One line for each team of a selection, in the order of their names.
+    #[must_use]
+    pub fn by_team(figures: &[CheckedFigure]) -> Vec<TeamSummary> {
+        let mut teams: BTreeMap<&str, Vec<&CheckedFigure>> = BTreeMap::new();
+        for figure in figures {
+            teams.entry(&figure.team).or_default().push(figure);
+        }
+        let summary = |(team, figures): (&str, Vec<&CheckedFigure>)| TeamSummary {
+            team: team.to_owned(),
+            compared: figures.len(),
+            agree: figures.iter().filter(|figure| figure.agrees()).count(),
+            median_percent: median(figures.iter().map(|figure| figure.difference_percent()).collect())
+                .unwrap_or_default(),
+        };
+        teams.into_iter().map(summary).collect()
+    }
+}
+
+/// What each team found, one figure a team.
+type Found<'a> = Vec<(&'a str, f64)>;
+
+/// The scatter of one team about all, relative: see the head of this file.
+fn spread(teams: &BTreeMap<Key<'_>, Vec<f64>>, of: impl Fn(PublishedQuantity) -> bool) -> Option<f64> {
+    let mut by_step: BTreeMap<(TrainId, SpeedStep, Approach), Found<'_>> = BTreeMap::new();
+    for ((_, train, step, approach, team, _), values) in teams.iter().filter(|(key, _)| of(key.0)) {
+        by_step.entry((*train, *step, *approach)).or_default().push((team, mean(values)));
+    }
+    let mut ratios = Vec::new();
+    for found in by_step.values() {
+        for (place, (team, value)) in found.iter().enumerate() {
+            let others = found.iter().skip(place + 1).filter(|(other, _)| other != team);
+            ratios.extend(others.map(|(_, other)| libm::log(value / other).abs()));
+        }
+    }
+    // Two teams that copied one figure would differ by nothing, and everything would be a disagreement.
+    median(ratios).map(|ratio| ratio / (QUARTILE * std::f64::consts::SQRT_2)).filter(|spread| *spread > 0.0)
+}
+
+fn checked(file: &CalibrationFile, key: &Key<'_>, values: &[f64], between: f64) -> Option<CheckedFigure> {
+    let (quantity, train, step, approach, team, term) = *key;
+    let form = file.trains.iter().find(|form| form.train == train)?;
+    let (ours, definition) = match quantity {
+        PublishedQuantity::Speed => (our_speed(form, step, approach)?, 0.0),
+        PublishedQuantity::Stop(counted) => {
+            let own = form.stops.as_ref()?.steps.iter().find(|own| own.step == step)?;
+            let doubt =
+                if counted == CountedFrom::NotStated { NOT_STATED_S * own.speed_mm_per_s } else { 0.0 };
+            ([own.distance.value, own.distance.uncertainty], doubt)
+        }
+    };
+    let theirs = mean(values);
+    let squares: f64 = values.iter().map(|value| (value - theirs).powi(2)).sum();
+    let count = values.len() as f64;
+    // The uncertainty of their mean, where they read more than once.
+    let their_variance = if values.len() > 1 { squares / (count - 1.0) / count } else { 0.0 };
+    let [value, uncertainty] = ours;
+    let variance = 2.0 * between * between
+        + (uncertainty * uncertainty + definition * definition) / (value * value)
+        + their_variance / (theirs * theirs);
+    (value > 0.0).then(|| CheckedFigure {
+        quantity,
+        train,
+        step,
+        approach,
+        team: team.to_owned(),
+        term: term.to_owned(),
+        theirs,
+        readings: values.len(),
+        ours,
+        sigma: variance.sqrt(),
+    })
+}
+
+/// Our speed of a step reached from the side that they reached it from, or from one that is not known.
+fn our_speed(form: &TrainForm, step: SpeedStep, theirs: Approach) -> Option<[f64; 2]> {
+    let sides: &[Approach] = match theirs {
+        Approach::Below => &[Approach::Below, Approach::Unknown],
+        Approach::Above => &[Approach::Above, Approach::Unknown],
+        Approach::Unknown => &[Approach::Below, Approach::Unknown, Approach::Above],
+    };
+    let speed = sides
+        .iter()
+        .find_map(|side| form.speeds.iter().find(|speed| speed.step == step && speed.approach == *side))?;
+    Some([speed.speed.value, speed.speed.uncertainty])
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let upper = *values.get(middle)?;
+    let lower = *values.get((values.len() - 1) / 2)?;
+    Some(f64::midpoint(lower, upper))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration_file::{Quantity, SpeedForm};
+
+    fn speed(step: u8, value: f64, team: &str) -> PublishedFigure {
+        PublishedFigure {
+            quantity: PublishedQuantity::Speed,
+            train: TrainId(24),
+            step: SpeedStep::new(step).unwrap(),
+            approach: Approach::Unknown,
+            value,
+            team: team.to_owned(),
+            term: String::new(),
+        }
+    }
+
+    fn ours(step: u8, value: f64, uncertainty: f64) -> CalibrationFile {
+        let speed = SpeedForm {
+            step: SpeedStep::new(step).unwrap(),
+            approach: Approach::Below,
+            speed: Quantity { value, uncertainty, unit: "mm/s".into(), measurements: 9, measured_at_s: None },
+            runs: 1,
+        };
+        let train = TrainForm {
+            train: TrainId(24),
+            speeds: vec![speed],
+            hysteresis: Vec::new(),
+            run_deviation_percent: 1.0,
+            contact_scatter_mm: 5.0,
+            sections: Vec::new(),
+            laws: Vec::new(),
+            stops: None,
+            suspicious: Vec::new(),
+        };
+        CalibrationFile {
+            model_version: "1".into(),
+            layout: "line".into(),
+            polling: Vec::new(),
+            trains: vec![train],
+        }
+    }
+
+    #[test]
+    fn a_difference_is_judged_by_how_far_teams_differ() {
+        // Given two teams that differ by 10 % wherever both measured,
+        let figures =
+            [speed(8, 200.0, "a"), speed(8, 220.0, "b"), speed(9, 300.0, "a"), speed(9, 330.0, "b")];
+        let check = CrossCheck::of(&ours(8, 210.0, 2.1), &figures).unwrap();
+        // then one team scatters by ln 1.1 / (0.6745 √2), and ours by 1 % more.
+        let spread = 1.1_f64.ln() / (0.674_49 * 2.0_f64.sqrt());
+        assert!((check.speed_spread_percent.unwrap() - 100.0 * spread).abs() < 1e-3);
+        let [first, second] = check.speeds.as_slice() else { panic!("{check:?}") };
+        let sigma = (2.0 * spread * spread + 0.01 * 0.01_f64).sqrt();
+        assert!((first.sigma - sigma).abs() < 1e-5 && (first.difference_percent() - 5.0).abs() < 1e-9);
+        assert!(first.agrees() && second.agrees() && second.sigmas() < 0.0);
+        assert_eq!(check.without_counterpart, [4, 2]);
+    }
+
+    #[test]
+    fn a_slip_of_the_pen_is_a_difference() {
+        // Given five teams within a few percent, and one that wrote a digit too many,
+        let figures = [("a", 200.0), ("b", 210.0), ("c", 2000.0), ("d", 205.0), ("e", 208.0), ("f", 203.0)]
+            .map(|(team, value)| speed(8, value, team));
+        let check = CrossCheck::of(&ours(8, 206.0, 2.0), &figures).unwrap();
+        let differing: Vec<&str> = check
+            .speeds
+            .iter()
+            .filter(|figure| !figure.agrees())
+            .map(|figure| figure.team.as_str())
+            .collect();
+        assert_eq!(differing, ["c"]);
+        let teams = CrossCheck::by_team(&check.speeds);
+        assert_eq!(teams.iter().map(|team| team.agree).collect::<Vec<_>>(), [1, 1, 0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn without_others_or_a_train_of_ours_there_is_nothing_to_compare() {
+        let one = [speed(8, 200.0, "a"), speed(9, 300.0, "a")];
+        assert_eq!(CrossCheck::of(&ours(8, 1.0, 0.1), &one), Err(NothingToCompare::OneTeam));
+        let two = [speed(8, 200.0, "a"), speed(8, 220.0, "b")];
+        let nothing = CrossCheck::of(&ours(9, 1.0, 0.1), &two);
+        assert_eq!(nothing, Err(NothingToCompare::NoCounterpart { figures: 2 }));
+    }
+}

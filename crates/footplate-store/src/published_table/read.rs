@@ -1,0 +1,198 @@
+//! Reading a table of speeds or stopping distances that another team published.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use footplate_core::{Approach, SpeedStep, TrainId};
+
+use crate::table::{Column, Row, Table, TableError};
+
+/// Beyond what any model train does (mm/s, and mm of stopping distance): a unit was mistaken.
+const LARGEST_FIGURE: f64 = 100_000.0;
+
+/// From where a published stopping distance is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CountedFrom {
+    /// From the command to stop: the team took off the way run on before it.
+    Command,
+    /// From a light gate at which the command was sent.
+    Gate,
+    /// The team does not say: the command, or the contact whose report released it.
+    NotStated,
+}
+
+/// What a published figure is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PublishedQuantity {
+    /// A steady speed, in mm/s.
+    Speed,
+    /// A stopping distance, in mm.
+    Stop(CountedFrom),
+}
+
+/// One figure as published.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PublishedFigure {
+    /// What it is of.
+    pub quantity: PublishedQuantity,
+    /// The train's number.
+    pub train: TrainId,
+    /// The throttle step.
+    pub step: SpeedStep,
+    /// From which side the step was reached, where the team tells.
+    pub approach: Approach,
+    /// The figure: mm/s for a speed, mm for a stop.
+    pub value: f64,
+    /// Who published it.
+    pub team: String,
+    /// When, as the team counts: a year or a term.
+    pub term: String,
+}
+
+/// Why a table of published figures could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PublishedTableError {
+    /// A line or a field is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The columns are those of no published table.
+    #[error(
+        "{file}, line {line}: a table of speeds has the columns train, step, approach, speed_mm_s, team and term; one \
+         of stops has train, step, approach, distance_mm, counted_from, team and term"
+    )]
+    Columns {
+        /// The file.
+        file: String,
+        /// The line of the header.
+        line: u64,
+    },
+    /// A table without a row.
+    #[error("{file}: the table has no row below its header")]
+    NoRow {
+        /// The file.
+        file: String,
+    },
+}
+
+/// Reads a table of speeds or one of stops, which its columns tell; other columns may stand beside.
+///
+/// # Errors
+/// [`PublishedTableError`] with file, line and column.
+pub fn read_published_table(path: &Path) -> Result<Vec<PublishedFigure>, PublishedTableError> {
+    let file = path.display().to_string();
+    let input = File::open(path).map_err(|source| TableError::Read { file: file.clone(), source })?;
+    let mut table = Table::open(&file, BufReader::new(input))?;
+    let shared = table.columns_named(["train", "step", "approach", "team", "term"]);
+    let kind = match (table.column("speed_mm_s"), table.columns_named(["distance_mm", "counted_from"])) {
+        (Some(speed), None) => Some((speed, None)),
+        (None, Some([distance, counted_from])) => Some((distance, Some(counted_from))),
+        _ => None,
+    };
+    let (Some(shared), Some((value, counted_from))) = (shared, kind) else {
+        return Err(PublishedTableError::Columns { file, line: table.line() });
+    };
+    let mut figures = Vec::new();
+    while let Some(row) = table.next_row()? {
+        figures.push(figure(row, shared, value, counted_from)?);
+    }
+    if figures.is_empty() {
+        return Err(PublishedTableError::NoRow { file });
+    }
+    Ok(figures)
+}
+
+fn figure(
+    row: Row<'_>,
+    [train, step, approach, team, term]: [Column; 5],
+    value: Column,
+    counted_from: Option<Column>,
+) -> Result<PublishedFigure, TableError> {
+    let quantity = match counted_from {
+        None => PublishedQuantity::Speed,
+        Some(column) => PublishedQuantity::Stop(row.read(
+            column,
+            "command, gate, or nothing where the team does not say",
+            counted,
+        )?),
+    };
+    let positive =
+        |text: &str| text.parse::<f64>().ok().filter(|value| *value > 0.0 && *value < LARGEST_FIGURE);
+    let name = |text: &str| (!text.is_empty()).then(|| text.to_owned());
+    Ok(PublishedFigure {
+        quantity,
+        train: TrainId(row.read(train, "the number of a train", |text| text.parse().ok())?),
+        step: row.read(step, "a throttle step from 1", |text| {
+            text.parse().ok().and_then(SpeedStep::new).filter(|step| *step > SpeedStep::STAND)
+        })?,
+        approach: row.read(approach, "below, above, or nothing where the team does not say", |text| {
+            match text {
+                "below" => Some(Approach::Below),
+                "above" => Some(Approach::Above),
+                "" => Some(Approach::Unknown),
+                _ => None,
+            }
+        })?,
+        value: row.read(value, "a number above 0 and below 100000", positive)?,
+        team: row.read(team, "the name of a team", name)?,
+        term: row.text(term).to_owned(),
+    })
+}
+
+fn counted(text: &str) -> Option<CountedFrom> {
+    match text {
+        "command" => Some(CountedFrom::Command),
+        "gate" => Some(CountedFrom::Gate),
+        "" => Some(CountedFrom::NotStated),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEEDS: &str = "train,step,approach,speed_mm_s,team,term\n";
+
+    fn read(text: &str) -> Result<Vec<PublishedFigure>, PublishedTableError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("table.csv");
+        std::fs::write(&path, text).unwrap();
+        read_published_table(&path)
+    }
+
+    #[test]
+    fn speeds_and_stops_are_told_by_their_columns() {
+        let speeds = read(&format!("{SPEEDS}24,14,above,557.5,someone,2018\n")).unwrap();
+        let [speed] = speeds.as_slice() else { panic!("{speeds:?}") };
+        assert_eq!((speed.quantity, speed.train), (PublishedQuantity::Speed, TrainId(24)));
+        assert_eq!((speed.approach, speed.value), (Approach::Above, 557.5));
+
+        let stops =
+            read("team,term,train,step,approach,note,counted_from,distance_mm\na,2022,1,8,,x,gate,180\n")
+                .unwrap();
+        assert_eq!(stops[0].quantity, PublishedQuantity::Stop(CountedFrom::Gate));
+        assert_eq!((stops[0].approach, stops[0].value), (Approach::Unknown, 180.0));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_place() {
+        for (text, told) in [
+            ("", "is empty"),
+            (SPEEDS, "no row"),
+            ("train,step,speed\n1,2,3\n", "speed_mm_s"),
+            (&format!("{SPEEDS}x,14,,1,a,\n"), "line 2, column 1 (train): `x`"),
+            (&format!("{SPEEDS}1,0,,1,a,\n"), "column 2 (step)"),
+            (&format!("{SPEEDS}1,1,beside,1,a,\n"), "column 3 (approach)"),
+            (&format!("{SPEEDS}1,1,,NaN,a,\n"), "column 4 (speed_mm_s)"),
+            (&format!("{SPEEDS}1,1,,-3,a,\n"), "above 0"),
+            (&format!("{SPEEDS}1,1,,inf,a,\n"), "above 0"),
+            (&format!("{SPEEDS}1,1,,1,,\n"), "column 5 (team)"),
+            (&format!("{SPEEDS}1,1,,1\n"), "4 fields"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(told), "{text:?}: {error}");
+        }
+    }
+}

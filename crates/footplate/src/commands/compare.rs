@@ -1,0 +1,117 @@
+//! `footplate compare`: what recordings show beside what others published of trains of the same number.
+
+mod markdown;
+mod table;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use footplate_core::{Approach, TrainId};
+use footplate_store::{
+    Batch, CalibrationFile, CheckedFigure, CountedFrom, CrossCheck, ModuleLetters, PublishedQuantity,
+    layout_named, read_published_table,
+};
+use serde_json::{Value, json};
+
+use super::Outcome;
+use super::recordings::read_all;
+
+/// Compare speeds and stops with tables that others published.
+///
+/// Calibrates from the recordings and sets every published figure of the same train and throttle step beside ours:
+/// the difference in percent, and in standard deviations of what teams differ by anyway.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  footplate compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv")]
+pub(crate) struct Arguments {
+    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    #[arg(long, value_name = "LAYOUT")]
+    layout: String,
+    /// Tables of published speeds or stops (CSV), as testdata/published-tables describes them.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    with: Vec<PathBuf>,
+    /// Only this train; also the train of logs that name none.
+    #[arg(long, value_name = "N")]
+    train: Option<u16>,
+    /// Print the comparison as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Print it as a page of Markdown.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let train = self.train.map(TrainId);
+        let mut figures = Vec::new();
+        for path in &self.with {
+            figures.extend(read_published_table(path)?);
+        }
+        figures.retain(|figure| train.is_none_or(|train| train == figure.train));
+        let recordings = read_all(&self.logs, &ModuleLetters, train)?;
+        let batch = Batch::of_recordings(&layout, &recordings, train)?;
+        let check = CrossCheck::of(&CalibrationFile::of(&layout, &batch), &figures)?;
+        if self.json {
+            writeln!(output, "{}", serde_json::to_string_pretty(&as_json(&check))?)?;
+        } else if self.markdown {
+            markdown::write(&check, output)?;
+        } else {
+            table::write(&check, output)?;
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn as_json(check: &CrossCheck) -> Value {
+    let figures = |figures: &[CheckedFigure]| figures.iter().map(figure).collect::<Vec<Value>>();
+    json!({
+        "speed_spread_percent": check.speed_spread_percent,
+        "stop_spread_percent": check.stop_spread_percent,
+        "published": check.without_counterpart[0],
+        "without_counterpart": check.without_counterpart[1],
+        "speeds_mm_per_s": figures(&check.speeds),
+        "stops_mm": figures(&check.stops),
+    })
+}
+
+fn figure(figure: &CheckedFigure) -> Value {
+    json!({
+        "train": figure.train, "step": figure.step, "approach": approach(figure.approach),
+        "counted_from": counted_from(figure.quantity),
+        "ours": figure.ours[0], "uncertainty": figure.ours[1],
+        "theirs": figure.theirs, "readings": figure.readings, "team": figure.team, "term": figure.term,
+        "difference_percent": figure.difference_percent(), "sigmas": figure.sigmas(), "agrees": figure.agrees(),
+    })
+}
+
+const fn approach(approach: Approach) -> &'static str {
+    match approach {
+        Approach::Below => "below",
+        Approach::Above => "above",
+        Approach::Unknown => "not stated",
+    }
+}
+
+const fn counted_from(quantity: PublishedQuantity) -> Option<&'static str> {
+    match quantity {
+        PublishedQuantity::Speed => None,
+        PublishedQuantity::Stop(CountedFrom::Command) => Some("command"),
+        PublishedQuantity::Stop(CountedFrom::Gate) => Some("light gate"),
+        PublishedQuantity::Stop(CountedFrom::NotStated) => Some("not stated"),
+    }
+}
+
+const fn verdict(figure: &CheckedFigure, agrees: bool) -> &'static str {
+    match (agrees, figure.ours[0] < figure.theirs) {
+        (true, _) => "agrees",
+        (false, true) => "ours is less",
+        (false, false) => "ours is more",
+    }
+}
