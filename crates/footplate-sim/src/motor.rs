@@ -15,7 +15,7 @@ use crate::draws::Draws;
 use crate::law::{COUNTS_PER_STEP, Law};
 use crate::train::Train;
 
-/// The step of the integration. The shortest time constant in the world is thirty times longer.
+/// The step of the integration. The shortest time constant of a drawn train is forty times longer.
 pub(crate) const STEP_S: f64 = 1e-3;
 
 /// Lag of a motor with load control behind a set speed that moves gently (chosen: below half a poll).
@@ -63,6 +63,8 @@ pub(crate) struct Motor<'train> {
     process: Process,
     step: SpeedStep,
     approach: Approach,
+    /// The speed of the step from that side.
+    target: f64,
     /// What the decoder asks of the motor.
     set_speed: f64,
     /// How fast the wheels would turn on level straight track.
@@ -109,6 +111,7 @@ impl<'train> Motor<'train> {
             process,
             step: SpeedStep::STAND,
             approach: Approach::Below,
+            target: 0.0,
             set_speed: 0.0,
             wheel_speed: 0.0,
             pending: None,
@@ -120,9 +123,8 @@ impl<'train> Motor<'train> {
     /// A train that has long been running steadily.
     pub(crate) fn running(train: &'train Train, step: SpeedStep, approach: Approach) -> Self {
         let mut motor = Self::at_rest(train);
-        motor.step = step;
-        motor.approach = approach;
-        let speed = motor.target();
+        motor.aim(step, approach);
+        let speed = motor.target;
         let counts = u16::from(step.get()) * COUNTS_PER_STEP;
         match &mut motor.process {
             Process::Averaged { ramp, window, sum, .. } => {
@@ -205,10 +207,8 @@ impl<'train> Motor<'train> {
 
     /// `true` when the wheels stick for good at a step that is not 0.
     pub(crate) fn is_stalled(&self) -> bool {
-        let reach = self.target();
-        self.is_at_rest()
-            && self.step != SpeedStep::STAND
-            && self.breakaway.is_some_and(|needs| needs > reach)
+        let sticks = self.breakaway.is_some_and(|needs| needs > self.target);
+        self.is_at_rest() && self.step != SpeedStep::STAND && sticks
     }
 
     /// Speed of the wheels on level straight track in mm/s, one step of [`STEP_S`] later.
@@ -226,8 +226,10 @@ impl<'train> Motor<'train> {
         self.wheel_speed
     }
 
-    fn target(&self) -> f64 {
-        self.train.speeds.speed(self.step, self.approach).as_mm_per_s()
+    fn aim(&mut self, step: SpeedStep, approach: Approach) {
+        self.step = step;
+        self.approach = approach;
+        self.target = self.train.speeds.speed(step, approach).as_mm_per_s();
     }
 
     fn obey(&mut self, step: SpeedStep) {
@@ -239,11 +241,9 @@ impl<'train> Motor<'train> {
         if step > self.step && self.breakaway == Some(f64::INFINITY) {
             self.breakaway = Some(self.train.breakaway.as_mm_per_s());
         }
-        self.approach = if step < self.step { Approach::Above } else { Approach::Below };
-        self.step = step;
-        let to = self.target();
+        self.aim(step, if step < self.step { Approach::Above } else { Approach::Below });
         if let Process::Eased { up, down, shortest, change, lasts, elapsed } = &mut self.process {
-            *change = to - self.set_speed;
+            *change = self.target - self.set_speed;
             *lasts = *shortest + if *change > 0.0 { *change / *up } else { -*change / *down };
             *elapsed = 0.0;
         }
@@ -251,7 +251,7 @@ impl<'train> Motor<'train> {
 
     /// The decoder: the set speed after `dt`.
     fn decide(&mut self, dt: f64) -> f64 {
-        let target = self.target();
+        let target = self.target;
         let counts = u16::from(self.step.get()) * COUNTS_PER_STEP;
         match &mut self.process {
             Process::Ramp { up, down } => toward(self.set_speed, target, *up * dt, *down * dt),
