@@ -22,9 +22,13 @@ pub enum Phase {
 pub struct Forecast {
     /// The contact.
     pub sensor: SensorId,
-    /// Mean time of the report: the mean time of the contact and half a poll interval.
+    /// Mean time of the report, wherever polls may be: the mean time of the contact and half a poll interval.
+    /// Intervals lie about it.
     pub time: Timestamp,
-    /// How the report scatters about it, in seconds: the doubt of the motion and the uniform poll.
+    /// The poll that will report it if it closes when it is due, where the rhythm of polls is known; otherwise
+    /// the mean time again. The best single guess of the stamp: a report comes at a poll, not between two.
+    pub report: Timestamp,
+    /// How the report scatters about the mean time, in seconds: the doubt of the motion and the uniform poll.
     pub spread: UniformNormal,
     /// The speed at which the train will pass it.
     pub speed: Speed,
@@ -40,10 +44,17 @@ impl Forecast {
         (self.time - half, self.time + half)
     }
 
-    /// How much later than forecast a report came.
+    /// How much later than the poll that was expected to report it a report came.
     #[inline]
     #[must_use]
     pub fn error(&self, report: Timestamp) -> TimeSpan {
+        report - self.report
+    }
+
+    /// How much later than the mean time a report came: the error of the motion, with that of the poll in it.
+    #[inline]
+    #[must_use]
+    pub fn contact_error(&self, report: Timestamp) -> TimeSpan {
         report - self.time
     }
 
@@ -60,7 +71,7 @@ impl Forecast {
     #[inline]
     #[must_use]
     pub fn probability_by(&self, report: Timestamp) -> f64 {
-        self.spread.cdf(self.error(report).as_s())
+        self.spread.cdf(self.contact_error(report).as_s())
     }
 }
 
@@ -73,6 +84,7 @@ mod tests {
         let forecast = Forecast {
             sensor: SensorId(3),
             time: Timestamp::from_s(10.0),
+            report: Timestamp::from_s(10.0),
             spread: UniformNormal { deviation: 0.01, width: 0.07 },
             speed: Speed::from_mm_per_s(400.0),
             phase: Phase::Steady,

@@ -10,6 +10,7 @@ mod belief;
 mod contact_scatter;
 mod forecast;
 mod law_memory;
+mod polls;
 mod predictor;
 mod train_model;
 mod transition;

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use super::forecast::Forecast;
+use super::polls::Polls;
 use super::train_model::TrainModel;
 use crate::calibration::{Drift, LengthTable, Passage, PassageTracker, SectionIndex, Sighting};
 use crate::event::Event;
@@ -89,13 +90,13 @@ impl Predictor {
     pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Hit> {
         let (place, tracker) = self.under_way.as_mut()?;
         let before = tracker.drive();
-        let period = tracker.timing().timing().period;
+        let polls = Polls::of(tracker.timing());
         match tracker.take(layout, event) {
             Some(Sighting::Passage(passage)) => {
                 let place = *place;
                 let prior = self.lengths_ahead(place, &passage);
                 let model = self.trains.get_mut(place)?;
-                Some(model.pass(layout, &self.sections, passage, period, &prior))
+                Some(model.pass(layout, &self.sections, passage, polls, &prior))
             }
             Some(_) => None,
             None => {

@@ -6,6 +6,7 @@ use super::belief::{Belief, C, Command, Due, Hop, U, Unmodelled};
 use super::contact_scatter::ContactScatter;
 use super::forecast::{Forecast, Phase};
 use super::law_memory::LawMemory;
+use super::polls::Polls;
 use super::predictor::{Hit, Verdict};
 use crate::calibration::{
     Direction, DriftTest, Drive, Expected, Familiarity, LawFamily, LengthTable, Passage, PassageTracker,
@@ -241,7 +242,7 @@ impl TrainModel {
         layout: &Layout,
         sections: &SectionIndex,
         passage: Passage,
-        period: TimeSpan,
+        polls: Polls,
         prior: &[(usize, f64, f64)],
     ) -> Hit {
         for (section, by, variance) in prior {
@@ -260,7 +261,7 @@ impl TrainModel {
             self.place(&passage);
             return hit(None, Verdict::First, None);
         };
-        let forecast = self.forecast_of(passage.sensor, &way, &due, period);
+        let forecast = self.forecast_of(passage.sensor, &way, &due, polls);
         // Judged by what was known before the hit.
         let stated = self.foreseeable(forecast);
         let late = passage.window.middle().as_s() - due.time;
@@ -286,7 +287,7 @@ impl TrainModel {
         self.run.rejected = false;
         let noise = passage.window.variance_s2() + self.scatter.variance_s2(due.speed);
         let drift = if due.changing {
-            self.arrive_changing(&ahead, passage.window.middle().as_s(), noise, period);
+            self.arrive_changing(&ahead, passage.window.middle().as_s(), noise, polls.period);
             None
         } else {
             self.run.settled_hops += 1;
@@ -398,7 +399,7 @@ impl TrainModel {
         ahead
     }
 
-    fn forecast_of(&self, sensor: SensorId, way: &Reach, due: &Due, period: TimeSpan) -> Forecast {
+    fn forecast_of(&self, sensor: SensorId, way: &Reach, due: &Due, polls: Polls) -> Forecast {
         let phase = if due.changing {
             Phase::Change
         } else if way.hops().iter().all(|hop| self.has_passed(*hop, self.run.drive.step)) {
@@ -406,11 +407,13 @@ impl TrainModel {
         } else {
             Phase::FirstLap
         };
-        let mean = Timestamp::from_s(due.time) + TimeSpan::from_ns(period.as_ns() / 2);
+        let contact = Timestamp::from_s(due.time);
+        let time = contact + TimeSpan::from_ns(polls.period.as_ns() / 2);
         Forecast {
             sensor,
-            time: mean,
-            spread: self.spread(due, period),
+            time,
+            report: polls.rhythm.and_then(|rhythm| rhythm.poll_after(contact)).unwrap_or(time),
+            spread: self.spread(due, polls.period),
             speed: Speed::from_m_per_s(due.speed),
             phase,
         }
@@ -427,8 +430,8 @@ impl TrainModel {
         let way = self.likely_way(layout, from, tracker)?;
         let ahead = self.way_ahead(sections, &way);
         let due = self.best().due(self.run.command, ahead.hop, DOUBT)?;
-        let period = tracker.timing().timing().period;
-        self.foreseeable(self.forecast_of(way.sensor?, &way, &due, period))
+        let polls = Polls::of(tracker.timing());
+        self.foreseeable(self.forecast_of(way.sensor?, &way, &due, polls))
     }
 
     /// The next contact as the turnouts are known to lie, or else as the train went last time.

@@ -14,6 +14,7 @@
 
 use core::f64::consts::TAU;
 
+use super::poll_rhythm::PollRhythm;
 use crate::estimate::Estimate;
 use crate::time::{TimeSpan, Timestamp};
 
@@ -60,6 +61,9 @@ const PHASE_STEP: f64 = 0.15;
 const LINED_UP: f64 = 0.95;
 /// A longer period is preferred when it lines up this nearly as well as the best.
 const NEARLY: f64 = 0.985;
+
+/// Polls are told apart while their doubt is below this part of the period.
+const TOLD_APART: i64 = 5;
 
 /// Learns the rhythm of a link from the stamps of its reports.
 #[derive(Debug, Clone)]
@@ -128,6 +132,17 @@ impl PollTimingEstimator {
     #[must_use]
     pub fn period(&self) -> Option<Estimate<TimeSpan>> {
         self.fitted
+    }
+
+    /// The polls to come, as long as a rhythm was found and no command has pushed them since the last report.
+    #[inline]
+    #[must_use]
+    pub fn rhythm(&self) -> Option<PollRhythm> {
+        let period = self.fitted?;
+        let doubt = period.uncertainty.as_ns().max(1);
+        let tolerated = period.value.as_ns() / TOLD_APART - self.timing.jitter.as_ns();
+        let next = self.last_stamp? + self.timing.after_report;
+        Some(PollRhythm { next, period: period.value, reaches: tolerated / doubt })
     }
 
     /// Fits the rhythm to the gaps kept, now instead of at the next doubling.

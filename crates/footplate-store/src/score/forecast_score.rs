@@ -115,6 +115,7 @@ mod tests {
         let forecast = |late_ms| Forecast {
             sensor,
             time: until - TimeSpan::from_ms(late_ms),
+            report: until - TimeSpan::from_ms(late_ms),
             spread: UniformNormal { deviation: 0.0, width: 0.1 },
             speed: Speed::from_mm_per_s(400.0),
             phase: Phase::Steady,

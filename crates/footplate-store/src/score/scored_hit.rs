@@ -45,7 +45,7 @@ impl ScoredHit {
     /// How much later than we forecast it was reported.
     #[must_use]
     pub fn late(&self) -> Option<TimeSpan> {
-        self.hit.forecast.map(|forecast| forecast.error(self.reported()))
+        self.hit.forecast.map(|forecast| forecast.contact_error(self.reported()))
     }
 
     /// How much later than a rival forecast it was reported.
