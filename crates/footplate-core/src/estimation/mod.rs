@@ -12,10 +12,13 @@ mod forecast;
 mod law_memory;
 mod polls;
 mod predictor;
+mod speed_watch;
 mod train_model;
 mod transition;
+mod way_memory;
 
 pub use forecast::{Forecast, Phase};
 pub use law_memory::{KnownLaw, LawMemory};
 pub use predictor::{Hit, Predictor, Verdict};
+pub use speed_watch::WatchedSpeed;
 pub use train_model::TrainModel;

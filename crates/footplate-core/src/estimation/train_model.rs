@@ -1,23 +1,23 @@
 //! One train as it is known: its speeds, lengths and laws, and where it is in the run under way.
 
-use alloc::vec::Vec;
-
 use super::belief::{Belief, C, Command, Due, Hop, U, Unmodelled};
 use super::contact_scatter::ContactScatter;
 use super::forecast::{Forecast, Phase};
 use super::law_memory::LawMemory;
 use super::polls::Polls;
 use super::predictor::{Hit, Verdict};
+use super::speed_watch::{SpeedWatch, WatchedSpeed};
+use super::way_memory::WayMemory;
 use crate::calibration::{
     Direction, DriftTest, Drive, Expected, Familiarity, LawFamily, LengthTable, Passage, PassageTracker,
     SectionIndex, SpeedTable,
 };
 use crate::estimate::Estimate;
 use crate::event::Approach;
-use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::latency::UniformNormal;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{HopId, Layout, Reach};
+use crate::track::{Layout, Reach};
 use crate::units::Speed;
 
 /// Random walk of ln speed of a train on one step, per √s: 0.3 % over a lap of half a minute.
@@ -43,10 +43,8 @@ pub struct TrainModel {
     laws: LawMemory,
     drift: DriftTest,
     scatter: ContactScatter,
-    /// By hop, the steps at which the train has run over it, a bit each.
-    passed: Vec<u128>,
-    /// By node, the hop the train took when it was last there.
-    habits: Vec<Option<HopId>>,
+    watch: SpeedWatch,
+    ways: WayMemory,
     run: RunState,
 }
 
@@ -92,8 +90,8 @@ impl TrainModel {
             laws,
             drift: DriftTest::default(),
             scatter: ContactScatter::default(),
-            passed: Vec::new(),
-            habits: Vec::new(),
+            watch: SpeedWatch::default(),
+            ways: WayMemory::default(),
             run,
         }
     }
@@ -127,6 +125,18 @@ impl TrainModel {
     /// The same, to take over a calibration.
     pub const fn speeds_mut(&mut self) -> &mut SpeedTable {
         &mut self.speeds
+    }
+
+    /// The speed of a step as plain running averages see it.
+    #[must_use]
+    pub fn watched_speed(&self, step: SpeedStep) -> Option<WatchedSpeed> {
+        self.watch.step(step)
+    }
+
+    /// How near the test for a lasting drift is to an alarm, 0 to 1.
+    #[must_use]
+    pub fn drift_level(&self) -> f64 {
+        self.drift.level()
     }
 
     /// Its corrections of surveyed lengths.
@@ -249,7 +259,7 @@ impl TrainModel {
             self.lengths.set(*section, *by, *variance);
         }
         self.run.date = passage.window.until;
-        let named = passage.way.as_ref().and_then(|way| self.named(layout, way));
+        let named = passage.way.as_ref().and_then(|way| self.ways.named(layout, way));
         let hit = |forecast, verdict, drift| Hit { passage, forecast, named, verdict, drift };
         let Some(way) = passage.way.filter(|_| self.run.placed) else {
             self.place(&passage);
@@ -267,7 +277,7 @@ impl TrainModel {
         let late = passage.window.middle().as_s() - due.time;
         let probability = forecast.probability_by(passage.window.until);
         let too_wild = probability.min(1.0 - probability) < GATE;
-        self.remember(&way);
+        self.ways.remember(layout, &way, self.run.drive.step);
         if !due.changing && self.too_doubtful() {
             self.set_speed(&passage, &ahead);
             return hit(stated, Verdict::Learnt, None);
@@ -291,6 +301,8 @@ impl TrainModel {
             None
         } else {
             self.run.settled_hops += 1;
+            let took = passage.window.middle().as_s() - self.best().x[C];
+            self.watch.take(self.run.drive.step, ahead.hop.length / took);
             let drift = self.drift.take(late / libm::sqrt(due.variance + noise));
             self.scatter.take(late, due.variance + passage.window.variance_s2(), due.speed);
             self.arrive(self.run.best, &due, &ahead, late, noise, true);
@@ -402,7 +414,7 @@ impl TrainModel {
     fn forecast_of(&self, sensor: SensorId, way: &Reach, due: &Due, polls: Polls) -> Forecast {
         let phase = if due.changing {
             Phase::Change
-        } else if way.hops().iter().all(|hop| self.has_passed(*hop, self.run.drive.step)) {
+        } else if self.ways.has_passed(way, self.run.drive.step) {
             Phase::Steady
         } else {
             Phase::FirstLap
@@ -427,51 +439,16 @@ impl TrainModel {
         tracker: &PassageTracker,
     ) -> Option<Forecast> {
         let from = tracker.at().filter(|_| self.run.placed)?;
-        let way = self.likely_way(layout, from, tracker)?;
+        let way = self.ways.likely_way(layout, from, tracker.turnouts())?;
         let ahead = self.way_ahead(sections, &way);
         let due = self.best().due(self.run.command, ahead.hop, DOUBT)?;
         let polls = Polls::of(tracker.timing());
         self.foreseeable(self.forecast_of(way.sensor?, &way, &due, polls))
     }
 
-    /// The next contact as the turnouts are known to lie, or else as the train went last time.
-    fn likely_way(&self, layout: &Layout, from: NodeId, tracker: &PassageTracker) -> Option<Reach> {
-        let habit = self.habits.get(usize::from(from.0)).copied().flatten();
-        let mut open = layout.reaches(from, tracker.turnouts(), 0);
-        let first = open.next()?;
-        Some(
-            core::iter::once(first)
-                .chain(open)
-                .find(|way| way.hops().first().copied() == habit)
-                .unwrap_or(first),
-        )
-    }
-
-    /// Which contact had been named as the next before the train took this way.
-    fn named(&self, layout: &Layout, way: &Reach) -> Option<SensorId> {
-        let first = way.hops().first().and_then(|hop| layout.hop(*hop))?;
-        let habit = self.habits.get(usize::from(first.from.0)).copied().flatten();
-        habit.and_then(|hop| layout.hop(hop)).or_else(|| layout.hops_from(first.from).next())?.sensor
-    }
-
     fn spread(&self, due: &Due, period: TimeSpan) -> UniformNormal {
         let deviation = libm::sqrt(due.variance + self.scatter.variance_s2(due.speed));
         UniformNormal { deviation, width: period.as_s() }
-    }
-
-    fn has_passed(&self, hop: HopId, step: SpeedStep) -> bool {
-        self.passed.get(hop.index()).is_some_and(|steps| steps >> step.get() & 1 == 1)
-    }
-
-    fn remember(&mut self, way: &Reach) {
-        for hop in way.hops() {
-            if self.passed.len() <= hop.index() {
-                self.passed.resize(hop.index() + 1, 0);
-            }
-            if let Some(steps) = self.passed.get_mut(hop.index()) {
-                *steps |= 1 << self.run.drive.step.get();
-            }
-        }
     }
 }
 
