@@ -1,6 +1,7 @@
 //! The program: command line, clock, sockets and threads around the crates that have none.
 
 mod commands;
+mod progress;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

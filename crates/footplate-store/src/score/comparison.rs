@@ -14,7 +14,7 @@ pub struct Comparison {
     /// Hits for which a next contact had been named.
     pub named: usize,
     /// Those of them where it was the one that reported.
-    pub named_right: usize,
+    pub right: usize,
 }
 
 /// A rival's figures, and ours on the same hits.
@@ -29,11 +29,12 @@ pub struct RivalScore {
 }
 
 impl RivalScore {
-    /// Our median error over the rival's, on the hits that both forecast.
+    /// Our median error over the rival's, on the hits that both forecast: below 1 we are better. Two medians of
+    /// nothing are equal.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
-        let theirs = self.score.median_abs_mm.filter(|median| *median > 0.0)?;
-        self.ours.median_abs_mm.map(|ours| ours / theirs)
+        let (ours, theirs) = (self.ours.median_abs_mm?, self.score.median_abs_mm?);
+        Some(if ours == theirs { 1.0 } else { ours / theirs })
     }
 }
 
@@ -51,8 +52,14 @@ impl Comparison {
             ours: ForecastScore::of(hits),
             rivals: rivals.into(),
             named: named.clone().count(),
-            named_right: named.filter(|hit| hit.hit.named == Some(hit.hit.passage.sensor)).count(),
+            right: named.filter(|hit| hit.hit.named == Some(hit.hit.passage.sensor)).count(),
         }
+    }
+
+    /// How often the contact named as the next was the one that reported; `None` where none was named.
+    #[must_use]
+    pub fn named_right(&self) -> Option<f64> {
+        (self.named > 0).then(|| self.right as f64 / self.named as f64)
     }
 
     /// The figures of one rival.

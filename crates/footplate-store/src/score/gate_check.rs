@@ -92,6 +92,20 @@ impl GateAgreement {
     }
 }
 
+impl GateAgreement {
+    /// Sums up train by train.
+    #[must_use]
+    pub fn by_train<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> BTreeMap<TrainId, Self> {
+        let mut trains: BTreeMap<TrainId, Vec<&GateCheck>> = BTreeMap::new();
+        for check in checks {
+            trains.entry(check.train).or_default().push(check);
+        }
+        let of_train =
+            |(train, checks): (TrainId, Vec<&GateCheck>)| Some((train, Self::of(checks.into_iter())?));
+        trains.into_iter().filter_map(of_train).collect()
+    }
+}
+
 fn mean_and_deviation(values: &[f64]) -> Option<(f64, f64)> {
     let degrees = values.len().checked_sub(1)?;
     let mean = values.iter().sum::<f64>() / values.len() as f64;

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{calibrate, compare, completions, layout, simulate};
+use super::{calibrate, compare, completions, layout, predict, simulate};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -32,6 +32,7 @@ verbs! {
     Compare: compare,
     Completions: completions,
     Layout: layout,
+    Predict: predict,
     Simulate: simulate,
 }
 

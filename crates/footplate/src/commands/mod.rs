@@ -9,6 +9,7 @@ mod command;
 mod compare;
 mod completions;
 mod layout;
+mod predict;
 mod recordings;
 mod simulate;
 

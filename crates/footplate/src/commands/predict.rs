@@ -1,0 +1,121 @@
+//! `footplate predict`: walks recorded sensor logs, forecasts every report and says how good that was.
+
+mod figures;
+mod hit_rows;
+mod json;
+mod report;
+mod tables;
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{TrainId, TurnoutId};
+use footplate_store::score::{Knowledge, ReplayContext, ScoredRecording, score_recording};
+use footplate_store::{Recording, layout_named};
+
+use super::Outcome;
+use super::recordings::read_all;
+use crate::progress::with_progress;
+
+/// Forecast every next sensor of recorded logs, and score that.
+///
+/// A log is walked in the order of time, never looking ahead: each report is forecast with an interval, compared,
+/// and learnt from. Beside ours stand the forecasts that others would make of the same reports: a constant table
+/// (speeds of the first lap), running averages of the speed of a step (EWMA), the last lap; and two that know the
+/// whole log beforehand, the oracle and the hindsight table. Each log begins with nothing known, unless
+/// `--carry-on` says otherwise.
+#[derive(Args)]
+#[command(
+    after_help = "Example: footplate predict testdata/sensor-logs/eadanila_2020_track_a.csv --layout track-a"
+)]
+pub(crate) struct Arguments {
+    /// Sensor logs, in any of the forms of docs/formats/sensor-log.md.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The layout: the name of a built-in one or a layout file.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// Only this train; also the train of logs that name none.
+    #[arg(long, value_name = "N")]
+    train: Option<u16>,
+    /// How a turnout lies when runs begin, such as 6=straight; may be repeated.
+    #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
+    turnouts: Vec<(TurnoutId, Leg)>,
+    /// Keep what one log taught for the next, in the order given.
+    #[arg(long)]
+    carry_on: bool,
+    /// Leave out the hits, print only what sums them up.
+    #[arg(long)]
+    summary: bool,
+    /// Write JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write the summary as Markdown tables with the targets beside them.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let recordings = read_all(&self.logs, &layout, self.train.map(TrainId))?;
+        let scored = self.score(&layout, &recordings)?;
+        if self.json {
+            let value = json::scores(&layout, &scored, !self.summary);
+            writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
+        } else if self.markdown {
+            report::write(output, &layout, &scored)?;
+        } else {
+            for recording in scored.iter().filter(|_| !self.summary) {
+                hit_rows::write(output, &layout, recording)?;
+            }
+            tables::write(output, &scored)?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn score(&self, layout: &Layout, recordings: &[Recording]) -> anyhow::Result<Vec<ScoredRecording>> {
+        let context = ReplayContext { layout, turnouts: &self.turnouts };
+        let events = |recording: &Recording| recording.runs.iter().map(|run| run.events.len()).sum::<usize>();
+        with_progress("scoring", recordings.iter().map(events).sum(), |done| {
+            let nothing = Knowledge::of_layout(layout);
+            let mut knowledge = nothing.clone();
+            let mut scored = Vec::new();
+            for (path, recording) in self.logs.iter().zip(recordings) {
+                if !self.carry_on {
+                    knowledge = nothing.clone();
+                }
+                let only = self.train.map(TrainId);
+                let score = score_recording(context, recording, only, &mut knowledge)
+                    .with_context(|| path.display().to_string())?;
+                if score.runs == 0 {
+                    return Err(anyhow!(
+                        "{}: no run of train {}",
+                        path.display(),
+                        self.train.unwrap_or_default()
+                    ));
+                }
+                scored.push(score);
+                done.fetch_add(events(recording) as u64, Ordering::Relaxed);
+            }
+            Ok(scored)
+        })
+    }
+}
+
+/// Reads `6=straight`.
+fn turnout_state(text: &str) -> Result<(TurnoutId, Leg), String> {
+    let wanted =
+        || format!("`{text}` should be the number of a turnout and its leg, such as 6=straight or 7=curved");
+    let (number, leg) = text.split_once('=').ok_or_else(wanted)?;
+    let leg = match leg {
+        "straight" => Leg::Straight,
+        "curved" => Leg::Curved,
+        _ => return Err(wanted()),
+    };
+    Ok((TurnoutId(number.parse().map_err(|_| wanted())?), leg))
+}
