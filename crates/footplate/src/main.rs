@@ -1,7 +1,10 @@
 //! The program: command line, clock, sockets and threads around the crates that have none.
 
+mod clock;
 mod commands;
+mod counted;
 mod progress;
+mod reading;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

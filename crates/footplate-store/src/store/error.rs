@@ -58,6 +58,12 @@ pub enum StoreError {
         /// What was found.
         what: String,
     },
+    /// A file of which a salvage could read nothing.
+    #[error("nothing of a store can be read in {}", file.display())]
+    NothingReadable {
+        /// The file.
+        file: PathBuf,
+    },
     /// No space is left.
     #[error(
         "no space is left for the store {}; nothing of this was stored, and what was stored before is safe",

@@ -92,7 +92,7 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
             replace_list_of_tables(&copy, &fresh)?;
             let salvaged = copy_rows(&copy, &fresh)?;
             if salvaged.is_empty() {
-                return Err(StoreError::NotAStore { file: damaged.to_owned() });
+                return Err(StoreError::NothingReadable { file: damaged.to_owned() });
             }
             salvaged
         }
@@ -143,6 +143,8 @@ fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
     let mut bytes = fs::read(copy).map_err(system(copy, "read"))?;
     for page in pages {
         let range = page * size..(page + 1) * size;
+        // The file may have been cut off before the end of the list.
+        bytes.resize(bytes.len().max(range.end), 0);
         if let (Some(bytes), Some(good)) = (bytes.get_mut(range.clone()), good.get(range)) {
             bytes.copy_from_slice(good);
         }

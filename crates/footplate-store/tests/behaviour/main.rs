@@ -12,6 +12,7 @@ mod real_logs;
 mod recordings;
 mod scored_loop;
 mod store_damaged;
+mod store_of_old_versions;
 mod store_remembers;
 mod store_shared;
 mod store_survives;

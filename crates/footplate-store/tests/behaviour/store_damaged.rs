@@ -112,6 +112,16 @@ fn a_file_that_was_cut_off_keeps_what_is_left() {
 }
 
 #[test]
+fn a_file_cut_off_within_its_list_of_tables_keeps_its_recordings() {
+    let shelf = Shelf::new();
+    let whole = full(&shelf);
+    fs::write(shelf.path(), &whole[..10 * PAGE]).unwrap();
+    let salvaged = salvage(&shelf.path(), &shelf.file("new.db")).unwrap();
+    // The tables of recordings and runs are the first after the list; their rows fill less than a page each.
+    assert_eq!((rows(&salvaged, "recordings"), rows(&salvaged, "runs")), (9, 96));
+}
+
+#[test]
 fn events_whose_recording_is_lost_are_kept_under_a_stand_in() {
     let shelf = Shelf::new();
     full(&shelf);
@@ -160,7 +170,10 @@ fn salvaging_overwrites_nothing_and_invents_nothing() {
     assert!(matches!(salvage(&shelf.file("missing.db"), &into), Err(StoreError::Missing { .. })));
     for other in ["", "a letter", &"a long letter ".repeat(1000)] {
         fs::write(shelf.path(), other).unwrap();
-        assert!(matches!(salvage(&shelf.path(), &into), Err(StoreError::NotAStore { .. })), "{other:.20}");
+        assert!(
+            matches!(salvage(&shelf.path(), &into), Err(StoreError::NothingReadable { .. })),
+            "{other:.20}"
+        );
         assert!(matches!(Store::open(&shelf.path()), Err(StoreError::NotAStore { .. })) || other.is_empty());
     }
     assert!(!into.exists());

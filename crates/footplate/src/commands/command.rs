@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{calibrate, compare, completions, layout, predict, simulate};
+use super::{calibrate, compare, completions, convert, layout, predict, simulate, store};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -31,9 +31,11 @@ verbs! {
     Calibrate: calibrate,
     Compare: compare,
     Completions: completions,
+    Convert: convert,
     Layout: layout,
     Predict: predict,
     Simulate: simulate,
+    Store: store,
 }
 
 /// How a verb ended that was asked rightly.
@@ -42,6 +44,5 @@ pub(crate) enum Outcome {
     /// As wanted.
     Done,
     /// It worked, but the result is not good enough: a check failed, a target was missed.
-    #[expect(dead_code, reason = "the first verb that scores a result takes this line away")]
     FallsShort,
 }

@@ -8,9 +8,12 @@ mod calibrate;
 mod command;
 mod compare;
 mod completions;
+mod convert;
 mod layout;
 mod predict;
+mod log_file;
 mod recordings;
 mod simulate;
+mod store;
 
 pub(crate) use command::{Command, Outcome};

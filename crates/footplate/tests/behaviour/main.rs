@@ -10,4 +10,5 @@ mod predict;
 mod program;
 mod simulate;
 mod simulated;
+mod store;
 mod usage;

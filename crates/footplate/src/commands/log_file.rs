@@ -1,0 +1,30 @@
+//! A sensor log that a verb was given, read once for what it says and for its fingerprint.
+
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::Context;
+use footplate_store::{ContentHash, HashingReader, LogContext, Recording, parse_sensor_log};
+
+use crate::reading::ProgressReader;
+
+/// A sensor log and the fingerprint of its file.
+pub(crate) struct LogFile {
+    pub(crate) recording: Recording,
+    pub(crate) content: ContentHash,
+}
+
+impl LogFile {
+    /// Reads a log, shows how far it is if that takes long, and says on standard error what was odd in it.
+    pub(crate) fn read(path: &Path, context: LogContext<'_>) -> anyhow::Result<Self> {
+        let reading = || format!("reading {}", path.display());
+        let file = ProgressReader::open(path).with_context(reading)?;
+        let mut input = BufReader::new(HashingReader::new(file));
+        let recording = parse_sensor_log(path, &mut input, context)?;
+        let content = input.into_inner().finish().with_context(reading)?;
+        for note in &recording.notes {
+            eprintln!("{}, {note}", path.display());
+        }
+        Ok(Self { recording, content })
+    }
+}

@@ -1,0 +1,51 @@
+//! `footplate store salvage`: what can still be read of a damaged store.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use footplate_store::salvage;
+use serde_json::{Value, json};
+
+use crate::commands::Outcome;
+
+/// Copy what can be read of a damaged store into a new one. The damaged file is left as it is.
+#[derive(Args)]
+#[command(after_help = "Example: footplate store salvage --store railway.db --out salvaged.db\n\n\
+                  Exit status: 0 nothing is known to be lost, 1 something is, 2 nothing can be read.")]
+pub(super) struct Arguments {
+    /// The store to make.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    pub(super) fn run(self, store: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let salvaged = salvage(store, &self.out)?;
+        if self.json {
+            let tables = salvaged.tables.iter().map(|table| {
+                let counts = json!({ "rows": table.rows, "lost": table.lost, "stand_ins": table.stand_ins });
+                (table.name.to_owned(), counts)
+            });
+            let tables: Value = tables.collect::<serde_json::Map<_, _>>().into();
+            writeln!(output, "{}", json!({ "file": self.out, "tables": tables }))?;
+        } else {
+            writeln!(output, "{}", self.out.display())?;
+            for table in &salvaged.tables {
+                write!(output, "  {:<12} {:>9} rows", table.name, table.rows)?;
+                if table.lost > 0 {
+                    write!(output, ", {} lost", table.lost)?;
+                }
+                if table.stand_ins > 0 {
+                    write!(output, ", {} stand-ins for what they belong to", table.stand_ins)?;
+                }
+                writeln!(output)?;
+            }
+        }
+        let lost = salvaged.tables.iter().any(|table| table.lost + table.stand_ins > 0);
+        Ok(if lost { Outcome::FallsShort } else { Outcome::Done })
+    }
+}

@@ -1,0 +1,221 @@
+//! `footplate store show`: what is in a store, as of today or any other date.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::bail;
+use clap::Args;
+use footplate_core::{EventKind, SensorId, Timestamp};
+use footplate_store::{
+    RecordingKey, SensorNames, Store, StoredEvent, StoredRecording, StoredRun, layout_named,
+};
+use serde_json::{Value, json};
+
+use crate::clock::{Moment, local, now, rfc3339};
+use crate::commands::Outcome;
+use crate::counted::counted;
+
+/// Show what is in the store, and look whether the file is sound.
+#[derive(Args)]
+#[command(after_help = "Example: footplate store show --recording 3 --events --as-of 2026-11-20")]
+pub(super) struct Arguments {
+    /// The runs of this recording.
+    #[arg(long, value_name = "N")]
+    recording: Option<i64>,
+    /// Every event of the recording as well.
+    #[arg(long, requires = "recording")]
+    events: bool,
+    /// As it was at this date.
+    #[arg(long, value_name = "DATE")]
+    as_of: Option<Moment>,
+    /// Write JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    pub(super) fn run(self, path: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let store = Store::open(path)?;
+        store.check()?;
+        let as_of = self.as_of.map_or_else(now, |moment| moment.0);
+        let recordings = store.recordings(as_of)?;
+        let Some(key) = self.recording.map(RecordingKey) else {
+            if self.json {
+                let list: Vec<Value> = recordings.iter().map(recording_value).collect();
+                let list = json!({ "store": path, "as_of": rfc3339(as_of), "recordings": list });
+                writeln!(output, "{list:#}")?;
+            } else {
+                write_list(path, &recordings, output)?;
+            }
+            return Ok(Outcome::Done);
+        };
+        let runs = store.runs(key, as_of)?;
+        let Some(recording) = recordings.iter().find(|recording| recording.key == key) else {
+            bail!("recording {key} was not in the store yet on {}", local(as_of));
+        };
+        // The layout may be a file that is not here; its sensors then go by their numbers.
+        let layout = layout_named(&recording.layout).ok().map(|file| file.layout);
+        let names = layout.as_ref().map(|layout| layout as &dyn SensorNames);
+        if self.json {
+            let mut value = recording_value(recording);
+            value["runs"] = runs.iter().map(|run| run_value(run, self.events, names)).collect();
+            writeln!(output, "{value:#}")?;
+        } else {
+            write_runs(recording, &runs, output)?;
+            if self.events {
+                write_events(&runs, names, output)?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn write_list(path: &Path, recordings: &[StoredRecording], output: &mut dyn Write) -> std::io::Result<()> {
+    let sum = |count: fn(&StoredRecording) -> u64| recordings.iter().map(count).sum::<u64>();
+    let counts = [
+        counted(recordings.len(), "recording"),
+        counted(sum(|recording| recording.runs), "run"),
+        counted(sum(|recording| recording.events), "event"),
+    ];
+    let excluded = sum(|recording| recording.excluded);
+    writeln!(output, "{} is sound: {}, {excluded} excluded", path.display(), counts.join(", "))?;
+    if recordings.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        output,
+        "\nrecording  stored               runs   events  excluded  layout        form           name"
+    )?;
+    for recording in recordings {
+        writeln!(
+            output,
+            "{:>9}  {}  {:>4}  {:>7}  {:>8}  {:<12}  {:<13}  {}",
+            recording.key,
+            local(recording.stored_at),
+            recording.runs,
+            recording.events,
+            recording.excluded,
+            recording.layout,
+            recording.form,
+            recording.name
+        )?;
+    }
+    Ok(())
+}
+
+fn write_runs(
+    recording: &StoredRecording,
+    runs: &[StoredRun],
+    output: &mut dyn Write,
+) -> std::io::Result<()> {
+    let StoredRecording { key, name, form, layout, .. } = recording;
+    writeln!(output, "recording {key}: {name}, {form} on {layout}, stored {}", local(recording.stored_at))?;
+    writeln!(output, "\n  run  events         excluded  lasts       at its beginning")?;
+    for run in runs {
+        let numbers = match (run.events.first(), run.events.last()) {
+            (Some(first), Some(last)) => format!("{}-{}", first.key, last.key),
+            _ => "none".to_owned(),
+        };
+        let excluded = run.events.iter().filter(|stored| stored.is_excluded()).count();
+        let trains: Vec<String> = run
+            .trains
+            .iter()
+            .map(|at_start| format!("train {} at step {}", at_start.train, at_start.step))
+            .collect();
+        let lasts = lasts(run);
+        writeln!(
+            output,
+            "{:>5}  {numbers:<13}  {excluded:>8}  {lasts:>8.3} s  {}",
+            run.id,
+            trains.join(", ")
+        )?;
+    }
+    Ok(())
+}
+
+/// From the first event to the last, in seconds.
+fn lasts(run: &StoredRun) -> f64 {
+    match (run.events.first(), run.events.last()) {
+        (Some(first), Some(last)) => (last.raw.event.time - first.raw.event.time).as_s(),
+        _ => 0.0,
+    }
+}
+
+fn write_events(
+    runs: &[StoredRun],
+    names: Option<&dyn SensorNames>,
+    output: &mut dyn Write,
+) -> std::io::Result<()> {
+    writeln!(output, "\n  event    run          time  what")?;
+    for run in runs {
+        for stored in &run.events {
+            let time = (stored.raw.event.time - Timestamp::ZERO).as_s();
+            write!(output, "{:>7}  {:>5}  {time:>10.3} s  ", stored.key, run.id)?;
+            write!(output, "{}", words(stored.raw.event.kind, names))?;
+            match &stored.mark {
+                Some(mark) if stored.is_excluded() => {
+                    writeln!(output, "; excluded {}: {}", local(mark.made_at), mark.reason)?;
+                }
+                _ => writeln!(output)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+fn words(kind: EventKind, names: Option<&dyn SensorNames>) -> String {
+    match kind {
+        EventKind::Sensor(report) => format!("sensor {}", sensor_name(report.sensor, names)),
+        EventKind::Speed { train, step } => format!("train {train} to step {step}"),
+        EventKind::Reverse { train } => format!("train {train} reversed"),
+        EventKind::Turnout { turnout, curved } => {
+            format!("turnout {turnout} {}", if curved { "curved" } else { "straight" })
+        }
+        EventKind::Stopped { train, landmark, offset } => {
+            let landmark = sensor_name(landmark, names);
+            format!("train {train} stopped {:.0} mm past {landmark}", offset.as_mm())
+        }
+    }
+}
+
+fn sensor_name(sensor: SensorId, names: Option<&dyn SensorNames>) -> String {
+    names.and_then(|names| names.name_of(sensor)).unwrap_or_else(|| sensor.to_string())
+}
+
+fn recording_value(recording: &StoredRecording) -> Value {
+    json!({
+        "recording": recording.key.0,
+        "name": recording.name,
+        "form": recording.form,
+        "layout": recording.layout,
+        "stored_at": rfc3339(recording.stored_at),
+        "run_count": recording.runs,
+        "event_count": recording.events,
+        "excluded_count": recording.excluded,
+    })
+}
+
+fn run_value(run: &StoredRun, with_events: bool, names: Option<&dyn SensorNames>) -> Value {
+    let trains = run.trains.iter().map(|at_start| json!({ "train": at_start.train, "step": at_start.step }));
+    let mut value = json!({
+        "run": run.id,
+        "began_at": run.began_at.map(rfc3339),
+        "trains": trains.collect::<Value>(),
+        "event_count": run.events.len(),
+        "gate_passes": run.gates.len(),
+    });
+    if with_events {
+        value["events"] = run.events.iter().map(|stored| event_value(stored, names)).collect();
+    }
+    value
+}
+
+fn event_value(stored: &StoredEvent, names: Option<&dyn SensorNames>) -> Value {
+    json!({
+        "event": stored.key.0,
+        "line": stored.raw.line,
+        "t_s": (stored.raw.event.time - Timestamp::ZERO).as_s(),
+        "what": words(stored.raw.event.kind, names),
+        "excluded": stored.mark.as_ref().filter(|_| stored.is_excluded()).map(|mark| &mark.reason),
+    })
+}

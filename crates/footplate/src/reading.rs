@@ -1,0 +1,55 @@
+//! How far a file has been read, shown to a person who would otherwise wait in doubt.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// What ends sooner shows no bar.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A file that shows on standard error how far it has been read, if that takes long and is a terminal.
+pub(crate) struct ProgressReader {
+    file: File,
+    bar: ProgressBar,
+    shown: bool,
+}
+
+impl ProgressReader {
+    /// Opens the file at `path`.
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
+        let file = File::open(path)?;
+        let length = file.metadata()?;
+        if length.is_dir() {
+            return Err(io::Error::other("it is a folder"));
+        }
+        let bar = ProgressBar::with_draw_target(Some(length.len()), ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {bytes} of {total_bytes}, {eta} left")
+        {
+            bar.set_style(style);
+        }
+        bar.set_message(path.display().to_string());
+        Ok(Self { file, bar, shown: false })
+    }
+}
+
+impl Read for ProgressReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        self.bar.inc(count as u64);
+        if !self.shown && self.bar.elapsed() >= PATIENCE {
+            self.shown = true;
+            // Nothing is drawn where standard error is no terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        Ok(count)
+    }
+}
+
+impl Drop for ProgressReader {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
