@@ -10,6 +10,7 @@
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
 #   examples     the numbered examples print what is committed in testdata/examples
 #   scenarios    the tables in docs/tables are what the program prints
+#   browser      a report opens in a browser: every chart drawn, dark and light, on a phone, by keyboard
 #
 # And one that changes files, never part of "every step":
 #
@@ -22,7 +23,7 @@ shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")"
 export PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 
-readonly ALL_STEPS=(lint test bare-metal docs examples scenarios)
+readonly ALL_STEPS=(lint test bare-metal docs examples scenarios browser)
 readonly EXPECTED_EXAMPLES=testdata/examples
 readonly TABLES=docs/tables
 readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
@@ -150,6 +151,20 @@ check_table() {
 step_scenarios() {
   need_compiler
   each_table check_table
+}
+
+# The exact version, so that a test that fails today fails tomorrow.
+readonly PLAYWRIGHT=playwright-core@1.65.1
+
+step_browser() {
+  need_compiler
+  need chromium chromium
+  need node nodejs
+  need npm npm
+  local at="$TARGET/browser"
+  [[ -d $at/node_modules/playwright-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT"
+  cargo build --quiet --profile test -p footplate
+  FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test tests/browser/
 }
 
 refresh_table() {

@@ -176,7 +176,7 @@ fn compare_all(fit: &JointFit, seen: &[Transient]) -> BTreeMap<(TrainId, Directi
 }
 
 /// The speeds of all steps of a train for a ramp through them, gaps on straight lines; `None` below three.
-fn step_table(fit: &JointFit, train: TrainId) -> Option<StepTable> {
+pub(super) fn step_table(fit: &JointFit, train: TrainId) -> Option<StepTable> {
     let known: Vec<(u8, f64)> = core::iter::once((0, 0.0))
         .chain((1..=SpeedStep::HIGHEST).filter_map(|number| {
             let step = SpeedStep::new(number)?;

@@ -110,7 +110,7 @@ pub fn compare_laws(changes: &[Transient], table: Option<&StepTable>) -> Option<
 }
 
 /// The motion of a change under a law, since its effect began.
-fn motion<'t>(
+pub(super) fn motion<'t>(
     kind: LawKind,
     pace: f64,
     change: &Transient,
@@ -133,7 +133,7 @@ fn motion<'t>(
 }
 
 /// Way and speed at a time since the command.
-fn at(motion: &impl Motion, from: f64, since_effect: f64) -> (f64, f64) {
+pub(super) fn at(motion: &impl Motion, from: f64, since_effect: f64) -> (f64, f64) {
     if since_effect <= 0.0 {
         return (from * since_effect, from);
     }
@@ -156,7 +156,7 @@ fn total_cost(all: &[(f64, f64)]) -> f64 {
 }
 
 /// Residuals of one change over their standard deviations, and in m, `x0` eliminated.
-fn residuals(ways: &[(f64, f64)], change: &Transient) -> Vec<(f64, f64)> {
+pub(super) fn residuals(ways: &[(f64, f64)], change: &Transient) -> Vec<(f64, f64)> {
     let weights: Vec<f64> = change
         .points
         .iter()

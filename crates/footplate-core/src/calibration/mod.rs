@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod drift_test;
+mod fitted_change;
 mod joint_fit;
 mod law_family;
 mod law_fit;
@@ -17,6 +18,7 @@ mod transient;
 
 pub use calibrate::{Calibration, Hysteresis};
 pub use drift_test::{Drift, DriftTest};
+pub use fitted_change::FittedChange;
 pub use joint_fit::{FittedPassage, JointFit, SpeedKey};
 pub use law_family::{Constant, LawFamily};
 pub use law_fit::{FittedLaw, LawComparison, LawKind, compare_laws};

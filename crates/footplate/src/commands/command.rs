@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{calibrate, compare, completions, convert, layout, predict, simulate, store};
+use super::{calibrate, compare, completions, convert, layout, predict, report, simulate, store};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -34,6 +34,7 @@ verbs! {
     Convert: convert,
     Layout: layout,
     Predict: predict,
+    Report: report,
     Simulate: simulate,
     Store: store,
 }

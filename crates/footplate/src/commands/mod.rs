@@ -13,6 +13,7 @@ mod layout;
 mod predict;
 mod log_file;
 mod recordings;
+mod report;
 mod simulate;
 mod store;
 

@@ -8,6 +8,7 @@ mod forecasts_hold;
 mod layout;
 mod predict;
 mod program;
+mod report;
 mod simulate;
 mod simulated;
 mod store;

@@ -1,0 +1,288 @@
+// Draws the charts of a report from the data inside the page. uPlot draws lines; error bars are drawn here.
+
+const report = JSON.parse(document.getElementById("report").textContent);
+const trains = new Map(report.trains.map((train) => [String(train.calibration.train), train]));
+/** Pixels of a chart's height; strips below a chart are lower. */
+const HEIGHT = 280;
+const STRIP = 190;
+/** Charts drawn so far, by figure, to be taken down when colours change. */
+const drawn = new Map();
+
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const rounded = (value, digits) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
+const withUnit = (unit, digits) => (_, value) => (value == null ? "–" : `${rounded(value, digits)} ${unit}`);
+
+/** Error bars on both axes: { x, y, dx, dy }, one standard deviation each. */
+function errorBars(points, name) {
+  return (u) => {
+    const { ctx, bbox } = u;
+    const cap = 3 * devicePixelRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.strokeStyle = colour(name);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.beginPath();
+    for (const { x, y, dx, dy } of points) {
+      const [cx, cy] = [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
+      if (dy) {
+        const [low, high] = [u.valToPos(y - dy, "y", true), u.valToPos(y + dy, "y", true)];
+        ctx.moveTo(cx, low); ctx.lineTo(cx, high);
+        ctx.moveTo(cx - cap, low); ctx.lineTo(cx + cap, low);
+        ctx.moveTo(cx - cap, high); ctx.lineTo(cx + cap, high);
+      }
+      if (dx) {
+        const [left, right] = [u.valToPos(x - dx, "x", true), u.valToPos(x + dx, "x", true)];
+        ctx.moveTo(left, cy); ctx.lineTo(right, cy);
+        ctx.moveTo(left, cy - cap); ctx.lineTo(left, cy + cap);
+        ctx.moveTo(right, cy - cap); ctx.lineTo(right, cy + cap);
+      }
+    }
+    ctx.stroke();
+    ctx.restore();
+  };
+}
+
+/** A level line at nought. */
+function zeroLine(u) {
+  const y = Math.round(u.valToPos(0, "y", true));
+  if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) return;
+  u.ctx.save();
+  u.ctx.strokeStyle = colour("quiet");
+  u.ctx.setLineDash([4 * devicePixelRatio, 4 * devicePixelRatio]);
+  u.ctx.beginPath();
+  u.ctx.moveTo(u.bbox.left, y);
+  u.ctx.lineTo(u.bbox.left + u.bbox.width, y);
+  u.ctx.stroke();
+  u.ctx.restore();
+}
+
+const line = (label, name, unit, digits) => ({
+  label, stroke: colour(name), width: 2, spanGaps: true, points: { show: false }, value: withUnit(unit, digits),
+});
+/** Points without a line; `told` says by x what a reader should know of a point. */
+const dots = (label, name, unit, digits, told = new Map()) => ({
+  label, stroke: colour(name), paths: () => null, snaps: true,
+  points: { show: true, size: 7, fill: colour(name), stroke: colour("card"), width: 1 },
+  value: (u, value, _, index) => {
+    if (value == null) return "–";
+    const more = told.get(u.data[0][index]);
+    return `${rounded(value, digits)} ${unit}${more ? ` (${more})` : ""}`;
+  },
+});
+
+/** The index of the nearest value that a series has: points stand far between the samples of a curve. */
+function nearest(u, series, index) {
+  const values = u.data[series];
+  if (!u.series[series].snaps || values[index] != null) return index;
+  for (let away = 1; away < values.length; away++) {
+    if (values[index - away] != null) return index - away;
+    if (values[index + away] != null) return index + away;
+  }
+  return index;
+}
+
+function axis(label, more) {
+  const font = "12px system-ui, sans-serif";
+  return {
+    label, stroke: colour("text"), font, labelFont: font, labelSize: 22, size: more?.vertical ? 58 : 40,
+    grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 },
+    values: (_, splits) => splits.map((value) => (value == null ? "" : String(value).replace("-", "−"))),
+    ...more,
+  };
+}
+
+/** Puts a chart into a figure. Arrow keys move the cursor, Escape shows all again. */
+function chart(figure, { name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks }) {
+  const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
+  const u = new uPlot({
+    width: figure.clientWidth - 2 * parseFloat(getComputedStyle(figure).paddingLeft), height,
+    cursor: {
+      dataIdx: nearest, y: false, drag: { x: true, y: false }, points: { size: 9 },
+      ...(sync && { sync: { key: sync, scales: ["x", null] } }),
+    },
+    legend: { live: true },
+    scales: { x: { time: false, ...range?.x }, y: { ...range?.y } },
+    axes: [axis(x.label, { incrs: ticks }), axis(y, { vertical: true })],
+    series: [{ label: x.label.split(" (")[0], value: withUnit(x.unit, x.digits) }, ...series],
+    bands,
+    hooks: { drawAxes: zero ? [zeroLine] : [], draw },
+  }, data, figure);
+  u.over.tabIndex = 0;
+  u.over.setAttribute("role", "application");
+  u.over.setAttribute("aria-label", `${name}. Arrow keys move along the values, Escape shows all.`);
+  u.over.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (step) {
+      const last = u.data[0].length - 1;
+      const index = Math.min(Math.max((u.cursor.idx ?? (step > 0 ? -1 : last + 1)) + step, 0), last);
+      u.setCursor({ left: u.valToPos(u.data[0][index], "x"), top: u.bbox.height / 2 / devicePixelRatio });
+      event.preventDefault();
+    } else if (event.key === "Escape") {
+      u.setData(u.data, true);
+    }
+  });
+  drawn.get(figure).push(u);
+  return u;
+}
+
+const APPROACHES = [
+  ["below", "reached from below", "first", -0.12],
+  ["above", "reached from above", "second", 0.12],
+  ["unknown", "side not recorded", "third", 0],
+];
+
+function speeds(figure, train) {
+  const all = train.calibration.speeds;
+  const parts = APPROACHES.map(([approach, label, name, shift]) => {
+    const own = all.filter((speed) => speed.approach.toLowerCase() === approach);
+    const points = own.map(({ step, speed }) => ({ x: step + shift, y: speed.value, dy: speed.uncertainty }));
+    const told = new Map(points.map(({ x, dy }, place) =>
+      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} hops`]));
+    return { label, name, points, told };
+  }).filter(({ points }) => points.length > 0);
+  const data = uPlot.join(parts.map(({ points }) => [points.map(({ x }) => x), points.map(({ y }) => y)]));
+  const steps = all.map(({ step }) => step);
+  chart(figure, {
+    name: "Speed by throttle step",
+    x: { label: "throttle step", unit: "", digits: 0 }, y: "speed (mm/s)", data, ticks: [1, 2, 5],
+    range: { x: { range: [Math.min(...steps) - 0.6, Math.max(...steps) + 0.6] }, y: { range: (_, __, high) => [0, high * 1.08] } },
+    series: parts.map(({ label, name, told }) => dots(label, name, "mm/s", 1, told)),
+    bars: parts.map(({ points, name }) => [points, name]),
+  });
+}
+
+function change(figure, train) {
+  const key = `change-${train.calibration.train}`;
+  const pick = document.createElement("p");
+  pick.className = "pick";
+  const label = document.createElement("label");
+  label.textContent = "Change shown ";
+  const select = document.createElement("select");
+  train.changes.forEach(({ title }, place) => select.add(new Option(title, place)));
+  select.value = figure.dataset.shown ?? train.changes.length - 1;
+  label.append(select);
+  pick.append(label);
+  figure.append(pick);
+  select.addEventListener("change", () => {
+    figure.dataset.shown = select.value;
+    redraw(figure);
+    figure.querySelector("select").focus();
+  });
+
+  const shown = train.changes[select.value];
+  const { contacts } = shown;
+  const times = contacts.map(({ time_s }) => time_s);
+  const told = new Map(contacts.map(({ time_s, told_by }) => [time_s, told_by]));
+  const x = { label: "since the command (s)", unit: "s", digits: 2 };
+  // All four charts begin and end together, whatever each of them holds; a zoomed range is taken as it is.
+  const [begins, ends] = [shown.time_s[0], shown.time_s.at(-1)];
+  const whole = [begins - 0.02 * (ends - begins), ends + 0.02 * (ends - begins)];
+  const range = { x: { range: (u, low, high) => (low <= u.data[0][0] && high >= u.data[0].at(-1) ? whole : [low, high]) } };
+  const curve = (values) => [shown.time_s, values];
+  chart(figure, {
+    name: "Way since the command", x, y: "way (mm)", sync: key, range,
+    data: uPlot.join([curve(shown.way_mm), [times, contacts.map(({ way_mm }) => way_mm)]]),
+    series: [line("law", "first", "mm", 0), dots("contact", "second", "mm", 0, told)],
+    bars: [[contacts.map(({ time_s, way_mm, doubt_s }) => ({ x: time_s, y: way_mm, dx: doubt_s })), "second"]],
+  });
+  const reach = 1.15 * Math.max(5, ...contacts.map(({ residual_mm, doubt_mm }) => Math.abs(residual_mm) + doubt_mm));
+  chart(figure, {
+    name: "How far contacts lie beyond the law", x, y: "beyond the law (mm)", sync: key, height: STRIP, zero: true,
+    range: { ...range, y: { range: [-reach, reach] } },
+    data: [times, contacts.map(({ residual_mm }) => residual_mm)],
+    series: [dots("beyond the law", "second", "mm", 1, told)],
+    bars: [[contacts.map(({ time_s, residual_mm, doubt_mm }) => ({ x: time_s, y: residual_mm, dy: doubt_mm })), "second"]],
+  });
+  const means = contacts.filter(({ mean_speed }) => mean_speed);
+  chart(figure, {
+    name: "Speed since the command", x, y: "speed (mm/s)", sync: key, height: STRIP, range,
+    data: uPlot.join([curve(shown.speed_mm_s), [means.map(({ mean_speed }) => mean_speed[0]), means.map(({ mean_speed }) => mean_speed[1])]]),
+    series: [line("law", "first", "mm/s", 0), dots("mean between two contacts", "second", "mm/s", 0)],
+  });
+  chart(figure, {
+    name: "Acceleration since the command", x, y: "acceleration (mm/s²)", sync: key, height: STRIP, range, zero: true,
+    data: curve(shown.acceleration_mm_s2), series: [line("law", "first", "mm/s²", 0)],
+  });
+}
+
+function forecasts(figure, train) {
+  const points = train.forecasts.filter(({ late_ms }) => late_ms != null);
+  if (points.length === 0) {
+    figure.append("Nothing could be forecast yet.");
+    return;
+  }
+  const numbers = points.map((_, place) => place + 1);
+  const told = new Map(points.map(({ sensor, step, phase, recording, line: row }, place) =>
+    [place + 1, `${sensor} at step ${step}, ${phase}, ${recording}:${row}`]));
+  for (const [late, half, unit] of [["late_mm", "half_90_mm", "mm"], ["late_ms", "half_90_ms", "ms"]]) {
+    const values = points.map((point) => point[late]);
+    const widths = points.map((point) => point[half]);
+    // A single wild forecast must not flatten all others: the axis holds 98 in 100.
+    const sizes = points.map((point) => Math.max(Math.abs(point[late]), point[half])).sort((a, b) => a - b);
+    const reach = 1.2 * sizes[Math.floor(0.98 * (sizes.length - 1))];
+    const digits = unit === "mm" ? 1 : 0;
+    const upper = { ...line("90 % interval", "band", unit, digits), width: 1, value: (_, value) => (value == null ? "–" : `± ${rounded(value, digits)} ${unit}`) };
+    const lower = { ...upper, class: "unlisted" };
+    const later = dots("later", "first", unit, digits, unit === "mm" ? told : undefined);
+    chart(figure, {
+      name: `Forecast error in ${unit}`, zero: true, sync: `forecasts-${train.calibration.train}`, height: unit === "mm" ? HEIGHT : STRIP + 30,
+      x: { label: "forecast number", unit: "", digits: 0 }, y: `later than forecast (${unit})`, ticks: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000],
+      range: { y: { range: [-reach, reach] } }, data: [numbers, widths, widths.map((width) => -width), values],
+      series: [upper, lower, { ...later, points: { ...later.points, size: 5 } }],
+      bands: [{ series: [1, 2], fill: colour("band") }],
+    });
+  }
+}
+
+function stops(figure, train) {
+  const steps = train.calibration.stops.steps;
+  const points = steps.map(({ speed_mm_per_s, distance }) => ({ x: speed_mm_per_s, y: distance.value, dy: distance.uncertainty }));
+  const told = new Map(steps.map(({ step, speed_mm_per_s, distance }) =>
+    [speed_mm_per_s, `± ${rounded(distance.uncertainty, 0)}, step ${step}`]));
+  points.sort((one, other) => one.x - other.x);
+  const law = train.stop_curve;
+  const fastest = Math.max(...points.map(({ x }) => x), ...law.map(([speed]) => speed));
+  const furthest = Math.max(...points.map(({ y, dy }) => y + dy), ...law.map(([, way]) => way));
+  chart(figure, {
+    name: "Stopping distance by speed",
+    x: { label: "speed before the stop (mm/s)", unit: "mm/s", digits: 0 }, y: "distance (mm)",
+    range: { x: { range: [0, fastest] }, y: { range: [0, 1.05 * furthest] } },
+    data: uPlot.join([[law.map(([speed]) => speed), law.map(([, way]) => way)], [points.map(({ x }) => x), points.map(({ y }) => y)]]),
+    series: [line("law", "first", "mm", 0), dots("measured", "second", "mm", 0, told)],
+    bars: [[points, "second"]],
+  });
+}
+
+const KINDS = { speeds, change, forecasts, stops };
+
+function redraw(figure) {
+  for (const u of drawn.get(figure) ?? []) u.destroy();
+  drawn.set(figure, []);
+  for (const child of [...figure.children].slice(1)) child.remove();
+  KINDS[figure.dataset.chart](figure, trains.get(figure.dataset.train));
+}
+
+const figures = [...document.querySelectorAll("figure[data-chart]")];
+const widths = new Map();
+const watch = new ResizeObserver((entries) => {
+  for (const { target, contentRect } of entries) {
+    if (widths.get(target) === contentRect.width) continue;
+    widths.set(target, contentRect.width);
+    for (const u of drawn.get(target) ?? []) u.setSize({ width: contentRect.width, height: u.height });
+  }
+});
+for (const figure of figures) {
+  redraw(figure);
+  watch.observe(figure);
+}
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => figures.forEach(redraw));
+addEventListener("beforeprint", () => {
+  document.documentElement.dataset.paper = "";
+  figures.forEach(redraw);
+});
+addEventListener("afterprint", () => {
+  delete document.documentElement.dataset.paper;
+  figures.forEach(redraw);
+});

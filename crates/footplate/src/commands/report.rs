@@ -1,0 +1,123 @@
+//! `footplate report`: what is known of trains as one page with charts that opens in any browser, without a network.
+
+mod charts;
+mod data;
+mod forecasts;
+mod health;
+mod markup;
+mod page;
+mod tables;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use footplate_core::track::Layout;
+use footplate_core::{Timestamp, TrainId};
+use footplate_store::{Batch, CalibrationFile, ModuleLetters, Run, Store, layout_named, write_whole};
+
+use super::Outcome;
+use super::recordings::read_all;
+use data::{ReportData, TrainReport};
+
+/// Write a page with charts of what recordings show.
+///
+/// For every train: how it fares, speed by throttle step, the law by which it changes speed against the contacts
+/// measured, how far forecasts were off, stops, corrected lengths and suspicious measurements. The page is one
+/// file, needs no network, and the same input makes the same bytes.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  footplate report testdata/sensor-logs/*train24*.csv --layout track-a --out report.html")]
+pub(crate) struct Arguments {
+    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
+    #[arg(value_name = "LOG", required_unless_present = "store", conflicts_with = "store")]
+    logs: Vec<PathBuf>,
+    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    #[arg(long, value_name = "LAYOUT")]
+    layout: String,
+    /// Only this train; also the train of logs that name none.
+    #[arg(long, value_name = "N")]
+    train: Option<u16>,
+    /// Report on all that this store holds of the layout instead, less what was excluded.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+    /// The page to write (HTML).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// The runs of one recording, however they were kept.
+struct Session {
+    name: String,
+    runs: Vec<Run>,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let train = self.train.map(TrainId);
+        let (sessions, batch) = match &self.store {
+            Some(path) => of_store(&layout, &Store::open(path)?, train)?,
+            None => {
+                let recordings = read_all(&self.logs, &ModuleLetters, train)?;
+                let batch = Batch::of_recordings(&layout, &recordings, train)?;
+                let session = |recording: footplate_store::Recording| Session {
+                    name: recording.name,
+                    runs: recording.runs,
+                };
+                (recordings.into_iter().map(session).collect(), batch)
+            }
+        };
+        let data = gather(&layout, &sessions, &batch)?;
+        write_whole(&self.out, page::page(&data)?.as_bytes())
+            .with_context(|| format!("writing {}", self.out.display()))?;
+        for train in &data.trains {
+            let health = &train.health;
+            writeln!(
+                output,
+                "train {}: {}, {}",
+                train.calibration.train,
+                health.state.word(),
+                health.summary
+            )?;
+        }
+        writeln!(output, "{}: open it in a browser", self.out.display())?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// All that a store holds of a layout. No clock is asked: whatever is in it was there before.
+fn of_store(layout: &Layout, store: &Store, train: Option<TrainId>) -> anyhow::Result<(Vec<Session>, Batch)> {
+    let now = Timestamp::from_ns(i64::MAX);
+    let mut sessions = Vec::new();
+    for recording in store.recordings(now)?.into_iter().filter(|recording| recording.layout == layout.name())
+    {
+        let runs = store.runs(recording.key, now)?;
+        sessions.push(Session {
+            name: recording.name,
+            runs: runs.iter().map(footplate_store::StoredRun::accepted).collect(),
+        });
+    }
+    Ok((sessions, Batch::of_store(layout, store, now, train)?))
+}
+
+fn gather(layout: &Layout, sessions: &[Session], batch: &Batch) -> anyhow::Result<ReportData> {
+    let file = CalibrationFile::of(layout, batch);
+    let trains = file.trains.iter().map(|form| {
+        let forecasts = forecasts::of_train(layout, sessions, form.train)?;
+        Ok(TrainReport {
+            health: health::of(form.train, batch, &forecasts),
+            changes: charts::changes(batch, form.train),
+            stop_curve: form.stops.as_ref().map(charts::stop_curve).unwrap_or_default(),
+            calibration: form.clone(),
+            forecasts,
+        })
+    });
+    Ok(ReportData {
+        trains: trains.collect::<anyhow::Result<_>>()?,
+        layout: file.layout.clone(),
+        polling: file.polling,
+    })
+}

@@ -1,0 +1,82 @@
+//! Curves for charts: changes of speed under their law, and the law of stopping distance.
+
+use footplate_core::calibration::Transient;
+use footplate_core::{TimeSpan, TrainId};
+use footplate_store::{Batch, StopForm};
+
+use super::data::{ChangeChart, ContactPoint};
+
+/// Changes shown for each direction, spread over the steps there are.
+const SHOWN: usize = 4;
+/// Points of a curve (chosen: one every few pixels).
+const SAMPLES: usize = 160;
+
+pub(super) fn changes(batch: &Batch, train: TrainId) -> Vec<ChangeChart> {
+    let mut own: Vec<&Transient> =
+        batch.calibration.transients.iter().filter(|change| change.train == train).collect();
+    own.sort_by_key(|change| (change.direction(), change.steps, change.run));
+    let directions = own.chunk_by(|one, next| one.direction() == next.direction());
+    directions.flat_map(spread_out).filter_map(|change| chart(batch, change)).collect()
+}
+
+/// The first, the last, and some between them at equal distances.
+fn spread_out<'a>(changes: &[&'a Transient]) -> Vec<&'a Transient> {
+    let shown = changes.len().min(SHOWN);
+    let place = |number: usize| number * (changes.len() - 1) / shown.saturating_sub(1).max(1);
+    (0..shown).filter_map(|number| changes.get(place(number)).copied()).collect()
+}
+
+fn chart(batch: &Batch, change: &Transient) -> Option<ChangeChart> {
+    let ends = change.points.iter().map(|point| point.since_command).fold(0.0, f64::max);
+    let begins = change.points.iter().map(|point| point.since_command).fold(0.0, f64::min);
+    let times: Vec<TimeSpan> = (0..=SAMPLES)
+        .map(|number| TimeSpan::from_s(begins + (ends - begins) * number as f64 / SAMPLES as f64))
+        .collect();
+    let fitted = batch.calibration.fitted_change(change, &times)?;
+    let at_contacts: Vec<TimeSpan> =
+        change.points.iter().map(|point| TimeSpan::from_s(point.since_command)).collect();
+    let there = batch.calibration.fitted_change(change, &at_contacts)?;
+    let run = batch.runs.get(change.run)?;
+    let mut before: Option<(f64, f64)> = None;
+    let mut contacts = Vec::with_capacity(change.points.len());
+    for ((point, residual), state) in change.points.iter().zip(&fitted.residuals).zip(&there.states) {
+        let way_mm = 1e3 * point.way;
+        let mean_speed = before.and_then(|(time, way)| {
+            let took = point.since_command - time;
+            (took > 0.0).then(|| [f64::midpoint(time, point.since_command), (way_mm - way) / took])
+        });
+        before = Some((point.since_command, way_mm));
+        let speed = state.speed.as_m_per_s();
+        contacts.push(ContactPoint {
+            time_s: point.since_command,
+            doubt_s: point.variance.sqrt(),
+            way_mm,
+            residual_mm: residual.as_mm(),
+            doubt_mm: 1e3 * (speed * speed * point.variance + change.way_doubt * change.way_doubt).sqrt(),
+            mean_speed,
+            told_by: batch
+                .event(change.run, point.entry)
+                .map_or_else(String::new, |event| format!("{}:{}", run.recording, event.line)),
+        });
+    }
+    let [from, to] = change.steps;
+    Some(ChangeChart {
+        title: format!("step {from} to {to}, {} run {}", run.recording, run.id),
+        time_s: times.iter().map(|time| time.as_s()).collect(),
+        way_mm: fitted.states.iter().map(|state| state.distance.as_mm()).collect(),
+        speed_mm_s: fitted.states.iter().map(|state| state.speed.as_mm_per_s()).collect(),
+        acceleration_mm_s2: fitted.states.iter().map(|state| state.acceleration.as_mm_per_s2()).collect(),
+        contacts,
+    })
+}
+
+/// Speed and distance of the two-term law, up to a tenth beyond the fastest stop.
+pub(super) fn stop_curve(stops: &StopForm) -> Vec<[f64; 2]> {
+    let Some(law) = &stops.law else { return Vec::new() };
+    let fastest = stops.steps.iter().map(|step| step.speed_mm_per_s).fold(0.0, f64::max);
+    let distance = |speed: f64| law.delay.value * speed + speed * speed / (2.0 * law.deceleration.value);
+    (0..=SAMPLES)
+        .map(|number| 1.1 * fastest * number as f64 / SAMPLES as f64)
+        .map(|speed| [speed, distance(speed)])
+        .collect()
+}

@@ -1,0 +1,55 @@
+//! The forecasts of one train along its recordings, each walked from nothing known and never looking ahead.
+
+use footplate_core::TrainId;
+use footplate_core::calibration::Passage;
+use footplate_core::estimation::{Phase, Predictor};
+use footplate_core::track::Layout;
+use footplate_store::score::{ReplayContext, replay_run};
+
+use super::Session;
+use super::data::ForecastPoint;
+
+/// The level of the interval that is shown.
+const LEVEL: f64 = 0.9;
+
+pub(super) fn of_train(
+    layout: &Layout,
+    sessions: &[Session],
+    train: TrainId,
+) -> anyhow::Result<Vec<ForecastPoint>> {
+    let context = ReplayContext { layout, turnouts: &[] };
+    let mut points = Vec::new();
+    for session in sessions {
+        let mut predictor = Predictor::new(layout);
+        let own = session.runs.iter().filter(|run| run.only_train().is_some_and(|only| only.train == train));
+        for run in own {
+            replay_run(context, run, &mut predictor, |raw, hit, _| {
+                let Passage { sensor, drive, way, window, .. } = &hit.passage;
+                let late = hit.forecast.map(|forecast| forecast.error(window.until));
+                let half = hit.forecast.map(|forecast| forecast.spread.half_width(LEVEL));
+                let speed = hit.forecast.map(|forecast| forecast.speed.as_mm_per_s());
+                let phase = match hit.forecast.map(|forecast| forecast.phase) {
+                    Some(Phase::Steady) => "steady running",
+                    Some(Phase::FirstLap) => "first time over this way or at this step",
+                    Some(Phase::Change) => "changing speed",
+                    None => "no forecast",
+                };
+                points.push(ForecastPoint {
+                    recording: session.name.clone(),
+                    run: run.id.0,
+                    line: raw.line,
+                    sensor: layout.sensor_name(*sensor).to_owned(),
+                    step: drive.step.get(),
+                    phase,
+                    missed: way.as_ref().map_or(0, footplate_core::track::Reach::missed),
+                    drift: hit.drift.is_some(),
+                    late_ms: late.map(footplate_core::TimeSpan::as_ms),
+                    half_90_ms: half.map(|half| 1e3 * half),
+                    late_mm: late.zip(speed).map(|(late, speed)| late.as_s() * speed),
+                    half_90_mm: half.zip(speed).map(|(half, speed)| half * speed),
+                });
+            })?;
+        }
+    }
+    Ok(points)
+}

@@ -1,0 +1,179 @@
+//! How a train fares: a few numbers, each judged, and the worst of them for the whole train.
+
+use footplate_core::TrainId;
+use footplate_store::Batch;
+use footplate_store::score::Coverage;
+
+use super::data::{Check, ForecastPoint, Health, State};
+
+/// So many forecasts are "now" (chosen: two laps of the usual loop).
+const NOW: usize = 20;
+/// The error now, in units of the usual one, above which a look or a hand is needed (chosen: of 20 values the median
+/// is 1.5 times too large by chance once in thirty, twice hardly ever).
+const WORSE: [f64; 2] = [1.5, 2.0];
+/// Part of contacts that may be missed (the recordings that there are miss up to 3 in 100).
+const MISSES: [f64; 2] = [0.05, 0.15];
+/// Part of runs that may stay without a report: low steps stall.
+const SILENT: [f64; 2] = [0.2, 0.5];
+/// How far below 90 % the interval's share may lie before it is wrong and not only doubtful.
+const COVERAGE_WRONG: f64 = 0.8;
+
+pub(super) fn of(train: TrainId, batch: &Batch, points: &[ForecastPoint]) -> Health {
+    let runs = || batch.passages.iter().filter(|run| run.train == train);
+    let silent = runs().filter(|run| run.passages.is_empty()).count();
+    let checks = vec![
+        error(points),
+        coverage(points),
+        drift(points),
+        misses(points),
+        Check {
+            name: "Runs without a report",
+            found: format!("{silent} of {}", runs().count()),
+            state: graded(silent as f64 / runs().count().max(1) as f64, SILENT),
+            says: "the train stalled, or crept for as long as the run lasted",
+        },
+    ];
+    let state = checks.iter().map(|check| check.state).max().unwrap_or(State::Green);
+    let worst: Vec<String> = checks
+        .iter()
+        .filter(|check| check.state == state && state != State::Green)
+        .map(|check| format!("{}: {}", check.name.to_lowercase(), check.found))
+        .collect();
+    let summary = if worst.is_empty() { "nothing out of the usual".to_owned() } else { worst.join("; ") };
+    Health { state, summary, checks }
+}
+
+fn graded(value: f64, [amber, red]: [f64; 2]) -> State {
+    match value {
+        value if value > red => State::Red,
+        value if value > amber => State::Amber,
+        _ => State::Green,
+    }
+}
+
+fn error(points: &[ForecastPoint]) -> Check {
+    let off = |points: &[&ForecastPoint]| {
+        let mut off: Vec<f64> = points.iter().filter_map(|point| Some(point.late_mm?.abs())).collect();
+        off.sort_by(f64::total_cmp);
+        off.get(off.len() / 2).copied()
+    };
+    let known: Vec<&ForecastPoint> = points.iter().filter(|point| point.late_mm.is_some()).collect();
+    let (usual, now) = (off(&known), off(&known[known.len().saturating_sub(NOW)..]));
+    let (found, state) = match usual.zip(now) {
+        Some((usual, now)) => {
+            (format!("{now:.1} mm now, {usual:.1} mm usually"), graded(now / usual.max(1e-9), WORSE))
+        }
+        None => ("nothing could be forecast yet".to_owned(), State::Amber),
+    };
+    Check {
+        name: "Prediction error",
+        found,
+        state,
+        says: "median distance off, of the last 20 forecasts and of all; twice the usual is wrong",
+    }
+}
+
+fn coverage(points: &[ForecastPoint]) -> Check {
+    let known = points.iter().filter_map(|point| point.late_ms.zip(point.half_90_ms));
+    let (inside, of) =
+        known.fold((0, 0), |(inside, of), (late, half)| (inside + usize::from(late.abs() <= half), of + 1));
+    let coverage = Coverage { level: 0.9, inside, of };
+    let (found, state) = if of == 0 {
+        ("no forecast with an interval".to_owned(), State::Amber)
+    } else {
+        let (low, high) = coverage.plausible();
+        let state = match (low <= 0.9 && 0.9 <= high, coverage.fraction() < COVERAGE_WRONG) {
+            (true, _) => State::Green,
+            (false, false) => State::Amber,
+            (false, true) => State::Red,
+        };
+        (format!("{:.0} % of {of} reports", 100.0 * coverage.fraction()), state)
+    };
+    Check {
+        name: "Inside the 90 % interval",
+        found,
+        state,
+        says: "good when the count is in keeping with 90 % by chance",
+    }
+}
+
+fn drift(points: &[ForecastPoint]) -> Check {
+    let alarms = points.iter().filter(|point| point.drift).count();
+    let recent = points[points.len().saturating_sub(NOW)..].iter().any(|point| point.drift);
+    let state = match (recent, alarms) {
+        (true, _) => State::Red,
+        (false, 1..) => State::Amber,
+        (false, 0) => State::Green,
+    };
+    let found = match alarms {
+        0 => "none".to_owned(),
+        _ => format!("{alarms}, {} among the last 20", if recent { "some" } else { "none" }),
+    };
+    Check { name: "Drift alarms", found, state, says: "forecasts went wrong to one side for long" }
+}
+
+fn misses(points: &[ForecastPoint]) -> Check {
+    let missed: usize = points.iter().map(|point| point.missed).sum();
+    Check {
+        name: "Contacts missed",
+        found: format!("{missed} of {}", missed + points.len()),
+        state: graded(missed as f64 / (missed + points.len()).max(1) as f64, MISSES),
+        says: "contacts on the way that never reported",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(late_mm: f64, missed: usize, drift: bool) -> ForecastPoint {
+        ForecastPoint {
+            recording: String::new(),
+            run: 1,
+            line: 2,
+            sensor: "A1".into(),
+            step: 8,
+            phase: "steady running",
+            missed,
+            drift,
+            late_ms: Some(late_mm),
+            half_90_ms: Some(9.0),
+            late_mm: Some(late_mm),
+            half_90_mm: Some(9.0),
+        }
+    }
+
+    #[test]
+    fn an_error_that_doubles_is_wrong() {
+        let mut points: Vec<ForecastPoint> = (0..100).map(|_| point(4.0, 0, false)).collect();
+        assert_eq!(error(&points).state, State::Green);
+        points.extend((0..20).map(|_| point(-7.0, 0, false)));
+        assert_eq!(
+            (error(&points).state, error(&points).found.as_str()),
+            (State::Amber, "7.0 mm now, 4.0 mm usually")
+        );
+        points.extend((0..20).map(|_| point(8.5, 0, false)));
+        assert_eq!(error(&points).state, State::Red);
+        assert_eq!(error(&[]).state, State::Amber);
+    }
+
+    #[test]
+    fn coverage_is_judged_by_its_own_chance() {
+        // 9 of 10 and 4 of 5 are both in keeping with 90 %; 70 of 100 is not.
+        let points = |inside: usize, of: usize| -> Vec<ForecastPoint> {
+            (0..of).map(|place| point(if place < inside { 1.0 } else { 20.0 }, 0, false)).collect()
+        };
+        let states = [(9, 10), (4, 5), (83, 100), (70, 100), (0, 0)]
+            .map(|(inside, of)| coverage(&points(inside, of)).state);
+        assert_eq!(states, [State::Green, State::Green, State::Amber, State::Red, State::Amber]);
+    }
+
+    #[test]
+    fn an_alarm_is_red_as_long_as_it_is_fresh() {
+        let mut points = vec![point(1.0, 0, true)];
+        assert_eq!(drift(&points).state, State::Red);
+        points.extend((0..20).map(|_| point(1.0, 1, false)));
+        assert_eq!(drift(&points).state, State::Amber);
+        assert_eq!((misses(&points).found.as_str(), misses(&points).state), ("20 of 41", State::Red));
+    }
+}

@@ -1,0 +1,90 @@
+//! HTML from text that others wrote: nothing in it is ever taken for markup.
+
+use std::fmt::Write;
+
+/// Text as it may stand in an element or a quoted attribute.
+pub(super) fn text(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+/// JSON as it may stand in a script element: without a character that could end it or begin a comment.
+pub(super) fn json(json: &str) -> String {
+    // Outside its strings JSON has none of these, and inside an escape means the same.
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+/// A table. The first column names its row, columns in `numbers` stand to the right.
+pub(super) struct Table {
+    html: String,
+    numbers: &'static [bool],
+}
+
+impl Table {
+    /// Begins a table with its caption and columns, each with whether it holds numbers.
+    pub(super) fn new(caption: &str, columns: &[&str], numbers: &'static [bool]) -> Self {
+        let mut html = format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", text(caption));
+        for (column, number) in columns.iter().zip(numbers) {
+            let class = if *number { " class=\"number\"" } else { "" };
+            let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", text(column));
+        }
+        html.push_str("</tr></thead><tbody>\n");
+        Self { html, numbers }
+    }
+
+    /// Adds a row of plain text.
+    pub(super) fn row(&mut self, cells: &[String]) {
+        let escaped: Vec<String> = cells.iter().map(|cell| text(cell)).collect();
+        self.row_of_markup(&escaped);
+    }
+
+    /// Adds a row of cells that are markup already.
+    pub(super) fn row_of_markup(&mut self, cells: &[String]) {
+        self.html.push_str("<tr>");
+        for (place, (cell, number)) in cells.iter().zip(self.numbers).enumerate() {
+            let class = if *number { " class=\"number\"" } else { "" };
+            let _ = if place == 0 {
+                write!(self.html, "<th scope=\"row\"{class}>{cell}</th>")
+            } else {
+                write!(self.html, "<td{class}>{cell}</td>")
+            };
+        }
+        self.html.push_str("</tr>\n");
+    }
+
+    pub(super) fn end(self) -> String {
+        self.html + "</tbody></table></div>\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_others_stay_text() {
+        assert_eq!(text("<b a='1'>&\"</b>"), "&lt;b a=&#39;1&#39;&gt;&amp;&quot;&lt;/b&gt;");
+        let name = serde_json::to_string("</script><!-- & ü").unwrap();
+        let safe = json(&name);
+        assert!(!safe.contains(['<', '>', '&']), "{safe}");
+        assert_eq!(serde_json::from_str::<String>(&safe).unwrap(), "</script><!-- & ü");
+    }
+
+    #[test]
+    fn a_table_names_its_rows() {
+        let mut table = Table::new("Speeds", &["step", "speed"], &[true, false]);
+        table.row(&["8".into(), "<fast>".into()]);
+        let html = table.end();
+        assert!(html.contains("<th scope=\"row\" class=\"number\">8</th><td>&lt;fast&gt;</td>"), "{html}");
+    }
+}
