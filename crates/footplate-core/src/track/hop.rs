@@ -9,7 +9,7 @@ use crate::track::{Layout, Leg, NodeKind, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 /// Work that making the table may cost, counted in edges looked at and edges stored. The built-in layouts take
-/// some 2,000; a plan that needs this much has turnouts in the hundreds without a sensor between them.
+/// less than a thousand; a plan that needs this much has turnouts in the hundreds without a sensor between them.
 const MAX_TABLE_WORK: usize = 1 << 20;
 
 /// A hop by its place in the layout's table.

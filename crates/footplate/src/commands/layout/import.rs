@@ -13,10 +13,10 @@ use footplate_store::{ImportContext, LayoutTables, import_layout, write_layout, 
 use crate::commands::Outcome;
 
 /// What is assumed of lengths that come without a figure: two surveys of one course track by hand differ from
-/// a third by 9 and 11 mm (standard deviation of an edge).
+/// a third by 9 and 11 mm (standard deviation).
 const ASSUMED_UNCERTAINTY_MM: &str = "10";
 const ASSUMED_ORIGIN: &str =
-    "assumed: surveys of one track by hand were seen to differ by 9 to 11 mm an edge";
+    "assumed: surveys of one track were seen to differ by 9 to 11 mm (standard deviation)";
 
 /// Import a layout from CSV tables of nodes and directed edges.
 ///
@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     name: Option<String>,
     /// A few words about the layout: where it stands, who measured it.
-    #[arg(long, value_name = "TEXT", default_value = "")]
+    #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     about: String,
     /// One standard deviation of the length of an edge.
     #[arg(long, value_name = "MM", default_value = ASSUMED_UNCERTAINTY_MM)]
