@@ -164,7 +164,7 @@ step_browser() {
   local at="$TARGET/browser"
   [[ -d $at/node_modules/playwright-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT"
   cargo build --quiet --profile test -p footplate
-  FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test tests/browser/
+  FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/
 }
 
 refresh_table() {

@@ -59,7 +59,7 @@ function zeroLine(u) {
 }
 
 const line = (label, name, unit, digits) => ({
-  label, stroke: colour(name), width: 2, spanGaps: true, points: { show: false }, value: withUnit(unit, digits),
+  label, stroke: colour(name), width: 2, pxAlign: 0, spanGaps: true, points: { show: false }, value: withUnit(unit, digits),
 });
 /** Points without a line; `told` says by x what a reader should know of a point. */
 const dots = (label, name, unit, digits, told = new Map()) => ({
@@ -97,6 +97,8 @@ function axis(label, more) {
 function chart(figure, { name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks }) {
   const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
   const u = new uPlot({
+    // Whole pixels would make stairs of a gentle slope.
+    pxAlign: 0,
     width: figure.clientWidth - 2 * parseFloat(getComputedStyle(figure).paddingLeft), height,
     cursor: {
       dataIdx: nearest, y: false, drag: { x: true, y: false }, points: { size: 9 },
@@ -230,7 +232,7 @@ function forecasts(figure, train) {
       name: `Forecast error in ${unit}`, zero: true, sync: `forecasts-${train.calibration.train}`, height: unit === "mm" ? HEIGHT : STRIP + 30,
       x: { label: "forecast number", unit: "", digits: 0 }, y: `later than forecast (${unit})`, ticks: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000],
       range: { y: { range: [-reach, reach] } }, data: [numbers, widths, widths.map((width) => -width), values],
-      series: [upper, lower, { ...later, points: { ...later.points, size: 5 } }],
+      series: [upper, lower, { ...later, points: { ...later.points, size: 6 } }],
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
   }

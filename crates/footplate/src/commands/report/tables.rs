@@ -92,7 +92,8 @@ pub(super) fn stops(stops: &StopForm) -> String {
 
 pub(super) fn lengths(train: &TrainForm) -> String {
     let columns = ["from", "to", "surveyed", "to add"];
-    let mut table = Table::new("Lengths", &columns, &[false, false, true, true]);
+    let mut table =
+        Table::new("Between contacts: the survey, and what to add", &columns, &[false, false, true, true]);
     for section in &train.sections {
         let correction = &section.correction;
         table.row(&[

@@ -11,7 +11,7 @@ import { pathToFileURL } from "node:url";
 
 const AT = resolve(process.env.BROWSER_AT);
 const { chromium } = createRequire(join(AT, "package.json"))("playwright-core");
-const LOGS = resolve(import.meta.dirname, "../../testdata/sensor-logs");
+const LOGS = resolve(import.meta.dirname, "../../../../testdata/sensor-logs");
 const log = (train, kind) => join(LOGS, `choochoos_2020_track_a_train${train}_${kind}.csv`);
 
 let browser;
@@ -65,8 +65,9 @@ for (const colorScheme of ["light", "dark"]) {
 
 test("a phone shows the page without scrolling sideways", async () => {
   const { page, complaints } = await open({ viewport: { width: 390, height: 844 }, isMobile: true, deviceScaleFactor: 2 });
-  const [content, window] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
-  assert.ok(content <= window, `${content} wider than ${window}`);
+  // A phone zooms out until everything fits: what it then shows is wider than it is.
+  const width = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, innerWidth));
+  assert.equal(width, 390);
   await page.screenshot({ path: join(AT, "report-phone.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();
