@@ -5,19 +5,19 @@ mod table;
 
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::SystemTime;
 
 use anyhow::{Context, bail};
 use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 use footplate_store::{
-    Batch, CalibrationFile, Import, MODEL_VERSION, ModuleLetters, NewCalibration, Recording, Store,
-    layout_named, write_whole,
+    Batch, CalibrationFile, Import, MODEL_VERSION, NewCalibration, Recording, Store, layout_named,
+    write_whole,
 };
 
 use super::Outcome;
-use super::recordings::read_all;
+use super::log_file::LogFile;
+use crate::clock::{Moment, now};
 use explain::Question;
 
 /// Calibrate trains from recorded sensor reports.
@@ -43,9 +43,9 @@ pub(crate) struct Arguments {
     /// Keep recordings and calibration in this store, and calibrate from all that it holds of the layout.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
-    /// Calibrate as of this moment, in seconds since the Unix epoch: from what the store held then.
-    #[arg(long, value_name = "SECONDS", requires = "store", conflicts_with = "from")]
-    as_of: Option<f64>,
+    /// Calibrate as of this date: from what the store held then.
+    #[arg(long, value_name = "DATE", requires = "store", conflicts_with = "from")]
+    as_of: Option<Moment>,
     /// Write the calibration to a file, TOML or JSON by its ending.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -62,13 +62,16 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
-        let recordings = read_all(&self.from, &ModuleLetters, train)?;
+        let logs = LogFile::read_all(&self.from, &layout, train)?;
         let (batch, mut store) = match &self.store {
-            None => (Batch::of_recordings(&layout, &recordings, train)?, None),
+            None => {
+                let recordings: Vec<Recording> = logs.into_iter().map(|log| log.recording).collect();
+                (Batch::of_recordings(&layout, &recordings, train)?, None)
+            }
             Some(path) => {
                 let mut store = Store::open_or_create(path)?;
-                self.import(&layout, &recordings, &mut store)?;
-                let as_of = self.as_of.map_or_else(now, Timestamp::from_s);
+                self.import(&layout, &logs, &mut store)?;
+                let as_of = self.as_of.map_or_else(now, |moment| moment.0);
                 (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))
             }
         };
@@ -87,11 +90,10 @@ impl Arguments {
         Ok(Outcome::Done)
     }
 
-    fn import(&self, layout: &Layout, recordings: &[Recording], store: &mut Store) -> anyhow::Result<()> {
-        for (path, recording) in self.from.iter().zip(recordings) {
-            let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
-            let content = footplate_store::ContentHash::of(&bytes);
-            if let Import::AlreadyThere { .. } = store.import(recording, content, layout.name(), now())? {
+    fn import(&self, layout: &Layout, logs: &[LogFile], store: &mut Store) -> anyhow::Result<()> {
+        for (path, log) in self.from.iter().zip(logs) {
+            let imported = store.import(&log.recording, log.content, layout.name(), now())?;
+            if let Import::AlreadyThere { .. } = imported {
                 eprintln!("{}: in the store already, not added again", path.display());
             }
         }
@@ -117,11 +119,4 @@ fn write_calibration(file: &CalibrationFile, path: &std::path::Path) -> anyhow::
         }
     };
     write_whole(path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))
-}
-
-/// What the program's clock says; nothing below the program asks it.
-#[expect(clippy::disallowed_methods, reason = "the program is where the time comes from")]
-fn now() -> Timestamp {
-    let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    Timestamp::from_ns(i64::try_from(since_epoch.as_nanos()).unwrap_or(i64::MAX))
 }

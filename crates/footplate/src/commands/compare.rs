@@ -9,13 +9,13 @@ use std::path::PathBuf;
 use clap::Args;
 use footplate_core::{Approach, TrainId};
 use footplate_store::{
-    Batch, CalibrationFile, CheckedFigure, CountedFrom, CrossCheck, ModuleLetters, PublishedQuantity,
-    layout_named, read_published_table,
+    Batch, CalibrationFile, CheckedFigure, CountedFrom, CrossCheck, PublishedQuantity, layout_named,
+    read_published_table,
 };
 use serde_json::{Value, json};
 
 use super::Outcome;
-use super::recordings::read_all;
+use super::log_file::LogFile;
 
 /// Compare speeds and stops with tables that others published.
 ///
@@ -55,7 +55,7 @@ impl Arguments {
             figures.extend(read_published_table(path)?);
         }
         figures.retain(|figure| train.is_none_or(|train| train == figure.train));
-        let recordings = read_all(&self.logs, &ModuleLetters, train)?;
+        let recordings = LogFile::recordings(&self.logs, &layout, train)?;
         let batch = Batch::of_recordings(&layout, &recordings, train)?;
         let check = CrossCheck::of(&CalibrationFile::of(&layout, &batch), &figures)?;
         if self.json {

@@ -1,10 +1,11 @@
 //! A sensor log that a verb was given, read once for what it says and for its fingerprint.
 
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use footplate_store::{ContentHash, HashingReader, LogContext, Recording, parse_sensor_log};
+use footplate_core::TrainId;
+use footplate_store::{ContentHash, HashingReader, LogContext, Recording, SensorNames, parse_sensor_log};
 
 use crate::reading::ProgressReader;
 
@@ -26,5 +27,22 @@ impl LogFile {
             eprintln!("{}, {note}", path.display());
         }
         Ok(Self { recording, content })
+    }
+    /// Reads all logs; `train` is that of logs that name none.
+    pub(crate) fn read_all(
+        paths: &[PathBuf],
+        sensors: &dyn SensorNames,
+        train: Option<TrainId>,
+    ) -> anyhow::Result<Vec<Self>> {
+        paths.iter().map(|path| Self::read(path, LogContext { sensors, train })).collect()
+    }
+
+    /// What all logs say; `train` is that of logs that name none.
+    pub(crate) fn recordings(
+        paths: &[PathBuf],
+        sensors: &dyn SensorNames,
+        train: Option<TrainId>,
+    ) -> anyhow::Result<Vec<Recording>> {
+        Ok(Self::read_all(paths, sensors, train)?.into_iter().map(|log| log.recording).collect())
     }
 }

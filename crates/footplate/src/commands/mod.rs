@@ -12,7 +12,6 @@ mod convert;
 mod layout;
 mod log_file;
 mod predict;
-mod recordings;
 mod report;
 mod simulate;
 mod store;

@@ -18,7 +18,7 @@ use footplate_store::score::{Knowledge, ReplayContext, ScoredRecording, score_re
 use footplate_store::{Recording, layout_named};
 
 use super::Outcome;
-use super::recordings::read_all;
+use super::log_file::LogFile;
 use crate::progress::with_progress;
 
 /// Forecast every next sensor of recorded logs, and score that.
@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
-        let recordings = read_all(&self.logs, &layout, self.train.map(TrainId))?;
+        let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
         let scored = self.score(&layout, &recordings)?;
         if self.json {
             let value = json::scores(&layout, &scored, !self.summary);

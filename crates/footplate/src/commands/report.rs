@@ -15,10 +15,10 @@ use anyhow::Context;
 use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
-use footplate_store::{Batch, CalibrationFile, ModuleLetters, Run, Store, layout_named, write_whole};
+use footplate_store::{Batch, CalibrationFile, Run, Store, layout_named, write_whole};
 
 use super::Outcome;
-use super::recordings::read_all;
+use super::log_file::LogFile;
 use data::{ReportData, TrainReport};
 
 /// Write a page with charts of what recordings show.
@@ -61,7 +61,7 @@ impl Arguments {
         let (sessions, batch) = match &self.store {
             Some(path) => of_store(&layout, &Store::open(path)?, train)?,
             None => {
-                let recordings = read_all(&self.logs, &ModuleLetters, train)?;
+                let recordings = LogFile::recordings(&self.logs, &layout, train)?;
                 let batch = Batch::of_recordings(&layout, &recordings, train)?;
                 let session = |recording: footplate_store::Recording| Session {
                     name: recording.name,

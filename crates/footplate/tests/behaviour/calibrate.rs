@@ -91,7 +91,7 @@ fn a_store_keeps_the_logs_once_and_calibrates_again_from_itself() {
     assert_eq!(one, two);
     assert_eq!(one, three);
     // Before anything was stored there was nothing to calibrate from.
-    let before = footplate(&["calibrate", "--store", &store, "--layout", "track-a", "--as-of", "1000"]);
+    let before = footplate(&["calibrate", "--store", &store, "--layout", "track-a", "--as-of", "2001-01-01"]);
     assert_eq!(before.status, 2);
     assert!(before.errors.contains("nothing to calibrate"), "{}", before.errors);
 }

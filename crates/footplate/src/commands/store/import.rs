@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use footplate_core::TrainId;
-use footplate_store::{Import, LogContext, Store, layout_named};
+use footplate_store::{Import, Store, layout_named};
 use serde_json::json;
 
 use crate::clock::{local, now, rfc3339};
@@ -34,13 +34,8 @@ pub(super) struct Arguments {
 impl Arguments {
     pub(super) fn run(self, store: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
-        let context = LogContext { sensors: &layout, train: self.train.map(TrainId) };
         // All are read before the first is stored: a wrong one stops the import before it begins.
-        let logs = self
-            .logs
-            .iter()
-            .map(|path| LogFile::read(path, context))
-            .collect::<anyhow::Result<Vec<LogFile>>>()?;
+        let logs = LogFile::read_all(&self.logs, &layout, self.train.map(TrainId))?;
         let mut store = Store::open_or_create(store)?;
         for (path, log) in self.logs.iter().zip(&logs) {
             let outcome = store.import(&log.recording, log.content, layout.name(), now())?;
