@@ -85,18 +85,16 @@ impl Targets {
 
     /// Whether the end of some path reads like this: how a page that said where it is names what is there.
     fn contains_end(&self, end: &str) -> bool {
-        let end = format!("/{end}");
+        let end = format!("/{}", end.trim_end_matches('/'));
         self.0.iter().any(|path| path.ends_with(&end))
     }
 
     /// What is wrong with something that a page shows as code, if it is a path.
     fn objection(&self, span: &str) -> Option<String> {
-        if span.contains(['*', '{', '…', ' ', '<']) {
-            return None;
-        }
+        let pattern = span.contains(['*', '{', '…', ' ', '<']);
         let from_top = span.split_once('/').is_some_and(|(first, _)| self.contains(first));
-        let missing =
-            if from_top { !self.contains(span) } else { span.ends_with(".rs") && !self.contains_end(span) };
+        let is_path = !pattern && (from_top || span.ends_with(".rs"));
+        let missing = is_path && !self.contains(span) && !self.contains_end(span);
         missing.then(|| format!("names {span}, which is not there"))
     }
 }
