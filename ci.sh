@@ -163,7 +163,7 @@ step_browser() {
   need npm npm
   local at="$TARGET/browser"
   [[ -d $at/node_modules/playwright-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT"
-  cargo build --quiet --profile test -p footplate
+  cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/
 }
 
