@@ -20,8 +20,9 @@ mod whole_file;
 
 pub use batch::{Batch, BatchError, BatchEvent, BatchRun, Polling};
 pub use calibration_file::{
-    CalibrationFile, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION, PollingForm, Quantity,
-    SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm, TrainForm,
+    CalibrationFile, CalibrationFileError, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION,
+    PollingForm, Quantity, SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm,
+    TrainForm,
 };
 pub use content_hash::{ContentHash, HashingReader};
 pub use layout_file::{

@@ -5,8 +5,10 @@
 mod export;
 mod form;
 mod prime;
+mod read;
 
 pub use form::{
     CalibrationFile, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION, PollingForm, Quantity,
     SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm, TrainForm,
 };
+pub use read::CalibrationFileError;

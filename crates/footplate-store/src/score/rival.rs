@@ -5,6 +5,8 @@ use core::fmt;
 /// Another way to forecast the same report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rival {
+    /// Our own estimator again, naming the poll that will report instead of the mean time.
+    AtPoll,
     /// Our own estimator, told beforehand what the whole recording says.
     Oracle,
     /// A table of lengths and speeds, run by run, made from the whole recording beforehand.
@@ -27,7 +29,8 @@ pub const BASELINES: [Rival; 5] =
 
 impl Rival {
     /// All of them, in the order of their declaration.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
+        Self::AtPoll,
         Self::Oracle,
         Self::HindsightTable,
         Self::ConstantTable,
@@ -41,6 +44,7 @@ impl Rival {
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
+            Self::AtPoll => "at_poll",
             Self::Oracle => "oracle",
             Self::HindsightTable => "hindsight_table",
             Self::ConstantTable => "constant_table",
@@ -56,6 +60,7 @@ impl Rival {
 impl fmt::Display for Rival {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
+            Self::AtPoll => "Footplate, at a poll",
             Self::Oracle => "oracle",
             Self::HindsightTable => "hindsight table",
             Self::ConstantTable => "constant table",

@@ -99,7 +99,8 @@ fn score_run(
     replay_run(context, run, predictor, |raw, hit, predictor| {
         let [table, slow, middle, fast, lap] = baselines.take(train, &hit);
         let Hindsight { oracle, table: hindsight_table } = hindsight.next().copied().unwrap_or_default();
-        let rivals = [oracle, hindsight_table, table, slow, middle, fast, lap];
+        let at_poll = hit.forecast.map(|forecast| forecast.report);
+        let rivals = [at_poll, oracle, hindsight_table, table, slow, middle, fast, lap];
         scored.hits.push(ScoredHit { run: run.id, line: raw.line, train, hit, rivals });
         let speed = predictor.train(train).and_then(TrainModel::running_speed);
         laps.take(hit.passage.node, speed);

@@ -268,6 +268,10 @@ impl TableCopy<'_> {
                 (0..self.columns).map(|column| row.get(column)).collect();
             let Ok(values) = values else { return Ok(stretch) };
             let Some(Value::Integer(id)) = values.first() else { return Ok(stretch) };
+            // Rows come in the order of their ids; in damaged pages they may come round again, for ever.
+            if stretch.last_read.is_some_and(|last| *id <= last) {
+                return Ok(stretch);
+            }
             stretch.last_read = Some(*id);
             if let Some((parent, column)) = self.parent
                 && let Some(Value::Integer(key)) = values.get(column)

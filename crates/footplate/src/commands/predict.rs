@@ -15,7 +15,7 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{TrainId, TurnoutId};
 use footplate_store::score::{Knowledge, ReplayContext, ScoredRecording, score_recording};
-use footplate_store::{Recording, layout_named};
+use footplate_store::{CalibrationFile, Recording, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
@@ -27,7 +27,7 @@ use crate::progress::with_progress;
 /// and learnt from. Beside ours stand the forecasts that others would make of the same reports: a constant table
 /// (speeds of the first lap), running averages of the speed of a step (EWMA), the last lap; and two that know the
 /// whole log beforehand, the oracle and the hindsight table. Each log begins with nothing known, unless
-/// `--carry-on` says otherwise.
+/// `--carry-on` or `--calibration` says otherwise.
 #[derive(Args)]
 #[command(
     after_help = "Example: footplate predict testdata/sensor-logs/eadanila_2020_track_a.csv --layout track-a"
@@ -45,6 +45,9 @@ pub(crate) struct Arguments {
     /// How a turnout lies when runs begin, such as 6=straight; may be repeated.
     #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
     turnouts: Vec<(TurnoutId, Leg)>,
+    /// Begin with what a calibration says (TOML or JSON, as `footplate calibrate --out` writes it).
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Keep what one log taught for the next, in the order given.
     #[arg(long)]
     carry_on: bool,
@@ -63,7 +66,8 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
-        let scored = self.score(&layout, &recordings)?;
+        let calibration = self.calibration.as_deref().map(CalibrationFile::read).transpose()?;
+        let scored = self.score(&layout, &recordings, calibration.as_ref())?;
         if self.json {
             let value = json::scores(&layout, &scored, !self.summary);
             writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
@@ -78,16 +82,24 @@ impl Arguments {
         Ok(Outcome::Done)
     }
 
-    fn score(&self, layout: &Layout, recordings: &[Recording]) -> anyhow::Result<Vec<ScoredRecording>> {
+    fn score(
+        &self,
+        layout: &Layout,
+        recordings: &[Recording],
+        calibration: Option<&CalibrationFile>,
+    ) -> anyhow::Result<Vec<ScoredRecording>> {
         let context = ReplayContext { layout, turnouts: &self.turnouts };
         let events = |recording: &Recording| recording.runs.iter().map(|run| run.events.len()).sum::<usize>();
         with_progress("scoring", recordings.iter().map(events).sum(), |done| {
-            let nothing = Knowledge::of_layout(layout);
-            let mut knowledge = nothing.clone();
+            let mut before = Knowledge::of_layout(layout);
+            if let Some(calibration) = calibration {
+                calibration.prime(layout, &mut before.predictor);
+            }
+            let mut knowledge = before.clone();
             let mut scored = Vec::new();
             for (path, recording) in self.logs.iter().zip(recordings) {
                 if !self.carry_on {
-                    knowledge = nothing.clone();
+                    knowledge = before.clone();
                 }
                 let only = self.train.map(TrainId);
                 let score = score_recording(context, recording, only, &mut knowledge)

@@ -121,3 +121,30 @@ fn wrong_input_is_named_and_ends_with_status_2() {
     assert_eq!(elsewhere.status, 2);
     assert!(elsewhere.errors.contains("track-c"), "{}", elsewhere.errors);
 }
+
+#[test]
+fn a_calibration_makes_the_first_lap_forecast_as_well_as_the_second() {
+    // Given the calibration of a log,
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("predict-calibration");
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    let calibration = folder.join("all.toml").display().to_string();
+    let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
+    let made = footplate(&["calibrate", "--from", log, "--layout", "track-a", "--out", &calibration]);
+    assert_eq!(made.status, 0, "{}", made.errors);
+    // when the log is walked with it and without,
+    let p90 = |more: &[&str]| {
+        let done =
+            footplate(&[&["predict", log, "--layout", "track-a", "--summary", "--json"][..], more].concat());
+        assert_eq!(done.status, 0, "{}", done.errors);
+        let score: serde_json::Value = serde_json::from_str(&done.output).expect("JSON");
+        score["overall"]["p90_abs_mm"].as_f64().expect("a number")
+    };
+    // then forecasts miss by less, and a file that is none is refused with its place.
+    let (cold, primed) = (p90(&[]), p90(&["--calibration", &calibration]));
+    assert!(primed < cold, "{primed} against {cold}");
+    let bad = folder.join("bad.toml");
+    std::fs::write(&bad, "model_version = 7\n").expect("a test file");
+    let refused = footplate(&["predict", log, "--calibration", &bad.display().to_string()]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.errors.contains("line 1"), "{}", refused.errors);
+}

@@ -25,7 +25,7 @@ pub(super) fn of_train(
         for run in own {
             replay_run(context, run, &mut predictor, |raw, hit, _| {
                 let Passage { sensor, drive, way, window, .. } = &hit.passage;
-                let late = hit.forecast.map(|forecast| forecast.error(window.until));
+                let late = hit.forecast.map(|forecast| forecast.contact_error(window.until));
                 let half = hit.forecast.map(|forecast| forecast.spread.half_width(LEVEL));
                 let speed = hit.forecast.map(|forecast| forecast.speed.as_mm_per_s());
                 let phase = match hit.forecast.map(|forecast| forecast.phase) {
