@@ -60,7 +60,7 @@ impl Rival {
 impl fmt::Display for Rival {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
-            Self::AtPoll => "Footplate, at a poll",
+            Self::AtPoll => "ours, at a poll",
             Self::Oracle => "oracle",
             Self::HindsightTable => "hindsight table",
             Self::ConstantTable => "constant table",
