@@ -7,6 +7,7 @@
 //! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
 //! - [`ShortMove`] puts a start and a stop together: "go, wait, stop".
 
+mod ahead;
 mod bracket;
 mod limits;
 mod motion;

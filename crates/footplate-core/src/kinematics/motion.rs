@@ -49,3 +49,17 @@ pub trait Motion {
     /// How far the train gets in that [`duration`](Self::duration), in the direction of growing distance.
     fn distance(&self) -> Length;
 }
+
+/// Seconds, by a product: within one unit in the last place of the quotient that [`TimeSpan::as_s`] gives, and
+/// one nanosecond sooner, of the six that evaluating a profile takes.
+#[inline(always)]
+pub(super) fn seconds(span: TimeSpan) -> f64 {
+    span.as_ns() as f64 * 1e-9
+}
+
+/// A span of seconds that are not negative, to the nearest nanosecond: [`TimeSpan::from_s`] without the side of
+/// the sign that times within a motion do not have.
+#[inline(always)]
+pub(super) fn span_of(seconds: f64) -> TimeSpan {
+    TimeSpan::from_ns((seconds * 1e9 + 0.5) as i64)
+}

@@ -7,18 +7,22 @@
 
 #![expect(clippy::indexing_slicing, reason = "a phase's index is a count of the borders passed")]
 
+mod knot;
 mod opening;
 mod peak;
 mod plan;
 mod playback;
 mod ramp;
+mod rate;
 
 pub use playback::Playback;
 
+use self::knot::Knot;
 use self::plan::{Plan, Planner};
-use super::limits::{Ahead, Limits, ProfileError};
-use super::motion::{Motion, MotionState};
-use super::phase::{Phase, Triple};
+use super::ahead::{Ahead, grain};
+use super::limits::{Limits, ProfileError};
+use super::motion::{Motion, MotionState, seconds, span_of};
+use super::phase::{Phase, SIXTH, Triple};
 use super::stretch::{Stretch, stretches};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
@@ -34,15 +38,38 @@ use crate::units::{Acceleration, Length, Speed};
 pub struct SCurve {
     direction: f64,
     origin: f64,
-    /// End of each phase in s since the start, and the way there in m; the last is the end of the profile.
-    times: [f64; PHASES],
-    ways: [f64; PHASES],
-    /// And one more, for the time after the end.
-    phases: [Phase; PHASES + 1],
+    sixth_jerk: f64,
+    /// Whether it slows down before it cruises.
+    slows_first: bool,
+    /// The states at the borders between its phases: time in s since the start, way there in m, speed, and half
+    /// the acceleration.
+    times: [f64; KNOTS],
+    ways: [f64; KNOTS],
+    speeds: [f64; KNOTS],
+    half_accelerations: [f64; KNOTS],
 }
 
 /// Easing off, the three phases of a ramp, cruising, and the three of a ramp.
 const PHASES: usize = 8;
+
+/// The borders of the phases.
+const KNOTS: usize = PHASES + 1;
+
+/// Which of a phase's borders is its slow end, and the sign of its jerk; one more for the time after the end.
+struct Pattern {
+    slow_ends: [usize; PHASES + 1],
+    jerks: [f64; PHASES + 1],
+}
+
+static SPEEDING_UP_FIRST: Pattern = Pattern {
+    slow_ends: [1, 1, 2, 3, 4, 6, 7, 8, 8],
+    jerks: [1.0, 1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+};
+
+static SLOWING_DOWN_FIRST: Pattern = Pattern {
+    slow_ends: [0, 2, 3, 4, 4, 6, 7, 8, 8],
+    jerks: [-1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+};
 
 impl SCurve {
     /// The profile from a state to another.
@@ -52,12 +79,34 @@ impl SCurve {
     /// If a limit or a state makes no sense, or the target is nearer than its speed can be reached.
     #[inline]
     pub fn between(current: MotionState, target: MotionState, limits: Limits) -> Result<Self, ProfileError> {
-        let ahead = Ahead::new(current, target, &limits)?;
+        let ahead = Ahead::new(&current, &target);
+        let ends_level = target.acceleration == Acceleration::ZERO;
+        if ends_level && let Some(plan) = Plan::between_stands(&ahead, &limits) {
+            return Ok(Self::laid_out(&plan, current.distance, &ahead, &limits));
+        }
+        let planner = Planner::new(&ahead, &limits);
+        if ends_level && ahead.is_sound(&limits) && planner.is_ordinary() {
+            return Ok(Self::laid_out(&planner.ordinary(), current.distance, &ahead, &limits));
+        }
+        Self::out_of_the_ordinary(current, target, limits)
+    }
+
+    /// All other problems, from the beginning: to hand over what was worked out already, it would have to be
+    /// written to memory for the ordinary ones as well.
+    #[cold]
+    fn out_of_the_ordinary(
+        current: MotionState,
+        target: MotionState,
+        limits: Limits,
+    ) -> Result<Self, ProfileError> {
+        let ahead = Ahead::new(&current, &target);
+        ahead.check(&current, &target, &limits)?;
         if target.acceleration != Acceleration::ZERO {
             return Err(ProfileError::TargetAcceleration { found: target.acceleration });
         }
-        let plan = Planner::new(ahead, &limits)?.plan()?;
-        Ok(Self::from_plan(&plan, current.distance, &ahead))
+        let planner = Planner::new(&ahead, &limits).checked(ahead.direction)?;
+        let plan = planner.any(grain(&current, &target))?;
+        Ok(Self::laid_out(&plan, current.distance, &ahead, &limits))
     }
 
     /// The profile from a state to a speed, wherever that is reached.
@@ -66,21 +115,19 @@ impl SCurve {
     ///
     /// If a limit or the state makes no sense, or the speed is not between zero and the limit.
     pub fn to_speed(current: MotionState, speed: Speed, limits: Limits) -> Result<Self, ProfileError> {
-        let ahead = Ahead::new(current, MotionState::cruising(current.distance, speed), &limits)?;
-        let plan = Planner::new(ahead, &limits)?.at_once();
-        let (_, way) = plan.opening.end();
-        Ok(Self::from_plan(&plan, current.distance, &Ahead { way, ..ahead }))
+        let target = MotionState::cruising(current.distance, speed);
+        let ahead = Ahead::new(&current, &target);
+        ahead.check(&current, &target, &limits)?;
+        let plan = Planner::new(&ahead, &limits).checked(ahead.direction)?.at_once();
+        let way = plan.opening.end().way;
+        Ok(Self::laid_out(&plan, current.distance, &Ahead { way, ..ahead }, &limits))
     }
 
     /// Where it speeds up, cruises and slows down.
     pub fn stretches(&self) -> impl Iterator<Item = Stretch> {
-        let mut start = 0.0;
-        let ends = self.times.into_iter().zip(self.phases);
-        stretches(ends.map(move |(end, phase)| {
-            let (_, _, acceleration) = phase.state_at(0.5 * (start + end));
-            start = end;
-            (end, acceleration)
-        }))
+        let phases = self.half_accelerations.into_iter().zip(self.half_accelerations.into_iter().skip(1));
+        // Half of each end's acceleration is the mean of both.
+        stretches(self.times.into_iter().skip(1).zip(phases.map(|(start, end)| start + end)))
     }
 
     /// Its states in order, one every period from the start on, for ever.
@@ -91,37 +138,39 @@ impl SCurve {
         Playback::new(self, period)
     }
 
-    #[inline]
-    fn from_plan(plan: &Plan, origin: Length, ahead: &Ahead) -> Self {
+    #[inline(always)]
+    fn laid_out(plan: &Plan, origin: Length, ahead: &Ahead, limits: &Limits) -> Self {
         let Plan { opening, closing, level, .. } = plan;
-        let (opened, opened_way) = opening.end();
-        let speed = opening.speed;
+        let [k0, k1, k2, k3, k4] = opening.knots;
         let closing_way = level.1 + closing.way;
-        let cruise_way = (ahead.way - opened_way - closing_way).max(0.0);
-        let cruise = if plan.cruises && cruise_way > 0.0 { cruise_way / speed } else { 0.0 };
-        let closes = opened + cruise;
-        let (end, way) = (closes + level.0 + closing.time, ahead.way);
-        let ([build_up, hold, fade], [built_up, held]) = closing.downwards(end, way);
-        let steady = |time, distance, speed| Phase { time, distance, speed, ..Phase::default() };
-        let [t0, t1, t2, t3] = opening.times;
-        let [w0, w1, w2, w3] = opening.ways;
-        let [ease, rise, top, settle] = opening.phases;
+        let cruise_way = ahead.way - k4.way - closing_way;
+        let cruise = if plan.cruises && cruise_way > 0.0 { cruise_way / k4.speed } else { 0.0 };
+        let k5 = Knot { time: k4.time + cruise, way: ahead.way - closing_way, ..k4 };
+        let end = k5.time + level.0 + closing.time;
+        let [k6, k7, k8] = closing.downwards(end, ahead.way);
         Self {
             direction: ahead.direction,
             origin: origin.as_m(),
-            times: [t0, t1, t2, t3, closes, built_up.0, held.0, end],
-            ways: [w0, w1, w2, w3, way - closing_way, built_up.1, held.1, way],
-            phases: [
-                ease,
-                rise,
-                top,
-                settle,
-                steady(opened, opened_way, speed),
-                build_up,
-                hold,
-                fade,
-                steady(end, way, ahead.target_speed),
-            ],
+            sixth_jerk: SIXTH * limits.jerk.as_m_per_s3(),
+            slows_first: opening.slows,
+            times: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.time),
+            ways: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.way),
+            speeds: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.speed),
+            half_accelerations: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.half_acceleration),
+        }
+    }
+
+    /// The phase with a number, counted from its slow end.
+    #[inline(always)]
+    fn phase(&self, number: usize) -> Phase {
+        let pattern = if self.slows_first { &SLOWING_DOWN_FIRST } else { &SPEEDING_UP_FIRST };
+        let slow_end = pattern.slow_ends[number];
+        Phase {
+            time: self.times[slow_end],
+            distance: self.ways[slow_end],
+            speed: self.speeds[slow_end],
+            half_acceleration: self.half_accelerations[slow_end],
+            sixth_jerk: pattern.jerks[number] * self.sixth_jerk,
         }
     }
 
@@ -139,20 +188,22 @@ impl SCurve {
 impl Motion for SCurve {
     #[inline]
     fn state_at(&self, time: TimeSpan) -> MotionState {
-        let time = time.as_s().max(0.0);
-        let passed: usize = self.times.iter().map(|&end| usize::from(time >= end)).sum();
-        self.turned(self.phases[passed].state_at(time))
+        let time = seconds(time).max(0.0);
+        let [_, ends @ ..] = &self.times;
+        let passed: usize = ends.iter().map(|&end| usize::from(time >= end)).sum();
+        self.turned(self.phase(passed).state_at(time))
     }
 
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let way = self.direction * (distance.as_m() - self.origin);
         // The end itself belongs to the last phase: it may have no speed.
-        let passed: usize = self.ways.iter().map(|&end| usize::from(way > end)).sum();
-        let start = if passed > 0 { self.times[passed - 1] } else { 0.0 };
-        let longest = if passed < PHASES { self.times[passed] - start } else { f64::INFINITY };
-        let time = self.phases[passed].time_at(way, longest).max(0.0);
-        (way >= 0.0 && time.is_finite()).then(|| TimeSpan::from_s(time))
+        let [_, ends @ ..] = &self.ways;
+        let passed: usize = ends.iter().map(|&end| usize::from(way > end)).sum();
+        let longest =
+            if passed < PHASES { self.times[passed + 1] - self.times[passed] } else { f64::INFINITY };
+        let time = self.phase(passed).time_at(way, longest).max(0.0);
+        (way >= 0.0 && time.is_finite()).then(|| span_of(time))
     }
 
     fn duration(&self) -> TimeSpan {

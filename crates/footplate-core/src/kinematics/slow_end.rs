@@ -26,24 +26,52 @@ pub(super) struct SlowEnd {
 
 impl SlowEnd {
     /// Seconds to get `way` metres off, within a phase of `longest` seconds; 0 for no way at all.
-    #[inline]
+    //
+    // Always inlined: passed through memory, its argument would be written by halves and read as a whole, which
+    // makes the processor finish one call before it begins the next.
+    #[inline(always)]
     pub(super) fn time_to_cover(&self, way: f64, longest: f64) -> f64 {
         let Self { speed: v, half_acceleration: h, sixth_jerk: k, quartic: q } = *self;
         // Where the cubic term grows, it alone gives a first guess; where it fades, the square does.
         let growing = k > 0.0;
         let ratio = way / if growing { k } else { h };
-        let first = if growing { rough_cube_root(ratio) } else { rough_square_root(ratio) }.min(longest);
+        let first = least(if growing { rough_cube_root(ratio) } else { rough_square_root(ratio) }, longest);
         // The higher powers at that guess make up an effective square term: one quadratic equation.
         let square = h + first * (k + first * q);
-        let mut time = (2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square))).min(longest);
+        let mut time = least(2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square)), longest);
         for _ in 0..2 {
-            let excess = time * (v + time * (h + time * (k + time * q))) - way;
-            let slope = v + time * (2.0 * h + time * (3.0 * k + time * (4.0 * q)));
-            let bend = 2.0 * h + time * (6.0 * k + time * (12.0 * q));
-            time -= 2.0 * excess * slope / (2.0 * slope * slope - excess * bend);
+            let t2 = time * time;
+            let excess = time * ((v + time * h) + t2 * (k + time * q)) - way;
+            let slope = (v + time * (2.0 * h)) + t2 * (3.0 * k + time * (4.0 * q));
+            let half_bend = (h + time * (3.0 * k)) + t2 * (6.0 * q);
+            time -= excess * slope / (slope * slope - excess * half_bend);
         }
-        if way > 0.0 { time.min(longest) } else { 0.0 }
+        if way > 0.0 { least(time, longest) } else { 0.0 }
     }
+
+    /// The same to 11 %, for a phase without an end whose acceleration only grows.
+    #[inline(always)]
+    pub(super) fn rough_time_to_cover(&self, way: f64) -> f64 {
+        let Self { speed: v, half_acceleration: h, sixth_jerk: k, .. } = *self;
+        let square = h + k * rough_cube_root(way / k);
+        if way > 0.0 { 2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square)) } else { 0.0 }
+    }
+}
+
+/// Seconds from the slow end of a phase of constant acceleration to a place `off` metres away, before it (below
+/// zero) or behind it.
+#[inline(always)]
+pub(super) fn even_time(off: f64, speed: f64, acceleration: f64) -> f64 {
+    // v t + a t²/2 = d has no cancellation as t = 2d / (v + √(v² + 2ad)).
+    let way = off.abs();
+    let sum = speed + libm::sqrt(speed * speed + 2.0 * acceleration.abs() * way);
+    if way > 0.0 { 2.0 * off / sum } else { 0.0 }
+}
+
+/// The smaller of two, or the second where the first is not a number: one instruction, which `f64::min` is not.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 /// Cube root of a positive number to 3 % by dividing its exponent by three (Kahan's cube root).
@@ -64,8 +92,8 @@ fn rough_square_root(x: f64) -> f64 {
 
 /// Cube root of a number that is not negative, to two units in the last place.
 ///
-/// Written here because the one of `libm` rounds correctly, which takes four times as long without hardware
-/// that multiplies and adds in one step.
+/// The one of `libm` is right to the last digit, for which it multiplies and adds in one step: slow where the
+/// processor cannot be relied upon to do that.
 #[inline]
 pub(super) fn cube_root(x: f64) -> f64 {
     if x <= 0.0 {
@@ -78,4 +106,57 @@ pub(super) fn cube_root(x: f64) -> f64 {
         root *= (cube + 2.0 * x) / (2.0 * cube + x);
     }
     root - (root - x / (root * root)) / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cube_root_is_right_to_two_units_in_the_last_place() {
+        for exponent in -300..300 {
+            for part in 0..100 {
+                let x = (1.0 + 0.09 * f64::from(part)) * 10.0_f64.powi(exponent);
+                let (found, right) = (cube_root(x), x.cbrt());
+                assert!((found - right).abs() <= 2.0 * f64::EPSILON * right, "{x}: {found} and not {right}");
+            }
+        }
+        assert_eq!(cube_root(0.0), 0.0);
+    }
+
+    /// Phases of 1 s and 1 m, of every kind: shares of a steady speed, of an acceleration that fades, and of one
+    /// that grows.
+    fn phases() -> impl Iterator<Item = SlowEnd> {
+        let shares = [0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 100.0];
+        let all = shares.into_iter().flat_map(move |a| {
+            shares.into_iter().flat_map(move |b| shares.into_iter().map(move |c| (a, b, c)))
+        });
+        all.filter(|(a, b, c)| a + b + c > 0.0).map(|(steady, fading, growing)| {
+            let whole = steady + fading + growing;
+            let [steady, fading, growing] = [steady / whole, fading / whole, growing / whole];
+            let (half_acceleration, sixth_jerk) = (1.5 * fading, growing - 0.5 * fading);
+            SlowEnd { speed: steady, half_acceleration, sixth_jerk, quartic: 0.0 }
+        })
+    }
+
+    fn way(end: &SlowEnd, t: f64) -> f64 {
+        t * (end.speed + t * (end.half_acceleration + t * (end.sixth_jerk + t * end.quartic)))
+    }
+
+    #[test]
+    fn the_time_to_cover_a_way_is_found_on_every_kind_of_phase() {
+        let quartics = (0..100).map(|percent| {
+            let share = 0.01 * f64::from(percent);
+            SlowEnd { speed: 1.0 - share, half_acceleration: 0.0, sixth_jerk: 2.0 * share, quartic: -share }
+        });
+        for end in phases().chain(quartics) {
+            for step in 0..400 {
+                // Every order of magnitude down to 1e-4 of the phase, and both ends.
+                let time = 10.0_f64.powf(-0.01 * f64::from(step));
+                let found = end.time_to_cover(way(&end, time), 1.0);
+                assert!((found - time).abs() <= 1e-11 * time + 1e-15, "{end:?}: {found} and not {time}");
+            }
+            assert_eq!(end.time_to_cover(0.0, 1.0), 0.0);
+        }
+    }
 }

@@ -2,8 +2,10 @@
 
 #![expect(clippy::indexing_slicing, reason = "a phase's index is a count of the borders passed")]
 
-use super::limits::{Ahead, Limits, ProfileError};
-use super::motion::{Motion, MotionState};
+use super::ahead::{Ahead, grain};
+use super::limits::{Limits, ProfileError};
+use super::motion::{Motion, MotionState, seconds, span_of};
+use super::slow_end::even_time;
 use super::stretch::{Stretch, stretches};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
@@ -45,13 +47,19 @@ impl Trapezoid {
     /// If a limit or a state makes no sense, or the target is nearer than its speed can be reached.
     #[inline]
     pub fn between(current: MotionState, target: MotionState, limits: Limits) -> Result<Self, ProfileError> {
-        let ahead = Ahead::new(current, target, &limits)?;
-        let Ahead { direction, speed: start, way, target_speed: end, .. } = ahead;
+        let ahead = Ahead::new(&current, &target);
+        let possible = ahead.is_sound(&limits) && ahead.way >= shortest_way(&ahead, &limits);
+        if !possible {
+            check(&current, &target, &limits)?;
+        }
+        Ok(Self::laid_out(&ahead, current.distance, &limits))
+    }
+
+    #[inline(always)]
+    fn laid_out(ahead: &Ahead, origin: Length, limits: &Limits) -> Self {
+        let Ahead { direction, speed: start, way, target_speed: end, .. } = *ahead;
         let (speeding, braking) = (limits.acceleration.as_m_per_s2(), limits.deceleration.as_m_per_s2());
         let highest = limits.speed.as_m_per_s();
-        // What it takes to get from one end's speed to the other's at once.
-        let rate = if end > start { speeding } else { braking };
-        ahead.refuse_nearer_than(0.5 * (end - start).abs() * (end + start) / rate)?;
         // d = (v² − v₁²)/2a + (v² − v₂²)/2b for the peak speed v.
         let square = (2.0 * speeding * braking * way + braking * start * start + speeding * end * end)
             / (speeding + braking);
@@ -63,9 +71,9 @@ impl Trapezoid {
         let cruise_time = if cruise_way > 0.0 { cruise_way / peak } else { 0.0 };
         let (cruise_end, whole) = (first_time + cruise_time, first_time + cruise_time + last_time);
         let even = |time, way, speed, acceleration| EvenPhase { time, way, speed, acceleration };
-        Ok(Self {
+        Self {
             direction,
-            origin: current.distance.as_m(),
+            origin: origin.as_m(),
             times: [first_time, cruise_end, whole],
             ways: [first_way, way - last_way, way],
             phases: [
@@ -78,7 +86,7 @@ impl Trapezoid {
                 even(whole, way, end, -braking),
                 even(whole, way, end, 0.0),
             ],
-        })
+        }
     }
 
     /// Where it speeds up, cruises and slows down.
@@ -87,10 +95,26 @@ impl Trapezoid {
     }
 }
 
+/// The way it takes to get from one end's speed to the other's at once.
+#[inline(always)]
+fn shortest_way(ahead: &Ahead, limits: &Limits) -> f64 {
+    let Ahead { speed: start, target_speed: end, .. } = *ahead;
+    let rate = if end > start { limits.acceleration } else { limits.deceleration };
+    0.5 * (end - start).abs() * (end + start) / rate.as_m_per_s2()
+}
+
+/// Why the target cannot be reached, unless it is only rounding that seems to stand in the way.
+#[cold]
+fn check(current: &MotionState, target: &MotionState, limits: &Limits) -> Result<(), ProfileError> {
+    let ahead = Ahead::new(current, target);
+    ahead.check(current, target, limits)?;
+    ahead.refuse_nearer_than(shortest_way(&ahead, limits), grain(current, target))
+}
+
 impl Motion for Trapezoid {
     #[inline]
     fn state_at(&self, time: TimeSpan) -> MotionState {
-        let time = time.as_s().max(0.0);
+        let time = seconds(time).max(0.0);
         let passed: usize = self.times.iter().map(|&end| usize::from(time >= end)).sum();
         let phase = &self.phases[passed];
         let t = time - phase.time;
@@ -109,14 +133,8 @@ impl Motion for Trapezoid {
         // The end itself belongs to the last phase: it may have no speed.
         let passed: usize = self.ways.iter().map(|&end| usize::from(way > end)).sum();
         let phase = &self.phases[passed];
-        let off = way - phase.way;
-        // From the slow end v t + a t²/2 = d has no cancellation as t = 2d / (v + √(v² + 2ad)).
-        let size = off.abs();
-        let speed =
-            phase.speed + libm::sqrt(phase.speed * phase.speed + 2.0 * phase.acceleration.abs() * size);
-        let after = if size > 0.0 { (2.0 * size / speed).copysign(off) } else { 0.0 };
-        let time = (phase.time + after).max(0.0);
-        (way >= 0.0 && time.is_finite()).then(|| TimeSpan::from_s(time))
+        let time = (phase.time + even_time(way - phase.way, phase.speed, phase.acceleration)).max(0.0);
+        (way >= 0.0 && time.is_finite()).then(|| span_of(time))
     }
 
     fn duration(&self) -> TimeSpan {

@@ -4,8 +4,9 @@
 //! began later: a ramp starts where acceleration was or will be zero, at a time, way and speed that follow from
 //! the present ones by the same jerk.
 
-use super::ramp::Ramp;
-use crate::kinematics::phase::Phase;
+use super::knot::Knot;
+use super::ramp::{Ramp, THIRD};
+use super::rate::Rate;
 
 /// Time, way and speed at which acceleration was, or will be, zero under a constant jerk.
 #[derive(Debug, Clone, Copy)]
@@ -16,100 +17,78 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// From the present speed and acceleration; a jerk below zero leads into braking.
-    #[inline]
-    pub(super) fn new(speed: f64, acceleration: f64, jerk: f64) -> Self {
-        let time = -acceleration / jerk;
+    /// From the present speed and acceleration, and one over the jerk; below zero it leads into braking.
+    #[inline(always)]
+    pub(super) fn new(speed: f64, acceleration: f64, per_jerk: f64) -> Self {
+        let time = -acceleration * per_jerk;
         Self {
             time,
             // v t + a t²/2 + j t³/6 with a = −j t
-            way: time * (speed + acceleration * time / 3.0),
+            way: time * (speed + THIRD * acceleration * time),
             speed: speed + 0.5 * acceleration * time,
         }
     }
+
+    #[inline(always)]
+    fn knot(self) -> Knot {
+        Knot { time: self.time, way: self.way, speed: self.speed, half_acceleration: 0.0 }
+    }
 }
 
-/// Four phases: first whatever it takes to level the acceleration out, then the three of a ramp. Unused ones
-/// have no duration.
+/// The borders of four phases, from now on: first whatever it takes to level the acceleration out, then the
+/// three phases of a ramp. Phases that are not needed have no duration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Opening {
-    /// End of each phase, and the way there.
-    pub(super) times: [f64; 4],
-    pub(super) ways: [f64; 4],
-    pub(super) phases: [Phase; 4],
-    /// Speed at the end of the last.
-    pub(super) speed: f64,
+    pub(super) knots: [Knot; 5],
+    /// Whether the ramp is one of slowing down.
+    pub(super) slows: bool,
 }
 
 impl Opening {
+    /// Speeds up from standstill to a peak.
+    #[inline(always)]
+    pub(super) fn from_stand(peak: f64, rate: &Rate) -> Self {
+        let [built_up, held, top] = Ramp::new(0.0, peak, rate).upwards_from_here();
+        Self { knots: [Knot::default(), Knot::default(), built_up, held, top], slows: false }
+    }
+
     /// Speeds up from a present speed and acceleration, which level out as given, by a gain on that.
-    #[inline]
-    pub(super) fn speeding_up(
-        speed: f64,
-        acceleration: f64,
-        level: Level,
-        gain: f64,
-        limit: f64,
-        jerk: f64,
-    ) -> Self {
-        let ramp = Ramp::new(level.speed, gain, limit, jerk);
-        let ([first, hold, fade], [built_up, held]) = ramp.upwards(level.time, level.way);
-        let present = Phase {
-            time: 0.0,
-            distance: 0.0,
-            speed,
-            half_acceleration: 0.5 * acceleration,
-            sixth_jerk: jerk / 6.0,
-        };
-        let (ease_end, ease, build_up) = if acceleration < 0.0 {
-            ((level.time, level.way), first, first)
-        } else {
-            ((0.0, 0.0), present, present)
-        };
-        Self {
-            times: [ease_end.0, built_up.0, held.0, level.time + ramp.time],
-            ways: [ease_end.1, built_up.1, held.1, level.way + ramp.way],
-            phases: [ease, build_up, hold, fade],
-            speed: level.speed + gain,
-        }
+    #[inline(always)]
+    pub(super) fn speeding_up(speed: f64, acceleration: f64, level: Level, gain: f64, rate: &Rate) -> Self {
+        let now = Knot { speed, half_acceleration: 0.5 * acceleration, ..Knot::default() };
+        let eased = if acceleration < 0.0 { level.knot() } else { now };
+        let [built_up, held, top] = Ramp::new(level.speed, gain, rate).upwards(level.time, level.way);
+        Self { knots: [now, eased, built_up, held, top], slows: false }
     }
 
     /// Slows down from a present speed and acceleration to a lower one without acceleration.
-    pub(super) fn slowing_down(speed: f64, acceleration: f64, lower: f64, limit: f64, jerk: f64) -> Self {
-        let level = Level::new(speed, acceleration, -jerk);
-        let ramp = Ramp::new(lower, level.speed - lower, limit, jerk);
-        let (end_time, end_way) = (level.time + ramp.time, level.way + ramp.way);
-        let ([build_up, hold, fade], [built_up, held]) = ramp.downwards(end_time, end_way);
-        let present = Phase {
-            time: 0.0,
-            distance: 0.0,
-            speed,
-            half_acceleration: 0.5 * acceleration,
-            sixth_jerk: -jerk / 6.0,
-        };
-        let ease_end = if acceleration > 0.0 { (level.time, level.way) } else { (0.0, 0.0) };
-        Self {
-            times: [ease_end.0, built_up.0, held.0, end_time],
-            ways: [ease_end.1, built_up.1, held.1, end_way],
-            phases: [present, build_up, hold, fade],
-            speed: lower,
-        }
+    pub(super) fn slowing_down(speed: f64, acceleration: f64, lower: f64, rate: &Rate) -> Self {
+        let now = Knot { speed, half_acceleration: 0.5 * acceleration, ..Knot::default() };
+        let level = Level::new(speed, acceleration, -rate.per_jerk);
+        let eased = if acceleration > 0.0 { level.knot() } else { now };
+        let ramp = Ramp::new(lower, level.speed - lower, rate);
+        let [built_up, held, bottom] = ramp.downwards(level.time + ramp.time, level.way + ramp.way);
+        Self { knots: [now, eased, built_up, held, bottom], slows: true }
     }
 
     /// Eases off from braking at `braking` to braking at `eased`, both sizes.
-    pub(super) fn easing_off(speed: f64, braking: f64, eased: f64, jerk: f64) -> Self {
-        let time = (braking - eased) / jerk;
-        let way = time * (speed - time * (0.5 * braking - jerk * time / 6.0));
-        let speed = speed - 0.5 * time * (braking + eased);
-        let ease =
-            Phase { time, distance: way, speed, half_acceleration: -0.5 * eased, sixth_jerk: jerk / 6.0 };
-        Self { times: [time; 4], ways: [way; 4], phases: [ease; 4], speed }
+    pub(super) fn easing_off(speed: f64, braking: f64, eased: f64, rate: &Rate) -> Self {
+        let now = Knot { speed, half_acceleration: -0.5 * braking, ..Knot::default() };
+        let time = (braking - eased) * rate.per_jerk;
+        let easier = Knot {
+            time,
+            // v t − b t²/2 + J t³/6 with J t = b − e
+            way: time * (speed - THIRD * time * (braking + 0.5 * eased)),
+            speed: speed - 0.5 * time * (braking + eased),
+            half_acceleration: -0.5 * eased,
+        };
+        Self { knots: [now, easier, easier, easier, easier], slows: false }
     }
 
-    /// Time and way at its end.
-    #[inline]
-    pub(super) fn end(&self) -> (f64, f64) {
-        let ([.., time], [.., way]) = (self.times, self.ways);
-        (time, way)
+    /// Where it ends.
+    #[inline(always)]
+    pub(super) fn end(&self) -> Knot {
+        let [.., end] = self.knots;
+        end
     }
 }

@@ -1,10 +1,38 @@
 //! The highest speed of a jerk-limited run that is too short to cruise.
 
-use super::ramp::{holds_limit, way_and_slope};
-use crate::kinematics::slow_end::cube_root;
+use super::rate::Rate;
+use crate::kinematics::slow_end::{SlowEnd, cube_root};
 
-/// Steps of Newton's method at most. Four or five are usual; the bound only keeps the loop finite.
-const MOST_STEPS: u32 = 60;
+/// Steps of Newton's method at most. Two or three are usual; the bound only keeps the loop finite.
+const MOST_STEPS: u32 = 30;
+
+/// A relative step of this size was the last: what it leaves is about its square.
+const SETTLED: f64 = 2e-8;
+
+/// The peak speed, not above `highest`, of a run from standstill to standstill.
+///
+/// Closed where both ramps hold their limits (a quadratic) and where neither does (a cube root).
+#[inline(always)]
+pub(super) fn peak_between_stands(way: f64, highest: f64, speeding: &Rate, braking: &Rate) -> f64 {
+    let (a, b) = (speeding.limit, braking.limit);
+    // v²/2a + v a/2J + v²/2b + v b/2J = d, multiplied by 2ab.
+    let (square, double) = (a + b, 2.0 * a * b);
+    let linear = 0.5 * double * square * speeding.per_jerk;
+    let constant = double * way;
+    let root = libm::sqrt(linear * linear + 4.0 * square * constant);
+    let peak = 2.0 * constant / (linear + root);
+    if speeding.is_reached_by(peak) && braking.is_reached_by(peak) {
+        return if peak < highest { peak } else { highest };
+    }
+    // With v = J t², both ramps run v t: d = 2 J t³.
+    let time = cube_root(0.5 * way * speeding.per_jerk);
+    let without_hold = speeding.jerk * time * time;
+    if !speeding.is_reached_by(without_hold) && !braking.is_reached_by(without_hold) {
+        return if without_hold < highest { without_hold } else { highest };
+    }
+    let run = Run { start: 0.0, end: 0.0, speeding: *speeding, braking: *braking };
+    run.refine(way, 0.0, highest).first
+}
 
 /// A run that speeds up from one speed by a ramp and slows down to another by a second one.
 #[derive(Debug, Clone, Copy)]
@@ -12,9 +40,8 @@ pub(super) struct Run {
     /// Speed at the lower end of the first ramp and of the second.
     pub(super) start: f64,
     pub(super) end: f64,
-    pub(super) acceleration: f64,
-    pub(super) deceleration: f64,
-    pub(super) jerk: f64,
+    pub(super) speeding: Rate,
+    pub(super) braking: Rate,
 }
 
 /// The speeds that the two ramps of a run gain.
@@ -26,47 +53,43 @@ pub(super) struct Gains {
 
 impl Run {
     /// What both ramps gain when the peak is `above` the higher of their lower ends.
-    #[inline]
+    #[inline(always)]
     fn gains(&self, above: f64) -> Gains {
         let base = self.start.max(self.end);
         Gains { first: base - self.start + above, second: base - self.end + above }
     }
 
     /// The gains to a peak speed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn gains_to(&self, peak: f64) -> Gains {
         self.gains(peak - self.start.max(self.end))
     }
 
     /// The way of both ramps, and how it grows with the peak speed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn way_and_slope(&self, gains: Gains) -> (f64, f64) {
-        let (first, first_slope) = way_and_slope(self.start, gains.first, self.acceleration, self.jerk);
-        let (second, second_slope) = way_and_slope(self.end, gains.second, self.deceleration, self.jerk);
+        let (first, first_slope) = self.speeding.way_and_slope(self.start, gains.first);
+        let (second, second_slope) = self.braking.way_and_slope(self.end, gains.second);
         (first + second, first_slope + second_slope)
     }
 
+    #[inline(always)]
     fn both_hold(&self, gains: Gains) -> bool {
-        holds_limit(gains.first, self.acceleration, self.jerk)
-            && holds_limit(gains.second, self.deceleration, self.jerk)
+        self.speeding.is_reached_by(gains.first) && self.braking.is_reached_by(gains.second)
     }
 
     /// The gains, to a peak speed between `lowest` and `highest`, at which both ramps together take up a way or
-    /// as much of it as they can.
-    ///
-    /// Closed where both ramps hold their limits (a quadratic), and where neither does and both begin from
-    /// standstill (a cube root); by Newton's method in between.
-    #[inline]
+    /// as much of it as they can: closed where both hold their limits, by Newton's method where not.
+    #[inline(always)]
     pub(super) fn gains_for(&self, way: f64, lowest: f64, highest: f64) -> Gains {
-        let Self { start, end, acceleration, deceleration, jerk } = *self;
+        let Self { start, end, speeding, braking } = *self;
+        let (a, b, per_jerk) = (speeding.limit, braking.limit, speeding.per_jerk);
         // (v² − v₁²)/2a + (v + v₁) a/2J + (v² − v₂²)/2b + (v + v₂) b/2J = d, multiplied by 2ab.
-        let square = acceleration + deceleration;
-        let linear = acceleration * deceleration * square / jerk;
-        let constant = deceleration * start * (acceleration * acceleration / jerk - start)
-            + acceleration * end * (deceleration * deceleration / jerk - end)
-            - 2.0 * acceleration * deceleration * way;
-        let root = libm::sqrt((linear * linear - 4.0 * square * constant).max(0.0));
-        let peak = 0.5 * (root - linear) / square;
+        let square = a + b;
+        let linear = a * b * square * per_jerk;
+        let constant =
+            2.0 * a * b * way - b * start * (a * a * per_jerk - start) - a * end * (b * b * per_jerk - end);
+        let peak = 2.0 * constant / (linear + libm::sqrt(linear * linear + 4.0 * square * constant));
         if peak >= highest {
             // Ramps that need not hold their limits are shorter still.
             return self.gains_to(highest);
@@ -75,34 +98,46 @@ impl Run {
         if self.both_hold(gains) {
             return gains;
         }
-        // With v = J t², both ramps run v t: d = 2 J t³.
-        let time = cube_root(0.5 * way / jerk);
-        let peak_without_hold = jerk * time * time;
-        let from_stand = start == 0.0 && end == 0.0;
-        if from_stand && !holds_limit(peak_without_hold, acceleration.min(deceleration), jerk) {
-            return self.gains_to(peak_without_hold.min(highest));
-        }
-        self.refine(way, peak, lowest, highest)
+        self.refine(way, lowest, highest)
     }
 
-    /// Newton's method in the root of what the peak is above the higher of both ends, in which the way is a
+    /// Newton's method in the root u of what the peak is above the higher of both ends, in which the way is a
     /// convex function without a vertical start: once above the solution it comes down to it.
-    fn refine(&self, way: f64, guess: f64, lowest: f64, highest: f64) -> Gains {
+    #[inline(never)]
+    fn refine(self, way: f64, lowest: f64, highest: f64) -> Gains {
         let base = self.start.max(self.end);
         let (lowest, highest) = (lowest - base, highest - base);
-        // At the base itself the curve has no slope to follow.
-        let mut above = if guess > base { guess - base } else { highest };
+        let mut above = (self.first_guess(way, base)).max(lowest).min(highest);
         for _ in 0..MOST_STEPS {
             let (run, slope) = self.way_and_slope(self.gains(above));
             let old_root = libm::sqrt(above);
             let root = (old_root - (run - way) / (2.0 * old_root * slope)).max(0.0);
             let next = (root * root).max(lowest).min(highest);
-            let settled = (next - above).abs() <= 4.0 * f64::EPSILON * next;
+            let settled = (next - above).abs() <= SETTLED * next;
             above = next;
             if settled {
                 break;
             }
         }
         self.gains(above)
+    }
+
+    /// What the peak is above the higher end if the ramp from there does not hold its limit, and the other one
+    /// only grows by its slope: b u + s u² + k u³ is the way that is left, solved like a phase of a profile.
+    fn first_guess(&self, way: f64, base: f64) -> f64 {
+        let (low, other) =
+            if self.start < self.end { (self.start, self.speeding) } else { (self.end, self.braking) };
+        // A ramp of gain u² takes 2u/√J at a mean of v + u²/2.
+        let cubic = libm::sqrt(other.per_jerk);
+        let linear = 2.0 * base * cubic;
+        let end = if low < base {
+            let (way_to_base, slope) = other.way_and_slope(low, base - low);
+            (way - way_to_base, linear, slope, cubic)
+        } else {
+            (way, 2.0 * linear, 0.0, 2.0 * cubic)
+        };
+        let (left, speed, half_acceleration, sixth_jerk) = end;
+        let root = SlowEnd { speed, half_acceleration, sixth_jerk, quartic: 0.0 }.rough_time_to_cover(left);
+        root * root
     }
 }

@@ -10,10 +10,12 @@
 //! train above the limit of speed slows down to it instead of speeding up, or only as far as the way allows.
 
 use super::opening::{Level, Opening};
-use super::peak::{Gains, Run};
-use super::ramp::{Ramp, way_and_slope};
+use super::peak::{Gains, Run, peak_between_stands};
+use super::ramp::Ramp;
+use super::rate::Rate;
+use crate::kinematics::ahead::{Ahead, ROUNDINGS};
 use crate::kinematics::bracket::crossing;
-use crate::kinematics::limits::{Ahead, Limits, ProfileError, ROUNDINGS};
+use crate::kinematics::limits::{Limits, ProfileError};
 use crate::units::Acceleration;
 
 /// How much the present state may be outside of what is possible before it is more than rounding, relative.
@@ -29,13 +31,31 @@ pub(super) struct Plan {
     pub(super) level: (f64, f64),
 }
 
+impl Plan {
+    /// From standstill to standstill, where nothing is wrong with that: the most common problem of all has a
+    /// path of its own, in which nothing is worked out that is zero.
+    #[inline(always)]
+    pub(super) fn between_stands(ahead: &Ahead, limits: &Limits) -> Option<Self> {
+        let jerk = limits.jerk.as_m_per_s3();
+        let stands = ahead.speed == 0.0 && ahead.acceleration == 0.0 && ahead.target_speed == 0.0;
+        let per_jerk = 1.0 / jerk;
+        if !(stands && ahead.is_sound(limits) && jerk > 0.0 && per_jerk > 0.0) {
+            return None;
+        }
+        let speeding = Rate::new(limits.acceleration.as_m_per_s2(), jerk, per_jerk);
+        let braking = Rate::new(limits.deceleration.as_m_per_s2(), jerk, per_jerk);
+        let peak = peak_between_stands(ahead.way, limits.speed.as_m_per_s(), &speeding, &braking);
+        let opening = Opening::from_stand(peak, &speeding);
+        Some(Self { opening, cruises: true, closing: Ramp::new(0.0, peak, &braking), level: (0.0, 0.0) })
+    }
+}
+
 /// A problem with its limits, in plain SI numbers.
 pub(super) struct Planner {
     ahead: Ahead,
     highest: f64,
-    speeding: f64,
-    braking: f64,
-    jerk: f64,
+    speeding: Rate,
+    braking: Rate,
     /// Where the present acceleration was or will be zero if the train now eases off from braking or goes on
     /// speeding up.
     level: Level,
@@ -44,73 +64,92 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    #[inline]
-    pub(super) fn new(ahead: Ahead, limits: &Limits) -> Result<Self, ProfileError> {
-        let (speeding, braking) = (limits.acceleration.as_m_per_s2(), limits.deceleration.as_m_per_s2());
+    #[inline(always)]
+    pub(super) fn new(ahead: &Ahead, limits: &Limits) -> Self {
+        let Ahead { acceleration, speed, target_speed, .. } = *ahead;
         let jerk = limits.jerk.as_m_per_s3();
+        let per_jerk = 1.0 / jerk;
+        let mut level = Level::new(speed, acceleration, per_jerk);
+        let mut leveled = speed + 0.5 * acceleration * acceleration.abs() * per_jerk;
+        // A train that is about to arrive levels out at just the target's speed. The smallest difference left
+        // by rounding would take as long as its square root to make up.
+        let difference = leveled - target_speed;
+        if difference.abs() <= ROUNDING * speed {
+            level.speed -= difference;
+            leveled = target_speed;
+        }
+        Self {
+            ahead: *ahead,
+            highest: limits.speed.as_m_per_s(),
+            speeding: Rate::new(limits.acceleration.as_m_per_s2(), jerk, per_jerk),
+            braking: Rate::new(limits.deceleration.as_m_per_s2(), jerk, per_jerk),
+            level,
+            leveled,
+        }
+    }
+
+    /// Whether it is one of the first two cases, by far the most common, and nothing is wrong. No comparison
+    /// holds for NaN.
+    #[inline(always)]
+    pub(super) fn is_ordinary(&self) -> bool {
+        let Self { ahead: Ahead { acceleration, way, .. }, highest, leveled, .. } = *self;
+        let (speeding, braking) = (self.speeding.limit, self.braking.limit);
+        let lowest = self.lowest();
+        self.speeding.jerk > 0.0
+            && self.speeding.per_jerk > 0.0
+            && acceleration <= speeding
+            && -acceleration <= braking
+            && leveled >= 0.0
+            && leveled <= highest
+            && (lowest == 0.0 || way >= self.shortest(lowest))
+    }
+
+    /// What is wrong with the problem, if anything is; what is only rounding is put right.
+    pub(super) fn checked(mut self, direction: f64) -> Result<Self, ProfileError> {
+        let Ahead { acceleration, speed, .. } = self.ahead;
+        let (speeding, braking, jerk) = (self.speeding.limit, self.braking.limit, self.speeding.jerk);
         if !(jerk > 0.0 && jerk.is_finite()) {
             return Err(ProfileError::NoLimit { limit: "jerk", found: jerk });
         }
-        let Ahead { acceleration, speed, .. } = ahead;
-        let found = Acceleration::from_m_per_s2(ahead.direction * acceleration);
+        let found = Acceleration::from_m_per_s2(direction * acceleration);
         if acceleration > speeding * (1.0 + ROUNDING) || -acceleration > braking * (1.0 + ROUNDING) {
             return Err(ProfileError::BeyondLimits { found });
         }
-        let acceleration = acceleration.max(-braking).min(speeding);
-        let mut level = Level::new(speed, acceleration, jerk);
-        let mut leveled =
-            if acceleration > 0.0 { speed + 0.5 * acceleration * acceleration / jerk } else { level.speed };
-        if leveled < -ROUNDING * speed {
+        self.ahead.acceleration = acceleration.max(-braking).min(speeding);
+        if self.leveled < -ROUNDING * speed {
             return Err(ProfileError::StandsFirst { found });
         }
-        // A train that is about to arrive levels out at just the target's speed. The smallest difference left
-        // by rounding would take as long as its square root to make up.
-        let difference = leveled - ahead.target_speed;
-        if difference.abs() <= ROUNDING * speed {
-            level.speed -= difference;
-            leveled = ahead.target_speed;
-        }
-        let ahead = Ahead { acceleration, ..ahead };
-        Ok(Self { ahead, highest: limits.speed.as_m_per_s(), speeding, braking, jerk, level, leveled })
+        self.leveled = self.leveled.max(0.0);
+        self.level.speed = if acceleration < 0.0 { self.leveled } else { self.level.speed };
+        Ok(self)
     }
 
-    #[inline]
-    pub(super) fn plan(&self) -> Result<Plan, ProfileError> {
-        if self.leveled > self.highest {
-            return self.slow_down_to_limit();
-        }
-        let Self { level, ahead: Ahead { way, target_speed, .. }, .. } = *self;
-        let lowest = self.leveled.max(target_speed);
+    /// The plan of an ordinary problem.
+    #[inline(always)]
+    pub(super) fn ordinary(&self) -> Plan {
         let run = self.run();
-        let at_least = if lowest > 0.0 { level.way + run.way_and_slope(run.gains_to(lowest)).0 } else { 0.0 };
-        if way < at_least {
-            if self.brakes_towards_target() {
-                return self.ease_off();
+        self.speed_up(run.gains_for(self.ahead.way - self.level.way, self.lowest(), self.highest))
+    }
+
+    /// The plan of any problem, if there is one. Distances are as precise as their `grain`.
+    pub(super) fn any(&self, grain: f64) -> Result<Plan, ProfileError> {
+        if self.leveled > self.highest {
+            return self.slow_down_to_limit(grain);
+        }
+        let shortest = self.shortest(self.lowest());
+        if self.ahead.way < shortest {
+            if self.ahead.acceleration < 0.0 && self.ahead.target_speed < self.leveled {
+                return self.ease_off(grain);
             }
-            self.refuse_nearer_than(at_least)?;
+            self.refuse_nearer_than(shortest, grain)?;
         }
-        Ok(self.speed_up(run.gains_for(way - level.way, lowest, self.highest)))
+        Ok(self.ordinary())
     }
 
-    /// The refusal of a target that is nearer than `shortest`, unless by no more than rounding explains: a
-    /// speed to make up for takes as long as its square root, 2√(v/J), even where it is but a rounding.
-    fn refuse_nearer_than(&self, shortest: f64) -> Result<(), ProfileError> {
-        let speed = self.leveled.max(self.ahead.target_speed);
-        let rounding = ROUNDINGS * f64::EPSILON * speed;
-        let grain = self.ahead.grain + 2.0 * speed * libm::sqrt(rounding / self.jerk);
-        Ahead { grain, ..self.ahead }.refuse_nearer_than(shortest)
-    }
-
-    /// Speeding up from where the acceleration is level, and slowing down to the target's speed.
-    #[inline]
-    fn run(&self) -> Run {
-        Run {
-            start: self.level.speed,
-            end: self.ahead.target_speed,
-            acceleration: self.speeding,
-            deceleration: self.braking,
-            jerk: self.jerk,
-        }
+    /// The lowest peak there can be.
+    #[inline(always)]
+    fn lowest(&self) -> f64 {
+        if self.leveled > self.ahead.target_speed { self.leveled } else { self.ahead.target_speed }
     }
 
     /// To the target's speed at once, wherever that is reached.
@@ -124,32 +163,55 @@ impl Planner {
         Plan { cruises: false, ..plan }
     }
 
-    fn brakes_towards_target(&self) -> bool {
-        self.ahead.acceleration < 0.0 && self.ahead.target_speed < self.leveled
+    /// Speeding up from where the acceleration is level, and slowing down to the target's speed.
+    #[inline(always)]
+    fn run(&self) -> Run {
+        Run {
+            start: self.level.speed,
+            end: self.ahead.target_speed,
+            speeding: self.speeding,
+            braking: self.braking,
+        }
     }
 
-    #[inline]
+    /// The way that it takes with the lowest peak there can be.
+    #[inline(always)]
+    fn shortest(&self, lowest: f64) -> f64 {
+        let run = self.run();
+        self.level.way + run.way_and_slope(run.gains_to(lowest)).0
+    }
+
+    /// The refusal of a target that is nearer than `shortest`, unless by no more than rounding explains: a
+    /// speed to make up for takes as long as its square root, 2√(v/J), even where it is but a rounding.
+    fn refuse_nearer_than(&self, shortest: f64, grain: f64) -> Result<(), ProfileError> {
+        let speed = self.leveled.max(self.ahead.target_speed);
+        let rounding = ROUNDINGS * f64::EPSILON * speed.max(self.ahead.speed);
+        let grain = grain + 2.0 * speed * libm::sqrt(rounding * self.braking.per_jerk);
+        self.ahead.refuse_nearer_than(shortest, grain)
+    }
+
+    #[inline(always)]
     fn speed_up(&self, Gains { first, second }: Gains) -> Plan {
         let Ahead { speed, acceleration, target_speed, .. } = self.ahead;
-        let opening = Opening::speeding_up(speed, acceleration, self.level, first, self.speeding, self.jerk);
-        let closing = Ramp::new(target_speed, second, self.braking, self.jerk);
+        let opening = Opening::speeding_up(speed, acceleration, self.level, first, &self.speeding);
+        let closing = Ramp::new(target_speed, second, &self.braking);
         Plan { opening, cruises: true, closing, level: (0.0, 0.0) }
     }
 
     fn slow_down(&self, lower: f64) -> Plan {
         let Ahead { speed, acceleration, target_speed, .. } = self.ahead;
-        let opening = Opening::slowing_down(speed, acceleration, lower, self.braking, self.jerk);
-        let closing = Ramp::new(target_speed, lower - target_speed, self.braking, self.jerk);
+        let opening = Opening::slowing_down(speed, acceleration, lower, &self.braking);
+        let closing = Ramp::new(target_speed, lower - target_speed, &self.braking);
         Plan { opening, cruises: true, closing, level: (0.0, 0.0) }
     }
 
     /// The train is above the limit of speed, or about to be.
-    fn slow_down_to_limit(&self) -> Result<Plan, ProfileError> {
+    fn slow_down_to_limit(&self, grain: f64) -> Result<Plan, ProfileError> {
         let Ahead { speed, acceleration, way, target_speed, .. } = self.ahead;
-        let level = Level::new(speed, acceleration, -self.jerk);
+        let level = Level::new(speed, acceleration, -self.braking.per_jerk);
         let way_by = |lower: f64| {
-            let (first, _) = way_and_slope(lower, level.speed - lower, self.braking, self.jerk);
-            let (second, _) = way_and_slope(target_speed, lower - target_speed, self.braking, self.jerk);
+            let (first, _) = self.braking.way_and_slope(lower, level.speed - lower);
+            let (second, _) = self.braking.way_and_slope(target_speed, lower - target_speed);
             level.way + first + second
         };
         if way_by(self.highest) <= way {
@@ -159,28 +221,28 @@ impl Planner {
         if at_least <= way {
             return Ok(self.slow_down(crossing(self.highest, self.leveled, |lower| way_by(lower) - way)));
         }
-        if self.brakes_towards_target() {
-            return self.ease_off();
+        if acceleration < 0.0 {
+            return self.ease_off(grain);
         }
-        self.refuse_nearer_than(at_least)?;
+        self.refuse_nearer_than(at_least, grain)?;
         Ok(self.slow_down(self.leveled))
     }
 
     /// The train brakes, and would run past the target if it eased off altogether.
-    fn ease_off(&self) -> Result<Plan, ProfileError> {
+    fn ease_off(&self, grain: f64) -> Result<Plan, ProfileError> {
         let Ahead { speed, acceleration, way, target_speed, .. } = self.ahead;
         let plan_by = |eased: f64| {
-            let opening = Opening::easing_off(speed, -acceleration, eased, self.jerk);
-            let level = Level::new(opening.speed, -eased, -self.jerk);
-            let closing = Ramp::new(target_speed, level.speed - target_speed, self.braking, self.jerk);
+            let opening = Opening::easing_off(speed, -acceleration, eased, &self.braking);
+            let level = Level::new(opening.end().speed, -eased, -self.braking.per_jerk);
+            let closing = Ramp::new(target_speed, level.speed - target_speed, &self.braking);
             Plan { opening, cruises: false, closing, level: (level.time, level.way) }
         };
         let way_by = |eased: f64| {
             let Plan { opening, closing, level, .. } = plan_by(eased);
-            opening.end().1 + level.1 + closing.way
+            opening.end().way + level.1 + closing.way
         };
         let at_least = way_by(-acceleration);
-        self.refuse_nearer_than(at_least)?;
+        self.refuse_nearer_than(at_least, grain)?;
         Ok(plan_by(crossing(0.0, -acceleration, |eased| way_by(eased) - way)))
     }
 }

@@ -1,9 +1,10 @@
 //! A profile played back at a steady period, for controllers that ask once in every cycle.
 
-#![expect(clippy::indexing_slicing, reason = "the current phase is never counted beyond the last")]
+#![expect(clippy::indexing_slicing, reason = "phases are counted up to the last, which never ends")]
 
 use super::{PHASES, SCurve};
-use crate::kinematics::motion::MotionState;
+use crate::kinematics::motion::{MotionState, seconds};
+use crate::kinematics::phase::Phase;
 use crate::time::TimeSpan;
 
 /// The states of a profile, one every period from its start on, for ever.
@@ -12,12 +13,24 @@ pub struct Playback<'p> {
     profile: &'p SCurve,
     period: TimeSpan,
     next: TimeSpan,
-    phase: usize,
+    number: usize,
+    phase: Phase,
+    /// When the next phase begins.
+    until: f64,
 }
 
 impl<'p> Playback<'p> {
     pub(super) fn new(profile: &'p SCurve, period: TimeSpan) -> Self {
-        Self { profile, period, next: TimeSpan::ZERO, phase: 0 }
+        let mut playback =
+            Self { profile, period, next: TimeSpan::ZERO, number: 0, phase: profile.phase(0), until: 0.0 };
+        playback.turn_to(0);
+        playback
+    }
+
+    fn turn_to(&mut self, number: usize) {
+        self.number = number;
+        self.phase = self.profile.phase(number);
+        self.until = if number < PHASES { self.profile.times[number + 1] } else { f64::INFINITY };
     }
 }
 
@@ -26,11 +39,11 @@ impl Iterator for Playback<'_> {
 
     #[inline]
     fn next(&mut self) -> Option<MotionState> {
-        let time = self.next.as_s();
-        while self.phase < PHASES && time >= self.profile.times[self.phase] {
-            self.phase += 1;
+        let time = seconds(self.next);
+        while time >= self.until {
+            self.turn_to(self.number + 1);
         }
         self.next += self.period;
-        Some(self.profile.turned(self.profile.phases[self.phase].state_at(time)))
+        Some(self.profile.turned(self.phase.state_at(time)))
     }
 }

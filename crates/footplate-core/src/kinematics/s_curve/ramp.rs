@@ -9,104 +9,75 @@
 //! A ramp is its own mirror image, so that its mean speed is the mean of both ends; slowing down is the same
 //! ramp backwards.
 
-use crate::kinematics::phase::Phase;
+use super::knot::Knot;
+use super::rate::Rate;
 
-/// A ramp, in time and way since its lower end; SI units.
+pub(super) const THIRD: f64 = 1.0 / 3.0;
+
+/// A ramp, counted from its lower end; SI units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ramp {
-    peak: f64,
-    sixth_jerk: f64,
-    /// Time, way and speed at the lower end, after the build-up, and after the hold.
-    knots: [(f64, f64, f64); 3],
+    low: f64,
+    high: f64,
+    /// Where acceleration has built up, and where it begins to fade.
+    built_up: Knot,
+    held: Knot,
     pub(super) time: f64,
     pub(super) way: f64,
-}
-
-/// Whether a gain of speed is large enough for the limit of acceleration to be reached.
-#[inline]
-pub(super) fn holds_limit(gain: f64, limit: f64, jerk: f64) -> bool {
-    gain >= limit * limit / jerk
-}
-
-/// The way of a ramp, and how it grows with the speed gained; a gain below zero is rounding.
-#[inline]
-pub(super) fn way_and_slope(low: f64, gain: f64, limit: f64, jerk: f64) -> (f64, f64) {
-    let gain = gain.max(0.0);
-    let (time, slope) = if holds_limit(gain, limit, jerk) {
-        (gain / limit + limit / jerk, 1.0 / limit)
-    } else {
-        let time = 2.0 * libm::sqrt(gain / jerk);
-        (time, 2.0 / (jerk * time))
-    };
-    let mean = low + 0.5 * gain;
-    (mean * time, 0.5 * time + mean * slope)
 }
 
 impl Ramp {
     /// From a speed up by a gain, given apart because the difference to a peak hardly above it has few digits;
     /// a gain below zero is rounding.
-    #[inline]
-    pub(super) fn new(low: f64, gain: f64, limit: f64, jerk: f64) -> Self {
-        let gain = gain.max(0.0);
+    #[inline(always)]
+    pub(super) fn new(low: f64, gain: f64, rate: &Rate) -> Self {
+        let gain = if gain > 0.0 { gain } else { 0.0 };
         let high = low + gain;
-        let (peak, build_up, hold) = if holds_limit(gain, limit, jerk) {
-            let build_up = limit / jerk;
-            (limit, build_up, (gain / limit - build_up).max(0.0))
-        } else {
-            let build_up = libm::sqrt(gain / jerk);
-            (jerk * build_up, build_up, 0.0)
-        };
-        let built_up = 0.5 * peak * build_up;
-        let (slow, fast) = (low + built_up, high - built_up);
-        let first_way = build_up * (low + built_up / 3.0);
-        let held_way = first_way + 0.5 * hold * (slow + fast);
+        let (peak, build_up, hold) = rate.peak_for(gain);
+        let half_acceleration = 0.5 * peak;
+        let won = half_acceleration * build_up;
+        let (slow, fast) = (low + won, high - won);
+        let bent = THIRD * won;
+        let build_up_way = build_up * (low + bent);
+        let held_time = build_up + hold;
+        let held_way = build_up_way + hold * (0.5 * (slow + fast));
         Self {
-            peak,
-            sixth_jerk: jerk / 6.0,
-            knots: [(0.0, 0.0, low), (build_up, first_way, slow), (build_up + hold, held_way, fast)],
-            time: 2.0 * build_up + hold,
-            way: held_way + build_up * (high - built_up / 3.0),
+            low,
+            high,
+            built_up: Knot { time: build_up, way: build_up_way, speed: slow, half_acceleration },
+            held: Knot { time: held_time, way: held_way, speed: fast, half_acceleration },
+            time: build_up + held_time,
+            way: held_way + build_up * (high - bent),
         }
     }
 
-    /// Its three phases when the lower end is passed at a time and a way; and where the first two of them end.
-    #[inline]
-    pub(super) fn upwards(&self, time: f64, way: f64) -> ([Phase; 3], [(f64, f64); 2]) {
-        let [start, built_up, held] = self.knots;
-        let phase = |(after, off, speed): (f64, f64, f64), half_acceleration, sixth_jerk| Phase {
-            time: time + after,
-            distance: way + off,
-            speed,
-            half_acceleration,
-            sixth_jerk,
-        };
-        let half = 0.5 * self.peak;
-        let phases = [
-            phase(start, 0.0, self.sixth_jerk),
-            phase(built_up, half, 0.0),
-            phase(held, half, -self.sixth_jerk),
-        ];
-        (phases, [(time + built_up.0, way + built_up.1), (time + held.0, way + held.1)])
+    /// Its inner borders and its upper end, when it begins here and now.
+    #[inline(always)]
+    pub(super) fn upwards_from_here(&self) -> [Knot; 3] {
+        let top = Knot { time: self.time, way: self.way, speed: self.high, half_acceleration: 0.0 };
+        [self.built_up, self.held, top]
     }
 
-    /// Its three phases in order of time when it is run backwards, from the higher end down, and the lower end
-    /// is reached at a time and a way; and where the first two of them end.
-    #[inline]
-    pub(super) fn downwards(&self, time: f64, way: f64) -> ([Phase; 3], [(f64, f64); 2]) {
-        let [end, built_up, held] = self.knots;
-        let phase = |(before, off, speed): (f64, f64, f64), half_acceleration, sixth_jerk| Phase {
-            time: time - before,
-            distance: way - off,
-            speed,
-            half_acceleration,
-            sixth_jerk,
+    /// The same when its lower end is passed at another time and way.
+    #[inline(always)]
+    pub(super) fn upwards(&self, time: f64, way: f64) -> [Knot; 3] {
+        self.upwards_from_here().map(|knot| Knot { time: time + knot.time, way: way + knot.way, ..knot })
+    }
+
+    /// Its inner borders and its lower end in order of time, when it is run backwards, from the upper end down,
+    /// and the lower end is reached at a time and a way.
+    #[inline(always)]
+    pub(super) fn downwards(&self, time: f64, way: f64) -> [Knot; 3] {
+        let before = |knot: Knot| Knot {
+            time: time - knot.time,
+            way: way - knot.way,
+            speed: knot.speed,
+            half_acceleration: -knot.half_acceleration,
         };
-        let half = -0.5 * self.peak;
-        let phases = [
-            phase(held, half, -self.sixth_jerk),
-            phase(built_up, half, 0.0),
-            phase(end, 0.0, self.sixth_jerk),
-        ];
-        (phases, [(time - held.0, way - held.1), (time - built_up.0, way - built_up.1)])
+        [
+            before(self.held),
+            before(self.built_up),
+            Knot { time, way, speed: self.low, half_acceleration: 0.0 },
+        ]
     }
 }

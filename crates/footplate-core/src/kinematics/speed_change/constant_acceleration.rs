@@ -2,6 +2,7 @@
 
 use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
+use crate::kinematics::slow_end::even_time;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
@@ -9,6 +10,9 @@ use crate::units::{Acceleration, Length, Speed};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstantAcceleration {
     ends: Ends,
+    /// Time, distance and speed of the slow end, from which all is counted, so that a stop ends in a speed of
+    /// exactly zero.
+    origin: (f64, f64, f64),
     acceleration: f64,
 }
 
@@ -18,7 +22,10 @@ impl ConstantAcceleration {
     #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
-        Self { ends, acceleration: ends.per_duration(ends.to - ends.from) }
+        let acceleration = ends.per_duration(ends.to - ends.from);
+        let origin =
+            if acceleration < 0.0 { (ends.duration, ends.distance, ends.to) } else { (0.0, 0.0, ends.from) };
+        Self { ends, origin, acceleration }
     }
 
     /// From a speed to another with an acceleration, of which only the size counts; zero takes for ever, which
@@ -35,27 +42,18 @@ impl ConstantAcceleration {
 impl Motion for ConstantAcceleration {
     #[inline]
     fn state_at(&self, time: TimeSpan) -> MotionState {
-        let Self { ends: Ends { from, to, duration, distance, .. }, acceleration } = *self;
+        let Self { origin: (start, distance, speed), acceleration, .. } = *self;
         self.ends.state_at(time, |t| {
-            // A stop is counted from its end, so that it ends in a speed of exactly zero.
-            let (t, speed, origin) =
-                if acceleration < 0.0 { (t - duration, to, distance) } else { (t, from, 0.0) };
+            let t = t - start;
             let gained = acceleration * t;
-            (origin + t * (speed + 0.5 * gained), speed + gained, acceleration)
+            (distance + t * (speed + 0.5 * gained), speed + gained, acceleration)
         })
     }
 
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
-        let Self { ends: Ends { from, to, duration, distance: whole, .. }, acceleration } = *self;
-        self.ends.time_at(distance, |way| {
-            // From the slow end v t + a t²/2 = d has no cancellation as t = 2d / (v + √(v² + 2ad)).
-            let braking = acceleration < 0.0;
-            let (speed, off) = if braking { (to, whole - way) } else { (from, way) };
-            let sum = speed + libm::sqrt(speed * speed + 2.0 * acceleration.abs() * off);
-            let time = if off > 0.0 { (2.0 * off / sum).min(duration) } else { 0.0 };
-            if braking { duration - time } else { time }
-        })
+        let Self { origin: (start, origin, speed), acceleration, .. } = *self;
+        self.ends.time_at(distance, |way| start + even_time(way - origin, speed, acceleration))
     }
 
     fn duration(&self) -> TimeSpan {

@@ -1,6 +1,6 @@
 //! What all laws of speed change agree on: before the change one steady speed, after it another.
 
-use crate::kinematics::motion::MotionState;
+use crate::kinematics::motion::{MotionState, seconds, span_of};
 use crate::kinematics::phase::Triple;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
@@ -16,6 +16,8 @@ pub(super) struct Ends {
     pub(super) to: f64,
     pub(super) duration: f64,
     pub(super) distance: f64,
+    /// Whether the train turns around on the way, so that distances are passed twice.
+    turns_around: bool,
 }
 
 impl Ends {
@@ -30,13 +32,8 @@ impl Ends {
     #[inline]
     pub(super) fn new(from: f64, to: f64, duration: f64, distance: f64) -> Self {
         let direction = if from + to < 0.0 { -1.0 } else { 1.0 };
-        Self {
-            direction,
-            from: direction * from,
-            to: direction * to,
-            duration,
-            distance: direction * distance,
-        }
+        let (from, to, distance) = (direction * from, direction * to, direction * distance);
+        Self { direction, from, to, duration, distance, turns_around: from < 0.0 || to < 0.0 }
     }
 
     /// `numerator` per second of the change, per second squared …; zero for a change that takes no time.
@@ -45,43 +42,37 @@ impl Ends {
         if self.duration > 0.0 { numerator / self.duration } else { 0.0 }
     }
 
-    /// Whether the train turns around on the way, so that distances are passed twice.
-    #[inline]
-    fn turns_around(&self) -> bool {
-        self.from < 0.0 || self.to < 0.0
-    }
-
     /// The state at any time, from the law's own state `inside` the change.
-    #[inline]
+    #[inline(always)]
     pub(super) fn state_at(&self, time: TimeSpan, inside: impl Fn(f64) -> Triple) -> MotionState {
-        let time = time.as_s();
-        let (distance, speed, acceleration) = inside(time.max(0.0).min(self.duration));
-        let (before, after) = (time.min(0.0), (time - self.duration).max(0.0));
-        let changing = before == 0.0 && after == 0.0;
-        // At both borders the law itself has the exact speed, except one that takes no time.
-        let speed = if after > 0.0 { self.to } else { speed };
-        self.turned((
-            distance + self.from * before + self.to * after,
-            if before < 0.0 { self.from } else { speed },
-            if changing { acceleration } else { 0.0 },
-        ))
+        let time = seconds(time);
+        self.turned(if time >= 0.0 && time <= self.duration {
+            inside(time)
+        } else if time < 0.0 {
+            (self.from * time, self.from, 0.0)
+        } else {
+            (self.distance + self.to * (time - self.duration), self.to, 0.0)
+        })
     }
 
     /// The time at any distance, from the law's own time `inside` the change.
-    #[inline]
+    #[inline(always)]
     pub(super) fn time_at(&self, distance: Length, inside: impl Fn(f64) -> f64) -> Option<TimeSpan> {
-        let distance = self.direction * distance.as_m();
-        if !distance.is_finite() || self.turns_around() {
-            return None;
-        }
-        let seconds = if distance < 0.0 {
-            distance / self.from
-        } else if distance > self.distance {
-            self.duration + (distance - self.distance) / self.to
+        let way = self.direction * distance.as_m();
+        if self.turns_around {
+            None
+        } else if way >= 0.0 && way <= self.distance {
+            Some(span_of(inside(way)))
         } else {
-            inside(distance)
-        };
-        seconds.is_finite().then(|| TimeSpan::from_s(seconds))
+            self.time_outside(way)
+        }
+    }
+
+    /// Before the change and after it the train runs at a steady speed, unless it stands.
+    fn time_outside(&self, way: f64) -> Option<TimeSpan> {
+        let seconds =
+            if way < 0.0 { way / self.from } else { self.duration + (way - self.distance) / self.to };
+        (way.is_finite() && seconds.is_finite()).then(|| TimeSpan::from_s(seconds))
     }
 
     pub(super) fn duration(&self) -> TimeSpan {

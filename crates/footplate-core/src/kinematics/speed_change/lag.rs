@@ -23,6 +23,9 @@ pub struct Lag {
 /// it takes three or four; this bound only keeps the loop finite whatever the numbers.
 const MOST_STEPS: u32 = 30;
 
+/// A relative step of this size was the last: what it leaves is about its square.
+const SETTLED: f64 = 1e-9;
+
 impl Lag {
     /// The difference that counts as none unless stated otherwise: at 1 mm/s a train covers less than 0.1 mm
     /// between two polls of a command station.
@@ -83,7 +86,7 @@ impl Lag {
             let (reached, speed) = self.distance_and_speed(time);
             let step = (reached - way) / speed;
             time -= step;
-            if step.abs() <= f64::EPSILON * time {
+            if step.abs() <= SETTLED * time {
                 break;
             }
         }
