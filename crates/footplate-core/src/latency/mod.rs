@@ -6,6 +6,8 @@
 //! the distribution of a report about a forecast.
 
 mod contact_window;
+mod period_search;
+mod poll_regression;
 mod poll_rhythm;
 mod poll_timing;
 mod uniform_normal;

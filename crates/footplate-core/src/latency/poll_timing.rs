@@ -12,8 +12,8 @@
     reason = "indices stay below the named capacities and lengths beside them"
 )]
 
-use core::f64::consts::TAU;
-
+use super::period_search::{LINED_UP, LONGEST_GAP_S, MOST_GAPS, SHORTEST_PERIOD_S, longest_aligned_period};
+use super::poll_regression::{PollRegression, alignment};
 use super::poll_rhythm::PollRhythm;
 use crate::estimate::Estimate;
 use crate::time::{TimeSpan, Timestamp};
@@ -47,21 +47,12 @@ impl PollTiming {
 }
 
 /// Gaps kept; a fit over more does not move the period by a microsecond.
-const KEPT: usize = 96;
+const KEPT: usize = MOST_GAPS;
 /// Fewest gaps from which a period is stated.
 const FEWEST: usize = 8;
-/// Gaps longer than this many seconds would need a finer search for nothing.
-const LONGEST_GAP_S: f64 = 2.0;
-/// Trial periods reach from one module polled alone (13.8 ms on the wire) to a slow host with 31 modules.
-const SHORTEST_PERIOD_S: f64 = 0.012;
-const LONGEST_PERIOD_S: f64 = 0.3;
-/// Trial periods advance by this part of a cycle at the longest gap.
-const PHASE_STEP: f64 = 0.15;
-/// Gaps line up when `c` reaches this; random ones of `FEWEST` reach 0.95 once in 1400 trials.
-const LINED_UP: f64 = 0.95;
-/// A longer period is preferred when it lines up this nearly as well as the best.
-const NEARLY: f64 = 0.985;
-
+/// A period found in this many gaps is only refined as long as gaps line up at it; the search for another one
+/// costs a hundred times more.
+const CONFIRMED: u32 = 32;
 /// Polls are told apart while their doubt is below this part of the period.
 const TOLD_APART: i64 = 5;
 
@@ -151,8 +142,11 @@ impl PollTimingEstimator {
         if gaps.len() < FEWEST {
             return;
         }
-        let Some(rough) = longest_aligned_period(gaps) else { return };
-        let (period, offset, jitter, uncertainty) = refined(gaps, rough);
+        let lines_up = |period: &f64| alignment(gaps, *period).0 >= LINED_UP;
+        let confirmed = self.fitted.filter(|fitted| fitted.count >= CONFIRMED);
+        let known = confirmed.map(|fitted| fitted.value.as_s()).filter(lines_up);
+        let Some(rough) = known.or_else(|| longest_aligned_period(gaps)) else { return };
+        let PollRegression { period, offset, jitter, uncertainty } = PollRegression::of(gaps, rough);
         self.timing = PollTiming {
             period: TimeSpan::from_s(period),
             after_report: TimeSpan::from_s(period + offset),
@@ -165,73 +159,6 @@ impl PollTimingEstimator {
             date,
         });
     }
-}
-
-/// `c(p)` of the legend, and the mean phase in cycles.
-fn alignment(gaps: &[f64], period: f64) -> (f64, f64) {
-    let (mut x, mut y) = (0.0, 0.0);
-    for gap in gaps {
-        let (sin, cos) = libm::sincos(TAU * (gap / period));
-        x += cos;
-        y += sin;
-    }
-    (libm::hypot(x, y) / gaps.len() as f64, libm::atan2(y, x) / TAU)
-}
-
-fn longest_aligned_period(gaps: &[f64]) -> Option<f64> {
-    let longest_gap = gaps.iter().fold(0.0_f64, |longest, gap| longest.max(*gap));
-    let trials = || {
-        core::iter::successors(Some(LONGEST_PERIOD_S), move |p| {
-            Some(p - PHASE_STEP * p * p / longest_gap).filter(|p| *p >= SHORTEST_PERIOD_S)
-        })
-    };
-    let best = trials().map(|p| alignment(gaps, p).0).fold(0.0, f64::max);
-    if best < LINED_UP * 0.9 {
-        return None;
-    }
-    // Climb to the top of the first (longest) hill that is nearly as high as the highest.
-    for trial in trials() {
-        if alignment(gaps, trial).0 < best * 0.8 {
-            continue;
-        }
-        let mut step = PHASE_STEP * trial * trial / longest_gap;
-        let (mut top, mut height) = (trial, alignment(gaps, trial).0);
-        while step > 1e-9 {
-            let tries = [top - step, top + step].map(|p| (p, alignment(gaps, p).0));
-            match tries.into_iter().find(|(_, c)| *c > height) {
-                Some((p, c)) => (top, height) = (p, c),
-                None => step *= 0.5,
-            }
-        }
-        if height >= LINED_UP && height >= best * NEARLY {
-            return Some(top);
-        }
-    }
-    None
-}
-
-/// Regression of the gaps on their number of periods: period, offset, residual deviation and the standard
-/// error of the period, all in seconds.
-fn refined(gaps: &[f64], rough: f64) -> (f64, f64, f64, f64) {
-    let count = gaps.len() as f64;
-    let offset = alignment(gaps, rough).1 * rough;
-    let periods = |gap: f64| libm::round((gap - offset) / rough);
-    let mean_n = gaps.iter().map(|g| periods(*g)).sum::<f64>() / count;
-    let mean_g = gaps.iter().sum::<f64>() / count;
-    let (mut nn, mut ng) = (0.0, 0.0);
-    for gap in gaps {
-        let n = periods(*gap) - mean_n;
-        nn += n * n;
-        ng += n * (gap - mean_g);
-    }
-    if nn <= 0.0 {
-        return (rough, offset, 0.0, rough);
-    }
-    let period = ng / nn;
-    let offset = mean_g - period * mean_n;
-    let squares: f64 = gaps.iter().map(|g| g - offset - period * periods(*g)).map(|e| e * e).sum();
-    let deviation = libm::sqrt(squares / (count - 2.0));
-    (period, offset, deviation, deviation / libm::sqrt(nn))
 }
 
 #[cfg(test)]
