@@ -42,7 +42,7 @@ pub(super) fn longest_aligned_period(gaps: &[f64]) -> Option<f64> {
     let gaps = gaps.get(..MOST_GAPS).unwrap_or(gaps);
     let longest_gap = gaps.iter().fold(SHORTEST_PERIOD_S, |longest, gap| longest.max(*gap));
     let (first, step) = (1.0 / LONGEST_PERIOD_S, PHASE_STEP / longest_gap);
-    let trials = (((1.0 / SHORTEST_PERIOD_S - first) / step) as usize + 1).min(TRIALS);
+    let trials = (((1.0 / SHORTEST_PERIOD_S - first) / step) as usize).min(TRIALS - 1) + 1;
     let mut heights = [0.0_f32; TRIALS];
     let mut phasors = Phasors::new(gaps, first, step);
     let mut best = 0.0_f32;
@@ -114,5 +114,56 @@ impl Phasors {
                 self.im[block][lane] = re * turn_im + im * turn_re;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    /// Gaps of so many periods, far from regular, each a little off.
+    fn gaps(count: i64, period: f64, offset: f64) -> Vec<f64> {
+        let periods = |i: i64| (3 + (i * i * 7 + i) % 23) as f64;
+        let off = |i: i64| 0.000_1 * ((i * 37 % 11) as f64 - 5.0) / 5.0;
+        (1..=count).map(|i| offset + period * periods(i) + off(i)).collect()
+    }
+
+    #[test]
+    fn every_trial_stands_where_turning_took_it() {
+        // The height after many turns is that of sines and cosines taken there at once.
+        let gaps = gaps(45, 0.0614, 0.004);
+        let (first, step) = (1.0 / LONGEST_PERIOD_S, 0.05);
+        let mut phasors = Phasors::new(&gaps, first, step);
+        for turns in 0..TRIALS {
+            if turns % 100 == 0 {
+                let right = alignment(&gaps, 1.0 / (first + step * turns as f64)).0;
+                let found = f64::from(phasors.sum()) / gaps.len() as f64;
+                assert!((found - right).abs() < 1e-3, "after {turns} turns: {found} instead of {right}");
+            }
+            phasors.turn();
+        }
+    }
+
+    #[test]
+    fn the_longest_period_is_found_over_the_whole_range() {
+        for tenths_of_ms in (130..=900).step_by(7) {
+            let period = f64::from(tenths_of_ms) * 1e-4;
+            for count in [8, 16, 61, 96] {
+                let gaps: Vec<f64> =
+                    gaps(count, period, 0.0).into_iter().filter(|gap| *gap < LONGEST_GAP_S).collect();
+                let found = longest_aligned_period(&gaps).unwrap();
+                assert!((found - period).abs() < 1e-4, "{found} instead of {period} in {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn strange_gaps_have_no_period_or_one_that_is_a_number() {
+        for gap in [0.0, -1.0, 1e-300, 5.0, f64::INFINITY, f64::NAN] {
+            let found = longest_aligned_period(&[gap; 200]);
+            assert!(found.is_none_or(f64::is_finite), "{gap}: {found:?}");
+        }
+        assert_eq!(longest_aligned_period(&[]), None);
     }
 }
