@@ -31,7 +31,7 @@ impl SectionIndex {
         let mut surveyed: Vec<(f64, f64)> = Vec::new();
         let edge_variance = layout.survey().uncertainty.as_m() * layout.survey().uncertainty.as_m();
         for hop in &hops {
-            let back = layout.hops().find(|other| {
+            let back = layout.hops_from(hop.to.reverse()).find(|other| {
                 other.edges.len() == hop.edges.len()
                     && other.edges.iter().rev().zip(hop.edges).all(|(one, twin)| one.twin() == *twin)
             });

@@ -169,12 +169,13 @@ impl PassageTracker {
             return Sighting::Standing;
         }
         let way = self.at.and_then(|from| {
-            layout
-                .reaches(from, &self.turnouts, BELIEVED_MISSED)
-                .filter(|reach| reach.sensor == Some(sensor))
-                .min_by(|one, other| {
-                    one.missed().cmp(&other.missed()).then(one.length.as_m().total_cmp(&other.length.as_m()))
-                })
+            // The way past the fewest silent contacts, and of these the shortest.
+            (0..=BELIEVED_MISSED).find_map(|missed| {
+                layout
+                    .reaches(from, &self.turnouts, missed)
+                    .filter(|reach| reach.sensor == Some(sensor))
+                    .min_by(|one, other| one.length.as_m().total_cmp(&other.length.as_m()))
+            })
         });
         self.at = Some(node);
         Sighting::Passage(Passage { sensor, node, window, way, drive: self.drive, entry })

@@ -23,10 +23,13 @@ const N: usize = 4;
 /// nanosecond in which the laws answer.
 const STEPS: [f64; N] = [1e-3, 1e-3, 1e-2, 1e-3];
 const STEP_LENGTH: f64 = 1e-3;
+/// Above this speed at the contact (m/s) a later start or a longer way tell in the time by the speeds alone; below,
+/// a train that may stop short bends too much for that, and they are taken over the steps.
+const STRAIGHT_ABOVE: f64 = 0.05;
 /// Looks at one report from ever better points; after four the point no longer moves by a millimetre.
 const ITERATIONS: usize = 4;
-/// Letters that move by less than this (s, or parts of speed and pace) change nothing any more: 0.2 mm at 400 mm/s.
-const SETTLED: f64 = 5e-4;
+/// A look that moves the point by less than this (in the units of the state, and in m) was the last.
+const UNMOVED: f64 = 1e-6;
 /// One report moves no letter further than this from its mean: a factor of e for speed and pace.
 const FARTHEST: f64 = 1.0;
 
@@ -139,19 +142,27 @@ impl Belief {
     ) -> Option<Due> {
         let start = transition.distance_at(x[C]);
         let time = transition.time_at(start + length)?;
-        let mut j = [0.0; N];
-        for (place, step) in STEPS.iter().enumerate() {
+        let speed = transition.speed_at(time);
+        // Where the moved train never arrives the derivative says nothing; the doubt of the law stands in.
+        let over_step = |place: usize| {
+            let step = STEPS[place];
             let mut moved = *x;
             moved[place] += step;
             let other = self::transition(self.family, &moved, command);
-            // Where the moved train never arrives the derivative says nothing; the doubt of the law stands in.
-            j[place] = other
+            other
                 .time_at(other.distance_at(moved[C]) + length)
-                .map_or(0.0, |moved_time| (moved_time - time) / step);
-        }
-        let j_length = transition
-            .time_at(start + length + STEP_LENGTH)
-            .map_or(0.0, |moved_time| (moved_time - time) / STEP_LENGTH);
+                .map_or(0.0, |moved_time| (moved_time - time) / step)
+        };
+        let (mut j, j_length) = if speed > STRAIGHT_ABOVE && x[Q] >= 0.0 {
+            // The law itself stays as it is: what is lost at the start is made up at the end.
+            let ratio = transition.speed_at(x[C]) / speed;
+            ([ratio, 0.0, 0.0, 1.0 - ratio], 1.0 / speed)
+        } else {
+            let longer = transition.time_at(start + length + STEP_LENGTH);
+            let j_length = longer.map_or(0.0, |moved_time| (moved_time - time) / STEP_LENGTH);
+            ([over_step(C), 0.0, 0.0, over_step(Q)], j_length)
+        };
+        (j[U], j[A]) = (over_step(U), over_step(A));
         // The law is doubted over the part of the way on which the speed still changes.
         let settled = transition.settled();
         let changing_way = transition.distance_at(settled.min(time)) - start;
@@ -159,7 +170,7 @@ impl Belief {
         let path = Path {
             time,
             steady: (time - settled).max(0.0),
-            speed: transition.speed_at(time),
+            speed,
             law_variance: law_time * law_time,
             changing: true,
         };
@@ -168,33 +179,38 @@ impl Belief {
 
     /// The forecast seen from where the report `z` (variance `r`) says the state is, and how late the report
     /// is by it: the iterated extended Kalman filter (Bell and Cathey, 1993). Laws bend too much for one
-    /// straight line through a doubtful mean.
+    /// straight line through a doubtful mean. `first` is the forecast from the mean.
     pub(super) fn due_in_hindsight(
         &self,
+        first: Due,
         command: Option<Command>,
         hop: Hop,
         doubt: Unmodelled,
         z: f64,
         r: f64,
-    ) -> Option<(Due, f64)> {
-        let (mut x, mut length) = (self.x, hop.length);
-        let mut found = None;
-        for _ in 0..ITERATIONS {
-            let Some(due) = self.due_near(&x, length, command, hop, doubt) else { break };
+    ) -> (Due, f64) {
+        let (mut x, mut length, mut due) = (self.x, hop.length, first);
+        let mut looks = 1;
+        loop {
             let back: f64 = (0..N).map(|i| due.j[i] * (self.x[i] - x[i])).sum();
             let late = z - due.time - back - due.j_length * (hop.length - length);
             let s = due.variance + r;
             let step = |i: usize| (due.with[i] / s * late).clamp(-FARTHEST, FARTHEST);
-            let point: [f64; N] = core::array::from_fn(|i| self.x[i] + step(i));
-            let stays = point.iter().zip(&x).all(|(new, old)| (new - old).abs() < SETTLED);
-            x = point;
+            let (from, from_length) = (x, length);
+            x = core::array::from_fn(|i| self.x[i] + step(i));
             length = (hop.length + due.with_length / s * late).max(0.5 * hop.length);
-            found = Some((Due { time: z - late, ..due }, late));
-            if stays {
-                break;
+            let stays = (length - from_length).abs() < UNMOVED
+                && x.iter().zip(&from).all(|(to, from)| (to - from).abs() < UNMOVED);
+            let next = if stays || looks == ITERATIONS {
+                None
+            } else {
+                self.due_near(&x, length, command, hop, doubt)
+            };
+            match next {
+                Some(next) => (due, looks) = (next, looks + 1),
+                None => return (Due { time: z - late, ..due }, late),
             }
         }
-        found
     }
 
     fn spread(&self, path: Path, j: [f64; N], j_length: f64, hop: Hop, doubt: Unmodelled) -> Due {

@@ -371,11 +371,8 @@ impl TrainModel {
             let Some(belief) = self.run.beliefs.get(place).copied() else { continue };
             let Some(due) = belief.due(self.run.command, ahead.hop, DOUBT) else { continue };
             self.laws.weigh(direction, place, self.spread(&due, period).density(time - due.time));
-            if let Some((due, late)) =
-                belief.due_in_hindsight(self.run.command, ahead.hop, DOUBT, time, noise)
-            {
-                self.arrive(place, &due, ahead, late, noise, place == best);
-            }
+            let (due, late) = belief.due_in_hindsight(due, self.run.command, ahead.hop, DOUBT, time, noise);
+            self.arrive(place, &due, ahead, late, noise, place == best);
         }
         for (place, belief) in self.run.beliefs.iter().enumerate() {
             self.laws.keep(direction, place, belief);
