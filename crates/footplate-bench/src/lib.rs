@@ -1,7 +1,7 @@
 //! What Footplate's own operations cost, and what public crates that do the same cost beside them.
 //!
 //! - [`Operation`] is one thing to time: a body that does it so many times, with input that varies.
-//! - [`profiles`] lists the operations on motion profiles, [`replay`] that on recorded logs. Another subject is another such list, a file in
+//! - [`profiles`] lists the operations on motion profiles, [`replays`] those on recordings. Another subject is another such list, a file in
 //!   `benches/` that runs it, and a line in [`everything`].
 //! - [`contest`] runs the operations of one group in turns and prints what each takes, as a ratio to the first.
 //! - The program `once` does one operation so many times and nothing else, for an instruction counter:
@@ -10,12 +10,12 @@
 pub mod contest;
 pub mod operation;
 pub mod profiles;
-pub mod replay;
+pub mod replays;
 
 pub use operation::Operation;
 
 /// Every operation there is.
 #[must_use]
 pub fn everything() -> Vec<Operation> {
-    profiles::operations().into_iter().chain(replay::operations()).collect()
+    profiles::operations().into_iter().chain(replays::operations()).collect()
 }
