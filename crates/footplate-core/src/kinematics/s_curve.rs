@@ -39,8 +39,8 @@ pub struct SCurve {
     direction: f64,
     origin: f64,
     sixth_jerk: f64,
-    /// Whether it slows down before it cruises.
-    slows_first: bool,
+    /// What each phase does.
+    pattern: &'static Pattern,
     /// The states at the borders between its phases: time in s since the start, way there in m, speed, and half
     /// the acceleration.
     times: [f64; KNOTS],
@@ -55,21 +55,14 @@ const PHASES: usize = 8;
 /// The borders of the phases.
 const KNOTS: usize = PHASES + 1;
 
-/// Which of a phase's borders is its slow end, and the sign of its jerk; one more for the time after the end.
-struct Pattern {
-    slow_ends: [usize; PHASES + 1],
-    jerks: [f64; PHASES + 1],
-}
+/// For each phase the border that is its slow end, and the sign of its jerk; one more for the time after the end.
+type Pattern = [(usize, f64); PHASES + 1];
 
-static SPEEDING_UP_FIRST: Pattern = Pattern {
-    slow_ends: [1, 1, 2, 3, 4, 6, 7, 8, 8],
-    jerks: [1.0, 1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0],
-};
+static SPEEDING_UP_FIRST: Pattern =
+    [(1, 1.0), (1, 1.0), (2, 0.0), (3, -1.0), (4, 0.0), (6, -1.0), (7, 0.0), (8, 1.0), (8, 0.0)];
 
-static SLOWING_DOWN_FIRST: Pattern = Pattern {
-    slow_ends: [0, 2, 3, 4, 4, 6, 7, 8, 8],
-    jerks: [-1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0],
-};
+static SLOWING_DOWN_FIRST: Pattern =
+    [(0, -1.0), (2, -1.0), (3, 0.0), (4, 1.0), (4, 0.0), (6, -1.0), (7, 0.0), (8, 1.0), (8, 0.0)];
 
 impl SCurve {
     /// The profile from a state to another.
@@ -152,7 +145,7 @@ impl SCurve {
             direction: ahead.direction,
             origin: origin.as_m(),
             sixth_jerk: SIXTH * limits.jerk.as_m_per_s3(),
-            slows_first: opening.slows,
+            pattern: if opening.slows { &SLOWING_DOWN_FIRST } else { &SPEEDING_UP_FIRST },
             times: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.time),
             ways: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.way),
             speeds: [k0, k1, k2, k3, k4, k5, k6, k7, k8].map(|knot| knot.speed),
@@ -163,14 +156,13 @@ impl SCurve {
     /// The phase with a number, counted from its slow end.
     #[inline(always)]
     fn phase(&self, number: usize) -> Phase {
-        let pattern = if self.slows_first { &SLOWING_DOWN_FIRST } else { &SPEEDING_UP_FIRST };
-        let slow_end = pattern.slow_ends[number];
+        let (slow_end, jerk) = self.pattern[number];
         Phase {
             time: self.times[slow_end],
             distance: self.ways[slow_end],
             speed: self.speeds[slow_end],
             half_acceleration: self.half_accelerations[slow_end],
-            sixth_jerk: pattern.jerks[number] * self.sixth_jerk,
+            sixth_jerk: jerk * self.sixth_jerk,
         }
     }
 
