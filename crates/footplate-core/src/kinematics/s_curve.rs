@@ -1,9 +1,9 @@
 //! The profile of limited jerk: acceleration builds up and fades instead of jumping.
 //!
 //! From standstill to standstill it has seven phases, of jerk +J, 0, −J, then none, then −J, 0, +J. From any
-//! other speed and acceleration one more may precede them. All phases are polynomials in closed form; the peak
-//! speed of a run that is too short to cruise is closed too, except where one of the two limits of acceleration
-//! is reached and the other is not, which takes a few steps of Newton's method.
+//! other speed and acceleration one more may precede them. All phases are polynomials in closed form. So is the
+//! peak speed of a run that is too short to cruise if both limits of acceleration are reached, and between
+//! standstills also if neither is; otherwise two or three steps of Newton's method find it.
 
 #![expect(clippy::indexing_slicing, reason = "a phase's index is a count of the borders passed")]
 

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! which grows ever faster, so that one root-finder serves all of them: a start within 11 % of the root,
-//! then two steps of Halley's method (third order), which leave less than 3e-12 of the time. No branch
-//! depends on the numbers, so the processor overlaps neighbouring calls.
+//! then two steps of Halley's method (third order), which leave less than 3e-12 of the time. That is the same
+//! work whatever the numbers, so that the processor overlaps neighbouring calls.
 
 /// The polynomial of a phase, counted from its slow end.
 #[derive(Debug, Clone, Copy)]

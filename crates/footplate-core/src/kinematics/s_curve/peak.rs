@@ -107,7 +107,7 @@ impl Run {
     fn refine(self, way: f64, lowest: f64, highest: f64) -> Gains {
         let base = self.start.max(self.end);
         let (lowest, highest) = (lowest - base, highest - base);
-        let mut above = (self.first_guess(way, base)).max(lowest).min(highest);
+        let mut above = self.first_guess(way, base).max(lowest).min(highest);
         for _ in 0..MOST_STEPS {
             let (run, slope) = self.way_and_slope(self.gains(above));
             let old_root = libm::sqrt(above);
@@ -130,13 +130,12 @@ impl Run {
         // A ramp of gain u² takes 2u/√J at a mean of v + u²/2.
         let cubic = libm::sqrt(other.per_jerk);
         let linear = 2.0 * base * cubic;
-        let end = if low < base {
+        let (left, speed, half_acceleration, sixth_jerk) = if low < base {
             let (way_to_base, slope) = other.way_and_slope(low, base - low);
             (way - way_to_base, linear, slope, cubic)
         } else {
             (way, 2.0 * linear, 0.0, 2.0 * cubic)
         };
-        let (left, speed, half_acceleration, sixth_jerk) = end;
         let root = SlowEnd { speed, half_acceleration, sixth_jerk, quartic: 0.0 }.rough_time_to_cover(left);
         root * root
     }

@@ -66,7 +66,7 @@ impl Lag {
         (self.to * time + difference * self.time_constant * gone, self.to + difference * left)
     }
 
-    /// Seconds to a distance ahead: no more than the largest finite number, infinite if it is out of reach.
+    /// Seconds to a distance ahead; not a finite number if that is out of reach.
     fn seconds_to(&self, way: f64) -> f64 {
         let Self { from, to, time_constant: lag, .. } = *self;
         if to == 0.0 {
