@@ -7,7 +7,7 @@
 //! ```text
 //! estimation     what the next report will be, learnt from the last
 //! calibration    speeds, laws of speed change, stops, edge lengths: numbers with uncertainty
-//! kinematics  latency  track
+//! kinematics  latency  track  wheels
 //! event
 //! units  time  ids  linalg  estimate
 //! ```
@@ -30,6 +30,7 @@ pub mod linalg;
 mod time;
 pub mod track;
 mod units;
+pub mod wheels;
 
 pub use estimate::Estimate;
 pub use event::{Approach, Event, EventKind, Report};

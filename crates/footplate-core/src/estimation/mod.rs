@@ -10,6 +10,7 @@ mod belief;
 mod contact_scatter;
 mod forecast;
 mod law_memory;
+pub mod odometry;
 mod polls;
 mod predictor;
 mod speed_watch;

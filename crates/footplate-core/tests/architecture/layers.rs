@@ -13,7 +13,7 @@ const SIMULATOR: &str = "crates/footplate-sim/src/";
 const ROWS: [&[&str]; 5] = [
     &["estimation"],
     &["calibration"],
-    &["kinematics", "latency", "track"],
+    &["kinematics", "latency", "track", "wheels"],
     &["event"],
     &["units", "time", "ids", "linalg", "estimate"],
 ];
