@@ -2,10 +2,16 @@
 //!
 //! [`Odometer::step`] takes what was read in one [`Period`](crate::wheels::Period) and returns a [`MotionEstimate`].
 
+mod accuracy_monitor;
 mod motion_estimate;
 mod odometer;
+mod reading_amounts;
 mod settings;
+mod tolerance;
 
+pub use accuracy_monitor::{AccuracyMonitor, OdometerAccuracy};
 pub use motion_estimate::{Mode, MotionEstimate, WheelState};
 pub use odometer::Odometer;
+pub use reading_amounts::ReadingAmounts;
 pub use settings::OdometrySettings;
+pub use tolerance::{distance_tolerance, speed_tolerance};
