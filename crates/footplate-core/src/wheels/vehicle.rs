@@ -32,8 +32,8 @@ pub struct Vehicle {
     pub max_brake: Acceleration,
     /// The wheelsets of the two tachometers.
     pub wheelsets: [Wheelset; 2],
-    /// What the brake command is known to do; absent if nothing is claimed.
-    pub brake_command: Option<BrakeCommand>,
+    /// What the brake command is known to do.
+    pub brake_command: BrakeCommand,
     /// Where detection and correction draw their lines.
     pub thresholds: Thresholds,
 }
@@ -51,8 +51,22 @@ pub struct BrakeCommand {
     pub build_up: TimeSpan,
 }
 
+impl BrakeCommand {
+    /// What can be claimed of every brake that an emergency stop makes decelerate by `max_brake`: full service braking is
+    /// three quarters of it, give or take 40 % for load and friction, on lines with gradients up to 25 mm/m.
+    #[must_use]
+    pub fn cautious(max_brake: Acceleration) -> Self {
+        Self {
+            full: max_brake * 0.75,
+            tolerance: 0.4,
+            gradient: Acceleration::from_m_per_s2(0.25),
+            build_up: TimeSpan::from_s(4.0),
+        }
+    }
+}
+
 impl Vehicle {
-    /// A vehicle whose thresholds follow from what it can do, and of whose brake command nothing is claimed.
+    /// A vehicle whose thresholds follow from what it can do, and of whose brake command little is claimed.
     ///
     /// # Errors
     /// The first value that no railway has.
@@ -63,8 +77,9 @@ impl Vehicle {
         wheelsets: [Wheelset; 2],
     ) -> Result<Self, VehicleError> {
         let thresholds = Thresholds::derived(max_traction, max_brake);
+        let brake_command = BrakeCommand::cautious(max_brake);
         let vehicle =
-            Self { period, max_speed, max_traction, max_brake, wheelsets, brake_command: None, thresholds };
+            Self { period, max_speed, max_traction, max_brake, wheelsets, brake_command, thresholds };
         vehicle.check()?;
         Ok(vehicle)
     }
@@ -88,12 +103,11 @@ impl Vehicle {
             within("diameter_m", wheelset.diameter.as_m(), DIAMETERS_M)?;
             within("diameter_tolerance", wheelset.diameter_tolerance, (0.0, LARGEST_TOLERANCE))?;
         }
-        if let Some(command) = &self.brake_command {
-            within("full_brake_m_s2", command.full.as_m_per_s2(), (0.01, STRONGEST_M_PER_S2))?;
-            within("full_brake_tolerance", command.tolerance, (0.0, 1.0))?;
-            within("gradient_m_s2", command.gradient.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
-            within("build_up_s", command.build_up.as_s(), (0.0, 60.0))?;
-        }
+        let command = &self.brake_command;
+        within("full_brake_m_s2", command.full.as_m_per_s2(), (0.01, STRONGEST_M_PER_S2))?;
+        within("full_brake_tolerance", command.tolerance, (0.0, 1.0))?;
+        within("gradient_m_s2", command.gradient.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
+        within("build_up_s", command.build_up.as_s(), (0.0, 60.0))?;
         self.thresholds.check()
     }
 }
