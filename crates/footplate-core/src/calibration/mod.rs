@@ -1,5 +1,6 @@
-//! Speeds, laws of speed change, stops and lengths: numbers with uncertainty, from reports.
+//! Speeds, laws of speed change, stops, lengths and wheel diameters: numbers with uncertainty, from reports.
 
+mod balise_accuracy;
 mod calibrate;
 mod drift_test;
 mod fitted_change;
@@ -10,12 +11,16 @@ mod length_table;
 mod passage;
 mod recent_extremes;
 mod run;
+mod scale_filter;
+mod scale_interval;
 mod shift_average;
 mod speed_curve;
 mod speed_table;
 mod stop_fit;
 mod transient;
+mod wheel_diameter;
 
+pub use balise_accuracy::BaliseAccuracy;
 pub use calibrate::{Calibration, Hysteresis};
 pub use drift_test::{Drift, DriftTest};
 pub use fitted_change::FittedChange;
@@ -26,8 +31,10 @@ pub use length_table::{LengthTable, SectionIndex};
 pub use passage::{Drive, Passage, PassageTracker, Sighting};
 pub use recent_extremes::RecentExtremes;
 pub use run::{MeasuredStop, RunPassages};
+pub use scale_interval::ScaleInterval;
 pub use shift_average::ShiftAverage;
 pub use speed_curve::SpeedCurve;
 pub use speed_table::{Expected, Familiarity, SpeedTable};
 pub use stop_fit::{StopEntry, StopMeasurement, StopTable, TwoTermLaw};
 pub use transient::{Direction, Transient, TransientPoint, transients};
+pub use wheel_diameter::{ForeignScale, PairVerdict, WheelDiameters, WheelScale};

@@ -8,3 +8,4 @@ mod speed_change_laws;
 mod stopping;
 mod two_sensors;
 mod ways_on_tracks;
+mod wheel_diameters;

@@ -1,0 +1,81 @@
+//! Between which bounds the scale of a wheelset lies for certain.
+//!
+//! The scale is the true way that belongs to a counted way of 1. Bounds know no probabilities: what is assumed gives a
+//! set of possible scales, every measurement another, and the truth lies in all of them (set membership, Schweppe,
+//! 1968). An empty intersection says that an assumption is wrong, and is handed back instead of being taken in.
+
+use crate::units::Length;
+
+/// Lowest and highest scale that are possible.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ScaleInterval {
+    /// The scale is at least this ...
+    pub low: f64,
+    /// ... and at most this.
+    pub high: f64,
+}
+
+impl ScaleInterval {
+    /// The scales of a wheel whose diameter lies within this part of the believed one.
+    #[must_use]
+    pub fn of_tolerance(tolerance: f64) -> Self {
+        Self { low: 1.0 - tolerance, high: 1.0 + tolerance }
+    }
+
+    /// The scales that a way between these bounds allows when a way between those was counted; `None` when nothing was
+    /// counted for certain.
+    #[must_use]
+    pub fn of_way(
+        [true_low, true_high]: [Length; 2],
+        [counted_low, counted_high]: [Length; 2],
+    ) -> Option<Self> {
+        let interval = Self { low: true_low / counted_high, high: true_high / counted_low };
+        (counted_low > Length::ZERO && interval.low <= interval.high && interval.high.is_finite())
+            .then_some(interval)
+    }
+
+    /// What lies in both; `None` if nothing does.
+    #[must_use]
+    pub fn meet(self, other: Self) -> Option<Self> {
+        let both = Self { low: self.low.max(other.low), high: self.high.min(other.high) };
+        (both.low <= both.high).then_some(both)
+    }
+
+    /// The same after the scale may have changed by this part of itself, either way.
+    #[must_use]
+    pub fn widened(self, part: f64) -> Self {
+        Self { low: self.low * (1.0 - part), high: self.high * (1.0 + part) }
+    }
+
+    /// Whether a scale is possible.
+    #[must_use]
+    pub fn holds(self, scale: f64) -> bool {
+        self.low <= scale && scale <= self.high
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_longer_way_allows_a_smaller_range() {
+        // A kilometre ±2 m counted as 990 m ±34 mm.
+        let lengths = |middle, half| [middle - half, middle + half].map(Length::from_m);
+        let interval = ScaleInterval::of_way(lengths(1000.0, 2.0), lengths(990.0, 0.034)).unwrap();
+        assert!((interval.low - 998.0 / 990.034).abs() < 1e-12);
+        assert!((interval.high - 1002.0 / 989.966).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_contradicts_is_handed_back() {
+        let tolerance = ScaleInterval::of_tolerance(0.01);
+        assert_eq!(tolerance.meet(ScaleInterval { low: 1.02, high: 1.03 }), None);
+        assert_eq!(
+            tolerance.meet(ScaleInterval { low: 1.005, high: 1.03 }),
+            Some(ScaleInterval { low: 1.005, high: 1.01 })
+        );
+        assert_eq!(ScaleInterval::of_way([Length::ZERO; 2], [Length::ZERO; 2]), None);
+    }
+}
