@@ -15,6 +15,8 @@
 //! motor  law  train  speed_table             path  railway  circuit  track
 //! draws
 //! ```
+//!
+//! Full-size trains on full-size lines are a world of their own, in [`line`].
 
 mod circuit;
 mod contacts;
@@ -22,6 +24,7 @@ mod draws;
 mod gates;
 mod host;
 mod law;
+pub mod line;
 mod load;
 mod motor;
 mod path;
