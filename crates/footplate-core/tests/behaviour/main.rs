@@ -1,7 +1,10 @@
 //! What core promises, a file a promise.
 
+mod counted_run;
 mod draw;
+mod federated_filters;
 mod motion_checks;
+mod motion_models;
 mod profiles;
 mod short_moves;
 mod speed_change_laws;

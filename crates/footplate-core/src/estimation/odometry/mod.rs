@@ -4,16 +4,31 @@
 
 mod accuracy_monitor;
 mod balise_link;
+mod covariance;
+mod current_statistical;
+mod federated_filter;
+mod local_filter;
+mod manoeuvre;
 mod motion_estimate;
+mod motion_step;
 mod odometer;
 mod reading_amounts;
 mod settings;
+mod sharing;
+mod sound;
 mod tolerance;
 
 pub use accuracy_monitor::{AccuracyMonitor, OdometerAccuracy};
 pub use balise_link::{BaliseLink, BaliseVerdict, DistanceInterval, MissedBalise};
+pub use covariance::Covariance;
+pub use current_statistical::CurrentStatistical;
+pub use federated_filter::{FederatedFilter, Fusion};
+pub use local_filter::{Innovation, LocalFilter, MeasuredSpeed};
+pub use manoeuvre::{ErrorGrowth, Liveliness, Manoeuvre, ManoeuvreSettings};
 pub use motion_estimate::{Mode, MotionEstimate, WheelState};
+pub use motion_step::MotionStep;
 pub use odometer::Odometer;
 pub use reading_amounts::ReadingAmounts;
 pub use settings::OdometrySettings;
+pub use sharing::Sharing;
 pub use tolerance::{distance_tolerance, speed_tolerance};

@@ -1,0 +1,70 @@
+//! Two wheelsets and a virtual sensor, fused: a wheelset that slides costs nothing once it is known to slide, and the
+//! covariance is that of the errors.
+
+use std::ops::Range;
+
+use footplate_core::estimation::odometry::{
+    FederatedFilter, Fusion, Manoeuvre, ManoeuvreSettings, MeasuredSpeed, Sharing,
+};
+
+use crate::counted_run::{FIRST_SPEED, PERIOD, Run, SEEDS, SERVICE_BRAKE, Score, VARIANCE_TOLD, score};
+
+/// While the second wheelset slides (periods), and how fast it turns beside the train.
+const SLIDING: Range<usize> = 11_520..11_720;
+const CREEPAGE: f64 = 0.8;
+
+fn fused(run: &Run, fusion: Fusion, slides: bool) -> Score {
+    let variance = VARIANCE_TOLD * run.quantum * run.quantum;
+    let mut manoeuvre = Manoeuvre::new(ManoeuvreSettings::recommended());
+    let first = MeasuredSpeed { speed: FIRST_SPEED, variance };
+    let mut filter = FederatedFilter::starting_at(fusion, first);
+    score(run, |period, [first, mut second]| {
+        let sliding = slides && SLIDING.contains(&period);
+        if sliding {
+            second *= CREEPAGE;
+        }
+        let believed = [true, !sliding];
+        let shares = Sharing::PAPER.shares([first, second, 0.0], believed);
+        let [first, second] = [first, second].map(|speed| MeasuredSpeed { speed, variance });
+        filter.step(&manoeuvre.next_step(PERIOD), [first, second, MeasuredSpeed::MISSING], shares);
+        manoeuvre.learn(filter.master().state[1], true);
+        (filter.master().state, Some(*filter.master()))
+    })
+}
+
+#[test]
+fn a_slide_that_is_known_costs_nothing_and_as_printed_it_costs_metres_a_second() {
+    for teeth in [80.0, 200.0] {
+        for seed in SEEDS {
+            let run = Run::new(teeth, SERVICE_BRAKE, seed);
+            for fusion in [Fusion::Reset, Fusion::CovarianceIntersection] {
+                let [rolling, sliding] = [false, true].map(|slides| fused(&run, fusion, slides));
+                assert!(
+                    sliding.rms < rolling.rms + 0.001,
+                    "{fusion:?}, seed {seed}: {rolling:?} {sliding:?}"
+                );
+                assert!(sliding.braking < 0.2, "{fusion:?}, seed {seed}: {sliding:?}");
+            }
+            // Half of a fifth of 89 m/s: what the shares say has no effect.
+            let literal = fused(&run, Fusion::Literal, true);
+            assert!(literal.braking > 8.0, "seed {seed}: {literal:?}");
+        }
+    }
+}
+
+#[test]
+fn they_claim_no_more_than_they_know() {
+    for teeth in [80.0, 100.0, 200.0] {
+        for fusion in [Fusion::Reset, Fusion::CovarianceIntersection] {
+            let scores: Vec<Score> =
+                SEEDS.map(|seed| fused(&Run::new(teeth, SERVICE_BRAKE, seed), fusion, false)).collect();
+            for score in &scores {
+                assert!(score.rms < 0.04 && score.onset < 0.15, "{fusion:?}, {teeth} teeth: {score:?}");
+                // Both count the same pulses: at equal diameters the second wheelset may tell nothing new, or, half
+                // a pulse apart, almost everything that the first does not.
+                assert!((0.1..1.0).contains(&score.nees), "{fusion:?}, {teeth} teeth: {score:?}");
+                assert!(score.inside > 0.97, "{fusion:?}, {teeth} teeth: {score:?}");
+            }
+        }
+    }
+}
