@@ -109,7 +109,10 @@ impl LocalFilter {
         let variance = if taken { p.speed + r } else { p.speed };
         let inverse = 1.0 / (p.speed + r);
         let surprise = value * inverse;
-        self.state = [speed + p.speed * surprise, acceleration + p.mixed * surprise];
+        let updated = [speed + p.speed * surprise, acceleration + p.mixed * surprise];
+        // What nothing corrects drifts; beyond any train it would outrun its own covariance.
+        let drifting = [speed.clamp(-LARGEST_SPEED, LARGEST_SPEED), acceleration];
+        self.state = if taken { updated } else { drifting };
         let kept = r * inverse;
         let after = Covariance {
             speed: p.speed * kept,
@@ -168,6 +171,7 @@ mod tests {
         let mut filter = filter();
         for _ in 0..60 * 24 * 365 {
             filter.predict(&MotionStep::wandering(3.0, 60.0));
+            assert!(!filter.update(MeasuredSpeed::MISSING).taken);
         }
         assert!(filter.covariance.speed > 1e9 && filter.covariance.inverse().speed.is_finite());
         for _ in 0..100 {
