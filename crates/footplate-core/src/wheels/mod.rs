@@ -4,12 +4,25 @@
 //! a [`Period`] what was read in one odometry period. Everything that is learnt from them stands in
 //! [`estimation::odometry`](crate::estimation::odometry).
 
+mod count_windows;
 mod period;
+mod range;
+mod sensor_watch;
+mod slip_slide;
+mod steady_gains;
+mod tachometer;
 mod thresholds;
 mod vehicle;
+mod wheel_tracker;
 mod wheelset;
 
+pub use count_windows::CountWindows;
 pub use period::{Count, Direction, Period, WheelReading};
+pub use range::Range;
+pub use sensor_watch::{SensorWatch, Shown};
+pub use slip_slide::{BothAxles, Loss, Signs, SlipSlide, TrainSigns};
+pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn};
 pub use thresholds::Thresholds;
 pub use vehicle::{BrakeCommand, Vehicle, VehicleError};
+pub use wheel_tracker::WheelTracker;
 pub use wheelset::{Axle, Wheelset};

@@ -1,11 +1,19 @@
 //! Which of the ways to estimate is taken.
 
+use super::virtual_sensor::Envelope;
+use crate::wheels::BothAxles;
+
 /// How an [`Odometer`](super::Odometer) works.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometrySettings {
-    /// Everything beyond the published algorithm that has earned its place.
-    pub beyond_the_paper: bool,
+    /// What is done when the wheelsets differ and nothing else tells which one is at fault.
+    pub both_axles: BothAxles,
+    /// While a wheelset slides none is said to spin, and the other way round.
+    pub latch: bool,
+    /// How the speed falls while both wheelsets slide.
+    pub envelope: Envelope,
+    /// Spectral density of the train's jerk (m²/s⁵).
+    pub jerk_density: f64,
 }
 
 impl OdometrySettings {
@@ -13,12 +21,17 @@ impl OdometrySettings {
     /// read.
     #[must_use]
     pub const fn paper() -> Self {
-        Self { beyond_the_paper: false }
+        Self { both_axles: BothAxles::Literal, latch: false, envelope: Envelope::Fixed, jerk_density: 0.02 }
     }
 
     /// What is best on every scenario.
     #[must_use]
     pub const fn recommended() -> Self {
-        Self { beyond_the_paper: true }
+        Self {
+            both_axles: BothAxles::OnlyIfUndetermined,
+            latch: true,
+            envelope: Envelope::Touches,
+            jerk_density: 0.02,
+        }
     }
 }

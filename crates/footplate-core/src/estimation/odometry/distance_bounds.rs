@@ -1,0 +1,123 @@
+//! Between which distances the train must be.
+//!
+//! Two ways to bound a distance, and the better one counts. The bounds of the speed, summed up, are always good and
+//! always wide. The counts of a wheel that is known to turn no faster (or no slower) than the train moves are off by one
+//! pulse over any way; they are used from the moment on at which that is known.
+
+use crate::wheels::Range;
+
+/// Pulses by which a way by counts can be off: one for the phase at the start and end, a tenth for pitch errors.
+const PULSES_OFF: f64 = 1.1;
+
+/// A wheel's counts since it was last known to bound the distance from one side.
+#[derive(Debug, Clone, Copy)]
+struct Anchor {
+    /// The bound at which it was anchored (m).
+    bound: f64,
+    /// What it has counted since, in pulses, weighted with the pitch (m).
+    counted: f64,
+    set: bool,
+}
+
+impl Anchor {
+    const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false };
+
+    /// The bound after `way` more (m), if the wheel held it for the whole period and before.
+    fn bound(&mut self, holds: bool, way: f64, off: f64) -> Option<f64> {
+        self.set &= holds;
+        self.counted += way;
+        self.set.then_some(self.bound + self.counted + off)
+    }
+
+    fn anchor(&mut self, holds: bool, bound: f64) {
+        if holds && !self.set {
+            *self = Self { bound, counted: 0.0, set: true };
+        }
+    }
+}
+
+/// What one wheel turned in a period, and which bound of the distance that holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counted {
+    /// Signed pulses in the direction of travel.
+    pub(super) pulses: f64,
+    /// Pitch (m).
+    pub(super) pitch: Range,
+    /// The train moved at least as far.
+    pub(super) at_least: bool,
+    /// The train moved at most as far.
+    pub(super) at_most: bool,
+}
+
+/// Follows the bounds of the distance in the direction of travel, from where it began.
+#[derive(Debug, Clone)]
+pub(super) struct DistanceBounds {
+    distance: Range,
+    low: [Anchor; 2],
+    high: [Anchor; 2],
+}
+
+impl DistanceBounds {
+    pub(super) const fn new(distance: Range) -> Self {
+        Self { distance, low: [Anchor::NONE; 2], high: [Anchor::NONE; 2] }
+    }
+
+    pub(super) fn distance(&self) -> Range {
+        self.distance
+    }
+
+    /// The train has moved for `t` seconds, its speed from within `before` to within `now`, its acceleration within
+    /// `acceleration`.
+    pub(super) fn moved(
+        &mut self,
+        before: Range,
+        now: Range,
+        acceleration: Range,
+        wheels: &[Counted; 2],
+        t: f64,
+    ) -> Range {
+        // The mean of a speed with bounded acceleration is off the mean of its ends by at most (b - a) t / 8.
+        let bend = acceleration.width() * t * t * 0.125;
+        let mut low = self.distance.low + 0.5 * (before.low + now.low) * t - bend;
+        let mut high = self.distance.high + 0.5 * (before.high + now.high) * t + bend;
+        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+            let (short, long) = if wheel.pulses < 0.0 {
+                (wheel.pitch.high, wheel.pitch.low)
+            } else {
+                (wheel.pitch.low, wheel.pitch.high)
+            };
+            let off = PULSES_OFF * wheel.pitch.high;
+            if let Some(bound) = low_anchor.bound(wheel.at_least, wheel.pulses * short, -off) {
+                low = low.max(bound);
+            }
+            if let Some(bound) = high_anchor.bound(wheel.at_most, wheel.pulses * long, off) {
+                high = high.min(bound);
+            }
+        }
+        if low > high {
+            // Something taken for granted is not so; the speeds alone are left.
+            (low, high) = (
+                (self.distance.low + before.low.min(now.low) * t).min(low),
+                (self.distance.high + before.high.max(now.high) * t).max(low),
+            );
+            self.low = [Anchor::NONE; 2];
+            self.high = [Anchor::NONE; 2];
+        }
+        self.distance = Range { low, high };
+        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+            low_anchor.anchor(wheel.at_least, low);
+            high_anchor.anchor(wheel.at_most, high);
+        }
+        self.distance
+    }
+
+    /// The train is known to be within `place` (m from the start, in the direction of travel).
+    pub(super) fn relocate(&mut self, place: Range) {
+        *self = Self::new(place);
+    }
+
+    /// The bounds seen in the opposite direction, as the train turns round.
+    pub(super) fn reverse(&mut self) {
+        *self = Self::new(self.distance.reversed());
+    }
+}

@@ -1,0 +1,188 @@
+//! Between which speeds the train must run, whatever the filters believe.
+//!
+//! A set-membership observer. It shares nothing with the Kalman channel: no covariance, no fused speed. What it takes
+//! for granted is small and stated by the vehicle: the train cannot accelerate or brake harder than it can; a wheel
+//! that is braked turns no faster than the train moves, one that is driven no slower, and one that is neither turns
+//! with it; the pitch of each wheel lies within its tolerance.
+//!
+//! While the brake is on, no braked wheel bounds the speed from above: both may be held back, slowly and alike. Then the
+//! bound comes down as the *command* promises, never below what the wheels show; and once a slide was seen, which
+//! disproves the command, not at all (or by what the vehicle states for sliding wheels) until the brake is let go.
+
+use super::command_watch::Allowed;
+use crate::wheels::{Axle, Loss, Range, Thresholds};
+
+/// How far back the bound goes for one that is still sound when a slide or slip is seen (s): longer than any
+/// detection takes.
+const LOOK_BACK_S: f64 = 0.8;
+/// Share of full traction at which a powered wheel may creep by all that goes unseen; proportionally below.
+const FULL_CREEP_EFFORT: f64 = 0.2;
+
+/// What the counts of one wheel say, in the direction of travel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WheelBounds {
+    /// Between which speeds it turns; `Range::ANY` if nothing is known.
+    pub(super) turns: Range,
+    pub(super) axle: Axle,
+    pub(super) lost: Option<Loss>,
+}
+
+/// The extreme of a number within the last moments, from two halves that take turns.
+#[derive(Debug, Clone, Copy)]
+struct Recent {
+    now: f64,
+    before: f64,
+    age: f64,
+}
+
+impl Recent {
+    const fn new(value: f64) -> Self {
+        Self { now: value, before: value, age: 0.0 }
+    }
+
+    /// Takes in a value, larger ones count.
+    fn push(&mut self, value: f64, t: f64) -> f64 {
+        self.age += t;
+        if self.age > LOOK_BACK_S {
+            self.before = self.now;
+            self.now = value;
+            self.age = 0.0;
+        } else {
+            self.now = self.now.max(value);
+        }
+        self.now.max(self.before)
+    }
+}
+
+/// Follows the bounds of the speed, in the direction of travel.
+#[derive(Debug, Clone)]
+pub(super) struct SpeedBounds {
+    speed: Range,
+    highest: Recent,
+    /// Of the negated lower bound, and of the negated lower bound that powered wheels alone would give.
+    lowest: Recent,
+    by_powered: Recent,
+    all_slid: bool,
+    any_spun: bool,
+}
+
+impl SpeedBounds {
+    pub(super) const fn new(speed: Range) -> Self {
+        Self {
+            speed,
+            highest: Recent::new(speed.high),
+            lowest: Recent::new(-speed.low),
+            by_powered: Recent::new(-speed.low),
+            all_slid: false,
+            any_spun: false,
+        }
+    }
+
+    pub(super) fn speed(&self) -> Range {
+        self.speed
+    }
+
+    /// Where the train can have got to within `t` seconds, before any wheel is asked.
+    pub(super) fn possible(&self, allowed: &Allowed, t: f64) -> Range {
+        Range {
+            low: self.speed.low + allowed.acceleration.low * t,
+            high: self.speed.high + allowed.acceleration.high * t,
+        }
+    }
+
+    /// Narrows what is `possible` by what the wheels say.
+    pub(super) fn narrow(
+        &mut self,
+        possible: Range,
+        wheels: &[WheelBounds; 2],
+        allowed: &Allowed,
+        thresholds: &Thresholds,
+        t: f64,
+    ) -> Range {
+        let low = self.low(possible.low, wheels, allowed, thresholds, t);
+        let high = self.high(possible.high, wheels, allowed, thresholds, t);
+        let mut speed = Range { low, high };
+        if speed.is_empty() {
+            // Something that was taken for granted is not so: only what the train can do is left.
+            speed = possible.or(self.speed);
+        }
+        self.highest.push(speed.high, t);
+        self.lowest.push(-speed.low, t);
+        self.speed = speed;
+        speed
+    }
+
+    /// The bounds seen in the opposite direction, as the train turns round.
+    pub(super) fn reverse(&mut self) {
+        *self = Self::new(self.speed.reversed());
+    }
+
+    fn low(
+        &mut self,
+        free: f64,
+        wheels: &[WheelBounds; 2],
+        allowed: &Allowed,
+        thresholds: &Thresholds,
+        t: f64,
+    ) -> f64 {
+        let creep = thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
+        let mut rolling = f64::NEG_INFINITY;
+        let mut powered = f64::NEG_INFINITY;
+        let mut spun = false;
+        for wheel in wheels {
+            let driven = allowed.slip && wheel.axle.may_slip();
+            spun |= wheel.lost == Some(Loss::Spin);
+            if !driven {
+                rolling = rolling.max(wheel.turns.low);
+            } else if wheel.lost != Some(Loss::Spin) {
+                powered = powered.max(wheel.turns.low * (1.0 - creep));
+            }
+        }
+        // A wheel that starts to spin is seen a little late.
+        let powered = -self.by_powered.push(-powered, t);
+        let free = if spun && !self.any_spun { free.min(-self.lowest.before.max(self.lowest.now)) } else { free };
+        self.any_spun = spun;
+        free.max(rolling).max(powered)
+    }
+
+    fn high(
+        &mut self,
+        free: f64,
+        wheels: &[WheelBounds; 2],
+        allowed: &Allowed,
+        thresholds: &Thresholds,
+        t: f64,
+    ) -> f64 {
+        let mut trusted = f64::INFINITY;
+        let mut shown = f64::NEG_INFINITY;
+        let mut sliding = 0;
+        let mut braked = 0;
+        for wheel in wheels {
+            let slides = wheel.lost == Some(Loss::Slide);
+            if allowed.slide && wheel.axle.may_slide() {
+                braked += 1;
+                sliding += i32::from(slides);
+                if !slides && wheel.turns.high.is_finite() {
+                    shown = shown.max(wheel.turns.high);
+                }
+            } else {
+                trusted = trusted.min(wheel.turns.high);
+            }
+        }
+        if trusted.is_finite() {
+            self.all_slid = false;
+            return free.min(trusted);
+        }
+        if sliding == braked && braked > 0 && !self.all_slid {
+            // All slide now: the bound goes back to one from before the slide began.
+            self.all_slid = true;
+            return self.highest.now.max(self.highest.before);
+        }
+        self.all_slid &= allowed.slide;
+        // Below the peak of adhesion a wheel creeps without being seen, but only where adhesion is poor.
+        let creep = if sliding > 0 || self.all_slid { thresholds.creepage } else { 0.0 };
+        let by_command = self.speed.high + allowed.at_most_by_command * t;
+        let by_wheels = shown / (1.0 - creep);
+        if self.all_slid { free.min(self.speed.high + allowed.at_most_by_command * t) } else { free.min(by_command.max(by_wheels)) }
+    }
+}

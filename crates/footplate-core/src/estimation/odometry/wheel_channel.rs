@@ -1,0 +1,167 @@
+//! One wheelset from its reading to what it shows: speed, acceleration, and the bounds that its counts set.
+
+use super::command_watch::Allowed;
+use crate::wheels::{
+    CountWindows, Expected, Heading, Period, Quality, Range, SensorWatch, Tachometer, Vehicle, WheelTracker,
+    Wheelset,
+};
+
+/// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
+/// acceleration changed meanwhile.
+const SURPRISE_PULSES: f64 = 2.2;
+/// Accelerations of a wheelset beyond which a count is not one of a wheel (m/s²): the train's and noise, a wheel that
+/// slips or slides, one that regains its grip.
+const ROLLING: f64 = 2.5;
+const LOSING: f64 = 20.0;
+const REGAINING: f64 = 30.0;
+/// Readings before the tracker knows enough to be surprised.
+const WARM: u32 = 8;
+/// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
+const FASTER_THAN_TRAIN: f64 = 1.2;
+/// Time over which the acceleration is smoothed that tells braking from coasting (s).
+const SMOOTHED_S: f64 = 0.5;
+
+/// What one wheelset tells the odometer.
+#[derive(Debug, Clone)]
+pub(super) struct WheelChannel {
+    pub(super) wheelset: Wheelset,
+    pub(super) pitch: f64,
+    pub(super) pitch_range: Range,
+    pub(super) tracker: WheelTracker,
+    pub(super) watch: SensorWatch,
+    pub(super) quality: Quality,
+    /// Pulses of the period in the direction of travel.
+    pub(super) pulses: f64,
+    /// Speed before the period's pulses (m/s).
+    pub(super) speed_before: f64,
+    /// How far its counts put the train ahead of where the filter believes it (m).
+    pub(super) ahead: f64,
+    pub(super) smooth_acceleration: f64,
+    /// It was trusted in the last period.
+    pub(super) trusted: bool,
+    pub(super) missing_for: f64,
+    tachometer: Tachometer,
+    windows: CountWindows,
+    readings: u32,
+    most_per_second: f64,
+}
+
+impl WheelChannel {
+    pub(super) fn new(wheelset: Wheelset, vehicle: &Vehicle) -> Self {
+        let pitch = wheelset.pulse_pitch().as_m();
+        let period = vehicle.period.as_s();
+        Self {
+            wheelset,
+            pitch,
+            pitch_range: Range::around(pitch, wheelset.diameter_tolerance),
+            tracker: WheelTracker::new(pitch, period),
+            watch: SensorWatch::new(),
+            quality: Quality::Missing,
+            pulses: 0.0,
+            speed_before: 0.0,
+            ahead: 0.0,
+            smooth_acceleration: 0.0,
+            trusted: false,
+            missing_for: 0.0,
+            tachometer: Tachometer::new(),
+            windows: CountWindows::new(period),
+            readings: 0,
+            most_per_second: FASTER_THAN_TRAIN * vehicle.max_speed.as_m_per_s() / pitch,
+        }
+    }
+
+    /// Takes in a reading at `now` (s), `t` seconds after the last one; says how far the wheel turned (m).
+    pub(super) fn read(
+        &mut self,
+        period: &Period,
+        which: usize,
+        (now, t, nominal): (f64, f64, f64),
+        heading: Heading,
+        allowed: &Allowed,
+    ) -> f64 {
+        let Some(reading) = period.wheels.get(which) else { return 0.0 };
+        let expected = self.tracker.expected(t) / self.pitch;
+        let may_slide = allowed.slide && self.wheelset.axle.may_slide();
+        let may_slip = allowed.slip && self.wheelset.axle.may_slip();
+        let (up, down) = match (may_slide, may_slip) {
+            (true, _) => (REGAINING, LOSING),
+            (false, true) => (LOSING, REGAINING),
+            (false, false) => (ROLLING, ROLLING),
+        };
+        let warm = self.readings >= WARM;
+        let leeway = |acceleration: f64| {
+            if warm { SURPRISE_PULSES + acceleration * t * t / self.pitch } else { f64::INFINITY }
+        };
+        // Expectation and leeway in the sense in which the tachometer counts.
+        let (more, fewer) =
+            if heading.way < 0.0 { (leeway(down), leeway(up)) } else { (leeway(up), leeway(down)) };
+        let expectation = Expected {
+            pulses: expected * heading.way,
+            more,
+            fewer,
+            most: self.most_per_second * t + SURPRISE_PULSES,
+        };
+        let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
+        self.quality = turn.quality;
+        self.pulses = turn.pulses * heading.way;
+        self.speed_before = self.tracker.speed();
+        let counted = self.pulses * self.pitch;
+        self.windows.counted(now, self.pulses);
+        if turn.quality == Quality::Missing {
+            self.windows.interrupt();
+            self.missing_for += t;
+            self.readings = 0;
+            self.tracker.turned(self.tracker.expected(t), t);
+            return counted;
+        }
+        if turn.quality == Quality::Substituted {
+            self.windows.interrupt();
+        }
+        if self.readings == 0 && self.missing_for > 0.0 {
+            self.tracker.restart(counted / t);
+        }
+        self.missing_for = 0.0;
+        self.readings = self.readings.saturating_add(1);
+        self.tracker.turned(counted, t);
+        self.smooth_acceleration +=
+            (self.tracker.acceleration() - self.smooth_acceleration) * (t / SMOOTHED_S).min(1.0);
+        counted
+    }
+
+    /// The first reading of a run: only a speed is known from it.
+    pub(super) fn begin(&mut self, period: &Period, which: usize, t: f64) -> Option<f64> {
+        let reading = period.wheels.get(which)?;
+        let most = self.most_per_second * t + SURPRISE_PULSES;
+        let open = Expected { pulses: 0.0, more: f64::INFINITY, fewer: f64::INFINITY, most };
+        let uncertain = Heading { way: 1.0, certain: false };
+        let turn = self.tachometer.read(reading, 1.0, uncertain, &open);
+        self.quality = turn.quality;
+        if turn.quality == Quality::Missing {
+            return None;
+        }
+        let speed = turn.pulses * self.pitch / t;
+        self.tracker.restart(speed);
+        Some(speed)
+    }
+
+    /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
+    pub(super) fn turns(&self, acceleration: Range) -> Range {
+        if self.watch.doubted() || self.quality != Quality::Ok {
+            return Range::ANY;
+        }
+        self.windows.speed(self.pitch_range, acceleration)
+    }
+
+    /// The train has turned round.
+    pub(super) fn reverse(&mut self) {
+        self.tracker.reverse();
+        self.windows.reverse();
+        self.ahead = -self.ahead;
+        self.smooth_acceleration = -self.smooth_acceleration;
+    }
+
+    /// Its sample was read and its sensor is believed.
+    pub(super) fn is_read(&self) -> bool {
+        self.quality != Quality::Missing && !self.watch.excluded()
+    }
+}

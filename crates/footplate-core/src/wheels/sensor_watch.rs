@@ -1,0 +1,112 @@
+//! Whether a tachometer is to be believed: dead, stuck, or saying what no wheel can do.
+//!
+//! A locked wheel and a dead sensor both say nothing. What tells them apart is how they came to it: a wheel of 100
+//! kg m² needs some tenths of a second to stop, a cable breaks between two periods. Every exclusion is taken back once
+//! the sensor agrees with the train for a while.
+
+/// Faster than any wheelset on rails was seen to lose its speed (m/s²).
+const FASTEST_LOCK: f64 = 40.0;
+/// Speed of the train above which a silent wheel that cannot slide is dead (m/s).
+const DEAD_ABOVE: f64 = 1.5;
+/// How long it has to be silent (s).
+const DEAD_AFTER_S: f64 = 0.5;
+/// How long a count has to stand still before it can be stuck (s) ...
+const STUCK_AFTER_S: f64 = 1.0;
+/// ... and before it is no longer asked for bounds if the other wheelset disagrees (s).
+const DOUBTED_AFTER_S: f64 = 0.4;
+/// By how much the other wheelset has to disagree (m/s, and as part of the speed).
+const DISAGREE: (f64, f64) = (1.0, 0.05);
+/// By how much it may disagree before the bounds stop asking (m/s, and as part of the speed).
+const DOUBT: (f64, f64) = (0.25, 0.015);
+/// How long a sensor has to agree with the train to be believed again (s), and how closely (m/s, part of the speed).
+const AGREE_FOR_S: f64 = 1.0;
+const AGREE: (f64, f64) = (0.4, 0.02);
+
+/// What a sensor shows in one period, in the direction of travel.
+#[derive(Debug, Clone, Copy)]
+pub struct Shown {
+    /// Pulses read.
+    pub pulses: f64,
+    /// Speed of the wheel followed (m/s).
+    pub speed: f64,
+    /// Speed of the wheel before this period's pulses (m/s).
+    pub speed_before: f64,
+    /// Speed of the other wheel (m/s), if it is believed.
+    pub other: Option<f64>,
+    /// Speed of the train (m/s).
+    pub train: f64,
+    /// Brake or traction can make this wheel turn otherwise than the train moves.
+    pub may_differ: bool,
+    /// The count cannot be that of a wheel, whatever it does.
+    pub impossible: bool,
+}
+
+/// Follows one tachometer.
+#[derive(Debug, Clone)]
+pub struct SensorWatch {
+    excluded: bool,
+    doubted: bool,
+    last: f64,
+    same_for: f64,
+    silent_for: f64,
+    agreed_for: f64,
+}
+
+impl SensorWatch {
+    /// A sensor that is believed.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { excluded: false, doubted: false, last: -1.0, same_for: 0.0, silent_for: 0.0, agreed_for: 0.0 }
+    }
+
+    /// It is not believed.
+    #[must_use]
+    pub fn excluded(&self) -> bool {
+        self.excluded
+    }
+
+    /// It is not asked for bounds.
+    #[must_use]
+    pub fn doubted(&self) -> bool {
+        self.doubted || self.excluded
+    }
+
+    /// Takes in one period of `t` seconds.
+    pub fn look(&mut self, shown: &Shown, t: f64) {
+        let same = shown.pulses == self.last;
+        self.same_for = if same { self.same_for + t } else { 0.0 };
+        self.last = shown.pulses;
+        let silent_before = self.silent_for;
+        self.silent_for = if shown.pulses == 0.0 { self.silent_for + t } else { 0.0 };
+
+        let away = |from: f64, (least, part): (f64, f64)| {
+            (shown.speed - from).abs() > least.max(part * from.abs().max(shown.speed.abs()))
+        };
+        let silent = self.silent_for > 0.0;
+        let stopped_at_once =
+            silent && silent_before == 0.0 && shown.speed_before.abs() > FASTEST_LOCK * 2.0 * t;
+        let dead = silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
+        let disagrees = shown.other.is_some_and(|other| away(other, DISAGREE));
+        let stuck = !silent && self.same_for > STUCK_AFTER_S && disagrees;
+        self.doubted =
+            !silent && self.same_for > DOUBTED_AFTER_S && shown.other.is_some_and(|other| away(other, DOUBT));
+
+        let agrees = !away(shown.train, AGREE)
+            && !shown.impossible
+            && (!silent || shown.train.abs() < DEAD_ABOVE)
+            && !(self.same_for > STUCK_AFTER_S && disagrees);
+        self.agreed_for = if agrees { self.agreed_for + t } else { 0.0 };
+        if stopped_at_once || dead || stuck || shown.impossible {
+            self.excluded = true;
+            self.agreed_for = 0.0;
+        } else if self.agreed_for >= AGREE_FOR_S {
+            self.excluded = false;
+        }
+    }
+}
+
+impl Default for SensorWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
