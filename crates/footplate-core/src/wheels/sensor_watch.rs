@@ -85,17 +85,16 @@ impl SensorWatch {
         let silent = self.silent_for > 0.0;
         let stopped_at_once =
             silent && silent_before == 0.0 && shown.speed_before.abs() > FASTEST_LOCK * 2.0 * t;
-        let dead = silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
+        let dead =
+            silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
         let disagrees = shown.other.is_some_and(|other| away(other, DISAGREE));
         let stuck = !silent && self.same_for > STUCK_AFTER_S && disagrees;
         self.doubted =
             !silent && self.same_for > DOUBTED_AFTER_S && shown.other.is_some_and(|other| away(other, DOUBT));
 
-        let agrees = !away(shown.train, AGREE)
-            && !shown.impossible
-            && (!silent || shown.train.abs() < DEAD_ABOVE)
-            && !(self.same_for > STUCK_AFTER_S && disagrees);
-        self.agreed_for = if agrees { self.agreed_for + t } else { 0.0 };
+        let still_silent = silent && shown.train.abs() > DEAD_ABOVE;
+        let wrong = shown.impossible || still_silent || stuck || away(shown.train, AGREE);
+        self.agreed_for = if wrong { 0.0 } else { self.agreed_for + t };
         if stopped_at_once || dead || stuck || shown.impossible {
             self.excluded = true;
             self.agreed_for = 0.0;

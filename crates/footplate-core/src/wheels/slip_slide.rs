@@ -95,7 +95,15 @@ impl SlipSlide {
     /// Two wheelsets that roll.
     #[must_use]
     pub const fn new(thresholds: Thresholds, policy: BothAxles, latch: bool) -> Self {
-        Self { thresholds, policy, latch, lost: [None; 2], suspected: [0.0; 2], rolling: [0.0; 2], before: [0.0; 2] }
+        Self {
+            thresholds,
+            policy,
+            latch,
+            lost: [None; 2],
+            suspected: [0.0; 2],
+            rolling: [0.0; 2],
+            before: [0.0; 2],
+        }
     }
 
     /// What the wheelsets do now.
@@ -116,7 +124,8 @@ impl SlipSlide {
         let latched = if self.latch { self.latched() } else { None };
         let [first, second] = wheels;
         let [first_before, second_before] = self.before;
-        let own = [self.own(first, first_before, train, latched), self.own(second, second_before, train, latched)];
+        let own =
+            [self.own(first, first_before, train, latched), self.own(second, second_before, train, latched)];
         let by_difference = self.by_difference(wheels, train, latched, [own[0].is_some(), own[1].is_some()]);
         self.before = [first.acceleration, second.acceleration];
         let fastest = first.speed.max(second.speed);

@@ -81,7 +81,13 @@ impl Tachometer {
     }
 
     /// What the wheel turned in a period that is `periods` odometry periods long.
-    pub fn read(&mut self, reading: &WheelReading, periods: f64, heading: Heading, expected: &Expected) -> Turn {
+    pub fn read(
+        &mut self,
+        reading: &WheelReading,
+        periods: f64,
+        heading: Heading,
+        expected: &Expected,
+    ) -> Turn {
         let read = self.increment(reading, periods, heading, expected);
         let Some((pulses, whole)) = read else {
             self.assumed += expected.pulses;
@@ -133,8 +139,8 @@ impl Tachometer {
                 let expected_in_all = expected.pulses + self.assumed;
                 let expected_in_one = expected_in_all / span.max(1.0);
                 // A count after lost rows may cover them or its own period only: whichever is nearer to the expected.
-                let covers_one = span > LOST_ROWS
-                    && (counted - expected_in_one).abs() < (counted - expected_in_all).abs();
+                let covers_one =
+                    span > LOST_ROWS && (counted - expected_in_one).abs() < (counted - expected_in_all).abs();
                 if covers_one {
                     Some((counted + expected.pulses - expected_in_one, false))
                 } else {
@@ -240,7 +246,8 @@ mod tests {
 
     #[test]
     fn a_counter_that_starts_anew_is_missing_once() {
-        let turns = turns(&[Count::Counter(1000), Count::Counter(1020), Count::Counter(0), Count::Counter(20)]);
+        let turns =
+            turns(&[Count::Counter(1000), Count::Counter(1020), Count::Counter(0), Count::Counter(20)]);
         assert_eq!(turns[2].quality, Quality::Missing);
         assert_eq!(turns[3], Turn { pulses: 20.0 - 20.0 + 20.0 - 20.0, quality: Quality::Substituted });
     }

@@ -20,6 +20,8 @@ pub struct Thresholds {
     pub slide_deceleration: Acceleration,
     /// Creepage, as part of the larger speed, beyond which a wheelset slips or slides.
     pub creepage: f64,
+    /// Creepage that a fully braked wheelset can have while it rolls and keeps up with the other; in proportion below.
+    pub rolling_creepage: f64,
     /// Least difference to the train for the test of creepage.
     pub creepage_floor: Speed,
     /// Difference between the wheelsets beyond which at least one of them slips or slides ...
@@ -52,6 +54,8 @@ impl Thresholds {
             slide_deceleration: max_brake + beyond,
             // Beyond the peak of adhesion on dry rail and near it on wet rail (Polach).
             creepage: 0.08,
+            // Service braking on wet rail uses a quarter of the adhesion and creeps by a quarter of the peak (Polach).
+            rolling_creepage: 0.02,
             creepage_floor: Speed::from_m_per_s(0.3),
             difference: Speed::from_m_per_s(1.0),
             difference_ratio: 0.025,
@@ -73,6 +77,7 @@ impl Thresholds {
         within("slip_acceleration_m_s2", self.slip_acceleration.as_m_per_s2(), 50.0)?;
         within("slide_deceleration_m_s2", self.slide_deceleration.as_m_per_s2(), 50.0)?;
         within("creepage", self.creepage, 1.0)?;
+        within("rolling_creepage", self.rolling_creepage, 1.0)?;
         within("creepage_floor_m_s", self.creepage_floor.as_m_per_s(), 10.0)?;
         within("difference_m_s", self.difference.as_m_per_s(), 50.0)?;
         within("difference_ratio", self.difference_ratio, 1.0)?;

@@ -32,6 +32,9 @@ pub struct Vehicle {
     pub max_brake: Acceleration,
     /// The wheelsets of the two tachometers.
     pub wheelsets: [Wheelset; 2],
+    /// The two wheelsets are braked independently (in different bogies, each with its own cylinder and anti-slide
+    /// valve), so that both sliding alike for seconds can be ruled out. Not so if one converter feeds both.
+    pub independent: bool,
     /// What the brake command is known to do.
     pub brake_command: BrakeCommand,
     /// Where detection and correction draw their lines.
@@ -78,8 +81,16 @@ impl Vehicle {
     ) -> Result<Self, VehicleError> {
         let thresholds = Thresholds::derived(max_traction, max_brake);
         let brake_command = BrakeCommand::cautious(max_brake);
-        let vehicle =
-            Self { period, max_speed, max_traction, max_brake, wheelsets, brake_command, thresholds };
+        let vehicle = Self {
+            period,
+            max_speed,
+            max_traction,
+            max_brake,
+            wheelsets,
+            independent: false,
+            brake_command,
+            thresholds,
+        };
         vehicle.check()?;
         Ok(vehicle)
     }

@@ -43,16 +43,14 @@ pub(super) struct Allowed {
     pub(super) slide: bool,
     /// A powered wheel may turn faster than the train moves.
     pub(super) slip: bool,
-    /// The brake is commanded now.
-    pub(super) braking: bool,
-    /// Traction is commanded now.
-    pub(super) traction: bool,
     /// Acceleration of the train (m/s², in the direction of travel) within the last windows of counts.
     pub(super) acceleration: Range,
     /// The highest acceleration if the command is believed: below `acceleration.high` while the brake is on.
     pub(super) at_most_by_command: f64,
     /// How much of full traction may act, 0 to 1.
     pub(super) traction_effort: f64,
+    /// How much of the full brake may act, 0 to 1.
+    pub(super) brake_effort: f64,
 }
 
 impl CommandWatch {
@@ -72,11 +70,6 @@ impl CommandWatch {
     /// A slide was seen: until the brake is let go, its command says nothing about the train.
     pub(super) fn disprove(&mut self) {
         self.disproved = true;
-    }
-
-    /// Whether a slide was seen since the brake was applied.
-    pub(super) fn disproved(&self) -> bool {
-        self.disproved
     }
 
     /// The command of the next `t` seconds; where it is not recorded, `seen` tells it: how all wheels accelerate.
@@ -120,11 +113,10 @@ impl CommandWatch {
         Allowed {
             slide,
             slip,
-            braking,
-            traction,
             acceleration,
             at_most_by_command,
             traction_effort: self.traction,
+            brake_effort: if effort.is_some() { self.brake } else { 1.0 },
         }
     }
 

@@ -8,7 +8,7 @@ use super::command_watch::{Allowed, CommandWatch};
 use super::distance_bounds::{Counted, DistanceBounds};
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
 use super::settings::OdometrySettings;
-use super::speed_bounds::{SpeedBounds, WheelBounds};
+use super::speed_bounds::{Limits, SpeedBounds, WheelBounds};
 use super::train_filter::TrainFilter;
 use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
@@ -29,6 +29,16 @@ const BLIND_S: f64 = 5.0;
 const FIRST_COUNT: f64 = 1.0 / 6.0;
 /// Jerk density while the virtual sensor stands in (m²/s⁵): accelerations are known to 0.3 m/s² after a second.
 const BLIND_JERK: f64 = 0.1;
+
+/// Difference of speeds at which the wheel that seems to slip or slide loses half its share (m/s): three standard
+/// deviations of the difference of two wheels that roll.
+const APART: f64 = 0.25;
+/// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
+const CREEPING_SHARE: f64 = 0.05;
+/// No wheel that is trusted has less.
+const SMALLEST_SHARE: f64 = 1e-3;
+/// Wheels silent for longer in a slide are locked (s).
+const LOCKED_S: f64 = 0.15;
 
 /// Follows one train from its first period.
 #[derive(Debug, Clone)]
@@ -58,24 +68,7 @@ impl Odometer {
     /// The first value of the vehicle that no railway has.
     pub fn new(vehicle: Vehicle, settings: OdometrySettings) -> Result<Self, VehicleError> {
         vehicle.check()?;
-        let [first, second] = vehicle.wheelsets;
-        let fastest = vehicle.max_speed.as_m_per_s();
-        Ok(Self {
-            vehicle,
-            settings,
-            wheels: [WheelChannel::new(first, &vehicle), WheelChannel::new(second, &vehicle)],
-            command: CommandWatch::new(),
-            slips: SlipSlide::new(vehicle.thresholds, settings.both_axles, settings.latch),
-            bounds: SpeedBounds::new(Range { low: 0.0, high: fastest }),
-            ways: DistanceBounds::new(Range::exactly(0.0)),
-            train: TrainFilter::new(0.0, fastest * fastest),
-            stand_in: None,
-            last: None,
-            clock: 0.0,
-            way: 1.0,
-            distance: 0.0,
-            blind: 0.0,
-        })
+        Ok(Self::fresh(vehicle, settings))
     }
 
     /// How it works.
@@ -147,14 +140,13 @@ impl Odometer {
         let top = self.vehicle.max_speed.as_m_per_s();
         let before = self.ways.distance();
         let reach = Range { low: before.low - top * t, high: before.high + top * t };
-        let mut fresh = Self { way: self.way, distance: self.distance, ..Self::fresh(self.vehicle, self.settings) };
+        let mut fresh =
+            Self { way: self.way, distance: self.distance, ..Self::fresh(self.vehicle, self.settings) };
         fresh.ways.relocate(reach);
         let first = fresh.begin(period);
         *self = fresh;
-        let estimate = self.finished(
-            MotionEstimate { mode: Mode::Degraded, distance: last.distance, ..first },
-            &last,
-        );
+        let estimate =
+            self.finished(MotionEstimate { mode: Mode::Degraded, distance: last.distance, ..first }, &last);
         self.last = Some(estimate);
         estimate
     }
@@ -201,7 +193,7 @@ impl Odometer {
         let jerk = if self.stand_in.is_some() { BLIND_JERK } else { self.settings.jerk_density };
         let mut way = self.train.run(t, jerk);
         let lost = self.judge(&turns, possible, &allowed, t);
-        if lost.contains(&Some(Loss::Slide)) {
+        if lost == [Some(Loss::Slide); 2] {
             self.command.disprove();
         }
         let speed_before = self.bounds.speed();
@@ -247,13 +239,7 @@ impl Odometer {
     }
 
     /// Which wheelsets slip or slide, and which sensors are believed.
-    fn judge(
-        &mut self,
-        turns: &[Range; 2],
-        possible: Range,
-        allowed: &Allowed,
-        t: f64,
-    ) -> [Option<Loss>; 2] {
+    fn judge(&mut self, turns: &[Range; 2], possible: Range, allowed: &Allowed, t: f64) -> [Option<Loss>; 2] {
         let train = TrainSigns {
             speed: self.train.v,
             acceleration: self.train.a,
@@ -282,8 +268,7 @@ impl Odometer {
             let axle = wheel.wheelset.axle;
             let slides = allowed.slide && axle.may_slide();
             let slips = allowed.slip && axle.may_slip();
-            let impossible =
-                (range.high < possible.low && !slides) || (range.low > possible.high && !slips);
+            let impossible = (range.high < possible.low && !slides) || (range.low > possible.high && !slips);
             let shown = Shown {
                 pulses: wheel.pulses,
                 speed: wheel.tracker.speed(),
@@ -311,11 +296,13 @@ impl Odometer {
         let [first_lost, second_lost] = lost;
         let of = |wheel: &WheelChannel, turns: Range, lost| WheelBounds {
             turns: if wheel.watch.doubted() { Range::ANY } else { turns },
+            speed: wheel.tracker.speed(),
             axle: wheel.wheelset.axle,
             lost,
         };
         let wheels = [of(first, first_turns, first_lost), of(second, second_turns, second_lost)];
-        self.bounds.narrow(possible, &wheels, allowed, &self.vehicle.thresholds, t)
+        let Vehicle { thresholds, independent, .. } = self.vehicle;
+        self.bounds.narrow(possible, &wheels, allowed, &Limits { thresholds, independent }, t)
     }
 
     /// Which wheels may correct the filter.
@@ -335,7 +322,8 @@ impl Odometer {
             [true, true] => {
                 let weight = |wheel: &WheelChannel, other: &WheelChannel| {
                     let sharp = 1.0 / (wheel.pitch * wheel.pitch);
-                    let creeps = allowed.slip && wheel.wheelset.axle.may_slip() && !other.wheelset.axle.may_slip();
+                    let creeps =
+                        allowed.slip && wheel.wheelset.axle.may_slip() && !other.wheelset.axle.may_slip();
                     let behind = if allowed.slide {
                         other.tracker.speed() - wheel.tracker.speed()
                     } else if allowed.slip {
@@ -481,13 +469,3 @@ impl Odometer {
 fn worse(one: Mode, other: Mode) -> Mode {
     if one == Mode::Ambiguous { one } else { other }
 }
-
-/// Difference of speeds at which the wheel that seems to slip or slide loses half its share (m/s): three standard
-/// deviations of the difference of two wheels that roll.
-const APART: f64 = 0.25;
-/// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
-const CREEPING_SHARE: f64 = 0.05;
-/// No wheel that is trusted has less.
-const SMALLEST_SHARE: f64 = 1e-3;
-/// Wheels silent for longer in a slide are locked (s).
-const LOCKED_S: f64 = 0.15;

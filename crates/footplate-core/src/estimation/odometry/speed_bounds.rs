@@ -6,8 +6,10 @@
 //! with it; the pitch of each wheel lies within its tolerance.
 //!
 //! While the brake is on, no braked wheel bounds the speed from above: both may be held back, slowly and alike. Then the
-//! bound comes down as the *command* promises, never below what the wheels show; and once a slide was seen, which
+//! bound comes down as the *command* promises, never below what the wheels show; and once both were seen to slide, which
 //! disproves the command, not at all (or by what the vehicle states for sliding wheels) until the brake is let go.
+//! Only wheelsets that are braked independently and have kept up with each other for seconds bound it together: two
+//! slides are never alike.
 
 use super::command_watch::Allowed;
 use crate::wheels::{Axle, Loss, Range, Thresholds};
@@ -15,6 +17,14 @@ use crate::wheels::{Axle, Loss, Range, Thresholds};
 /// How far back the bound goes for one that is still sound when a slide or slip is seen (s): longer than any
 /// detection takes.
 const LOOK_BACK_S: f64 = 0.8;
+/// How long two independent wheelsets have to keep up with each other ...
+const TOGETHER_S: f64 = 3.0;
+/// ... and how closely (m/s, part of the speed): what diameters and creep explain.
+const TOGETHER: (f64, f64) = (0.15, 0.006);
+/// Time over which their difference is smoothed (s): a followed speed is noisy by 0.1 m/s at 80 pulses a turn.
+const SMOOTHED_S: f64 = 0.5;
+/// How far back a bound by braked wheels is taken from (s): a slide is seen earlier.
+const SLIDE_SEEN_S: f64 = 0.4;
 /// Share of full traction at which a powered wheel may creep by all that goes unseen; proportionally below.
 const FULL_CREEP_EFFORT: f64 = 0.2;
 
@@ -23,8 +33,17 @@ const FULL_CREEP_EFFORT: f64 = 0.2;
 pub(super) struct WheelBounds {
     /// Between which speeds it turns; `Range::ANY` if nothing is known.
     pub(super) turns: Range,
+    /// The speed it is followed at.
+    pub(super) speed: f64,
     pub(super) axle: Axle,
     pub(super) lost: Option<Loss>,
+}
+
+/// What the vehicle states about its wheels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    pub(super) thresholds: Thresholds,
+    pub(super) independent: bool,
 }
 
 /// The extreme of a number within the last moments, from two halves that take turns.
@@ -33,24 +52,29 @@ struct Recent {
     now: f64,
     before: f64,
     age: f64,
+    half: f64,
 }
 
 impl Recent {
-    const fn new(value: f64) -> Self {
-        Self { now: value, before: value, age: 0.0 }
+    const fn new(value: f64, half: f64) -> Self {
+        Self { now: value, before: value, age: 0.0, half }
+    }
+
+    const fn largest(&self) -> f64 {
+        self.now.max(self.before)
     }
 
     /// Takes in a value, larger ones count.
     fn push(&mut self, value: f64, t: f64) -> f64 {
         self.age += t;
-        if self.age > LOOK_BACK_S {
+        if self.age > self.half {
             self.before = self.now;
             self.now = value;
             self.age = 0.0;
         } else {
             self.now = self.now.max(value);
         }
-        self.now.max(self.before)
+        self.largest()
     }
 }
 
@@ -62,6 +86,10 @@ pub(super) struct SpeedBounds {
     /// Of the negated lower bound, and of the negated lower bound that powered wheels alone would give.
     lowest: Recent,
     by_powered: Recent,
+    /// Of the upper bounds by braked wheels.
+    by_braked: Recent,
+    apart: f64,
+    together_for: f64,
     all_slid: bool,
     any_spun: bool,
 }
@@ -70,9 +98,12 @@ impl SpeedBounds {
     pub(super) const fn new(speed: Range) -> Self {
         Self {
             speed,
-            highest: Recent::new(speed.high),
-            lowest: Recent::new(-speed.low),
-            by_powered: Recent::new(-speed.low),
+            highest: Recent::new(speed.high, LOOK_BACK_S),
+            lowest: Recent::new(-speed.low, LOOK_BACK_S),
+            by_powered: Recent::new(-speed.low, LOOK_BACK_S),
+            by_braked: Recent::new(speed.high, SLIDE_SEEN_S),
+            apart: 0.0,
+            together_for: 0.0,
             all_slid: false,
             any_spun: false,
         }
@@ -96,11 +127,11 @@ impl SpeedBounds {
         possible: Range,
         wheels: &[WheelBounds; 2],
         allowed: &Allowed,
-        thresholds: &Thresholds,
+        limits: &Limits,
         t: f64,
     ) -> Range {
-        let low = self.low(possible.low, wheels, allowed, thresholds, t);
-        let high = self.high(possible.high, wheels, allowed, thresholds, t);
+        let low = self.low(possible.low, wheels, allowed, limits, t);
+        let high = self.high(possible.high, wheels, allowed, limits, t);
         let mut speed = Range { low, high };
         if speed.is_empty() {
             // Something that was taken for granted is not so: only what the train can do is left.
@@ -122,10 +153,10 @@ impl SpeedBounds {
         free: f64,
         wheels: &[WheelBounds; 2],
         allowed: &Allowed,
-        thresholds: &Thresholds,
+        limits: &Limits,
         t: f64,
     ) -> f64 {
-        let creep = thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
+        let creep = limits.thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
         let mut rolling = f64::NEG_INFINITY;
         let mut powered = f64::NEG_INFINITY;
         let mut spun = false;
@@ -140,7 +171,7 @@ impl SpeedBounds {
         }
         // A wheel that starts to spin is seen a little late.
         let powered = -self.by_powered.push(-powered, t);
-        let free = if spun && !self.any_spun { free.min(-self.lowest.before.max(self.lowest.now)) } else { free };
+        let free = if spun && !self.any_spun { free.min(-self.lowest.largest()) } else { free };
         self.any_spun = spun;
         free.max(rolling).max(powered)
     }
@@ -150,7 +181,7 @@ impl SpeedBounds {
         free: f64,
         wheels: &[WheelBounds; 2],
         allowed: &Allowed,
-        thresholds: &Thresholds,
+        limits: &Limits,
         t: f64,
     ) -> f64 {
         let mut trusted = f64::INFINITY;
@@ -169,6 +200,8 @@ impl SpeedBounds {
                 trusted = trusted.min(wheel.turns.high);
             }
         }
+        let together = self.together(wheels, sliding, t) && limits.independent;
+        let kept_up = self.by_braked.push(if together { shown } else { f64::INFINITY }, t);
         if trusted.is_finite() {
             self.all_slid = false;
             return free.min(trusted);
@@ -176,13 +209,27 @@ impl SpeedBounds {
         if sliding == braked && braked > 0 && !self.all_slid {
             // All slide now: the bound goes back to one from before the slide began.
             self.all_slid = true;
-            return self.highest.now.max(self.highest.before);
+            return self.highest.largest();
         }
         self.all_slid &= allowed.slide;
-        // Below the peak of adhesion a wheel creeps without being seen, but only where adhesion is poor.
-        let creep = if sliding > 0 || self.all_slid { thresholds.creepage } else { 0.0 };
         let by_command = self.speed.high + allowed.at_most_by_command * t;
-        let by_wheels = shown / (1.0 - creep);
-        if self.all_slid { free.min(self.speed.high + allowed.at_most_by_command * t) } else { free.min(by_command.max(by_wheels)) }
+        if self.all_slid {
+            return free.min(by_command);
+        }
+        // Below the peak of adhesion a wheel creeps without being seen, but that far only where adhesion is poor.
+        let creep = if sliding > 0 { limits.thresholds.creepage } else { 0.0 };
+        let not_below = shown / (1.0 - creep);
+        let not_above = kept_up / (1.0 - limits.thresholds.rolling_creepage * allowed.brake_effort);
+        free.min(by_command.max(not_below)).min(not_above)
+    }
+
+    /// Whether both wheels have turned alike for long enough.
+    fn together(&mut self, [first, second]: &[WheelBounds; 2], sliding: i32, t: f64) -> bool {
+        let (least, part) = TOGETHER;
+        let known = first.turns.high.is_finite() && second.turns.high.is_finite();
+        self.apart += (first.speed - second.speed - self.apart) * (t / SMOOTHED_S).min(1.0);
+        let alike = self.apart.abs() < least.max(part * first.speed);
+        self.together_for = if known && alike && sliding == 0 { self.together_for + t } else { 0.0 };
+        self.together_for >= TOGETHER_S
     }
 }

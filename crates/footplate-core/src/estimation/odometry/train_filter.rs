@@ -50,7 +50,8 @@ impl TrainFilter {
         let psv = self.psv + t * self.pvv + half * self.pva;
         let psa = self.psa + t * self.pva + half * self.paa;
         let pva = self.pva + t * self.paa;
-        self.pss = self.pss + t * (self.psv + psv) + half * (self.psa + psa) + q * t * t * t * t * t * (1.0 / 20.0);
+        self.pss =
+            self.pss + t * (self.psv + psv) + half * (self.psa + psa) + q * t * t * t * t * t * (1.0 / 20.0);
         self.psv = psv + t * psa + q * t * t * t * t * 0.125;
         self.psa = psa + q * t * t * t * (1.0 / 6.0);
         self.pvv = self.pvv + t * (self.pva + pva) + q * t * t * t * (1.0 / 3.0);
@@ -74,25 +75,6 @@ impl TrainFilter {
         self.pss *= kept;
         self.psv *= kept;
         self.psa *= kept;
-        self.keep_positive();
-        Correction { moved: ks * y, nis: y * y * per_s }
-    }
-
-    /// Something that is not a wheel says the speed is `v`, with variance `r`.
-    #[inline]
-    pub(super) fn speed(&mut self, v: f64, r: f64) -> Correction {
-        let y = v - self.v;
-        let per_s = 1.0 / (self.pvv + r);
-        let (ks, kv, ka) = (self.psv * per_s, self.pvv * per_s, self.pva * per_s);
-        self.v += kv * y;
-        self.a += ka * y;
-        self.pss -= ks * self.psv;
-        self.psa -= ks * self.pva;
-        self.paa -= ka * self.pva;
-        let kept = r * per_s;
-        self.psv *= kept;
-        self.pvv *= kept;
-        self.pva *= kept;
         self.keep_positive();
         Correction { moved: ks * y, nis: y * y * per_s }
     }

@@ -45,7 +45,13 @@ pub(super) struct VirtualSensor {
 
 impl VirtualSensor {
     /// A slide or spin that begins at `speed` (m/s in the direction of travel), up to `limit` (m/s²) in a spin.
-    pub(super) fn new(kind: Loss, speed: f64, limit: f64, envelope: Envelope, thresholds: Thresholds) -> Self {
+    pub(super) fn new(
+        kind: Loss,
+        speed: f64,
+        limit: f64,
+        envelope: Envelope,
+        thresholds: Thresholds,
+    ) -> Self {
         let rate = match kind {
             Loss::Slide => -thresholds.correction.as_m_per_s2(),
             Loss::Spin => limit,
@@ -117,7 +123,8 @@ impl VirtualSensor {
         }
         self.touch = (self.elapsed, speed);
         if self.envelope == Envelope::Touches {
-            let shown = ((speed - before) / apart).clamp(-self.thresholds.slide_deceleration.as_m_per_s2(), -GENTLEST);
+            let shown = ((speed - before) / apart)
+                .clamp(-self.thresholds.slide_deceleration.as_m_per_s2(), -GENTLEST);
             self.rate += LEARNT * (shown - self.rate);
             self.locked = false;
         }
