@@ -77,7 +77,7 @@ impl Tachometer {
     /// A tachometer that has said nothing yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { counter: None, assumed: 0.0, unread: 1.0, withheld: 0.0, wiring: 1.0, contradictions: 0 }
+        Self { counter: None, assumed: 0.0, unread: 0.0, withheld: 0.0, wiring: 1.0, contradictions: 0 }
     }
 
     /// What the wheel turned in a period that is `periods` odometry periods long.
@@ -89,11 +89,20 @@ impl Tachometer {
         expected: &Expected,
     ) -> Turn {
         let read = self.increment(reading, periods, heading, expected);
-        let Some((pulses, whole)) = read else {
-            self.assumed += expected.pulses;
-            self.unread += periods;
-            self.withheld = 0.0;
-            return Turn { pulses: expected.pulses, quality: Quality::Missing };
+        let (pulses, whole) = match read {
+            Increment::Turned { pulses, whole } => (pulses, whole),
+            Increment::Nothing => {
+                self.assumed += expected.pulses;
+                self.unread += periods;
+                self.withheld = 0.0;
+                return Turn { pulses: expected.pulses, quality: Quality::Missing };
+            }
+            Increment::Restarted => {
+                self.assumed = 0.0;
+                self.unread = 0.0;
+                self.withheld = 0.0;
+                return Turn { pulses: expected.pulses, quality: Quality::Missing };
+            }
         };
         self.assumed = 0.0;
         self.unread = 0.0;
@@ -113,27 +122,29 @@ impl Tachometer {
         Turn { pulses: stand_in, quality: Quality::Substituted }
     }
 
-    /// Signed pulses since the last reading that can be a count, and whether all of them were read.
+    /// Signed pulses since the last reading, if they can be a count.
     fn increment(
         &mut self,
         reading: &WheelReading,
         periods: f64,
         heading: Heading,
         expected: &Expected,
-    ) -> Option<(f64, bool)> {
+    ) -> Increment {
         let span = self.unread + periods;
         let most = expected.most * span.max(1.0);
         match reading.count {
-            Count::Missing => None,
+            Count::Missing => Increment::Nothing,
             Count::Counter(value) => {
-                let before = self.counter.replace(value)?;
-                let turned = unwrapped(before, value, most)?;
-                Some((turned - self.assumed, true))
+                let moved = self.counter.replace(value).and_then(|before| unwrapped(before, value, most));
+                match moved {
+                    Some(turned) => Increment::Turned { pulses: turned - self.assumed, whole: true },
+                    None => Increment::Restarted,
+                }
             }
             Count::Pulses(pulses) => {
                 let counted = pulses as f64;
                 if !(0.0..=most).contains(&counted) {
-                    return None;
+                    return Increment::Nothing;
                 }
                 let counted = counted * self.sign(reading.direction, heading);
                 let expected_in_all = expected.pulses + self.assumed;
@@ -142,9 +153,9 @@ impl Tachometer {
                 let covers_one =
                     span > LOST_ROWS && (counted - expected_in_one).abs() < (counted - expected_in_all).abs();
                 if covers_one {
-                    Some((counted + expected.pulses - expected_in_one, false))
+                    Increment::Turned { pulses: counted + expected.pulses - expected_in_one, whole: false }
                 } else {
-                    Some((counted - self.assumed, true))
+                    Increment::Turned { pulses: counted - self.assumed, whole: true }
                 }
             }
         }
@@ -169,6 +180,16 @@ impl Tachometer {
         // A train does not turn round at speed: the sensor is wrong.
         heading.way
     }
+}
+
+/// What a reading adds.
+enum Increment {
+    /// Pulses since the last reading, and whether all of them were read.
+    Turned { pulses: f64, whole: bool },
+    /// No reading, or none that can be a count.
+    Nothing,
+    /// A running counter begins here.
+    Restarted,
 }
 
 impl Default for Tachometer {
@@ -204,8 +225,6 @@ mod tests {
 
     fn turns(counts: &[Count]) -> Vec<Turn> {
         let mut tachometer = Tachometer::new();
-        // The first reading starts a counter.
-        tachometer.unread = 0.0;
         let read = |count: &Count| WheelReading { count: *count, ..WheelReading::MISSING };
         counts.iter().map(|count| tachometer.read(&read(count), 1.0, FORWARD, &CALM)).collect()
     }
@@ -249,7 +268,7 @@ mod tests {
         let turns =
             turns(&[Count::Counter(1000), Count::Counter(1020), Count::Counter(0), Count::Counter(20)]);
         assert_eq!(turns[2].quality, Quality::Missing);
-        assert_eq!(turns[3], Turn { pulses: 20.0 - 20.0 + 20.0 - 20.0, quality: Quality::Substituted });
+        assert_eq!(turns[3], Turn { pulses: 20.0, quality: Quality::Ok });
     }
 
     #[test]
@@ -262,7 +281,6 @@ mod tests {
     fn pulses_of_lost_rows_are_filled_in_only_if_the_count_lacks_them() {
         for (counted, quality) in [(40, Quality::Ok), (20, Quality::Substituted)] {
             let mut tachometer = Tachometer::new();
-            tachometer.unread = 0.0;
             let expected = Expected { pulses: 40.0, ..CALM };
             let turn = tachometer.read(&WheelReading::pulses(counted), 2.0, FORWARD, &expected);
             assert_eq!(turn, Turn { pulses: 40.0, quality });
