@@ -4,13 +4,13 @@
 
 mod accuracy_monitor;
 mod balise_link;
+mod command_watch;
 mod covariance;
 mod current_statistical;
+mod distance_bounds;
 mod federated_filter;
 mod local_filter;
 mod manoeuvre;
-mod command_watch;
-mod distance_bounds;
 mod motion_estimate;
 mod motion_step;
 mod odometer;
