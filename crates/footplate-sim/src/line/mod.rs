@@ -1,9 +1,8 @@
-//! Full-size trains on full-size lines.
+//! Full-size trains on full-size lines: one body for running times, and a train on wheels that slip and slide.
 //!
-//! A [`Train`] is a body with a [`Resistance`], a [`TractiveEffort`] and a [`Brake`]; a [`LineProfile`] says how
-//! steep, how curved and how fast the line is and where trains stop. A [`Driver`] gives an effort for what the train
-//! does now. [`Journey`] puts the three together as one body, for running times; a world with wheels on rails steps
-//! the same driver through its own integration.
+//! **One body.** A [`Train`] is a body with a [`Resistance`], a [`TractiveEffort`] and a [`Brake`]; a [`LineProfile`]
+//! says how steep, how curved and how fast the line is and where trains stop. A [`Driver`] gives an effort for what the
+//! train does now. [`Journey`] puts the three together as one body, for running times.
 //!
 //! ```text
 //! journey          running times, energy
@@ -11,21 +10,63 @@
 //! train  profile   what it is, where it runs
 //! resistance  tractive_effort  stepped
 //! ```
+//!
+//! **On wheels.** [`LineScenario::run`] draws a train of many wheelsets and what lies on its rails from a seed, and
+//! runs it step by step: two wheelsets with their own rotation, the rest in groups. [`LineRun`] is what two tachometers
+//! recorded of it and, beside that, what is true.
+//!
+//! ```text
+//! scenario  normal_runs  slide_runs  fault_runs     named runs, drawn from a seed
+//! setup  run  recording  vehicle                    the world steps, the recorder reads; what is claimed of the train
+//! tachometer  faults  balises  inertial_sensor      what is read
+//! plan  motion  consist  bogie  gradients           a driver's plan, and a train of many wheelsets
+//! slide_protection  slip_control  brake_cylinder    what keeps wheels turning as they should
+//! rotation  creep_force  rail                       one wheelset on what lies on the rail
+//! ```
 
+mod balises;
+mod bogie;
+mod brake_cylinder;
+mod consist;
+mod creep_force;
 mod driver;
+mod fault_runs;
+mod faults;
+mod gradients;
+mod inertial_sensor;
 mod journey;
+mod motion;
+mod normal_runs;
+mod plan;
 mod profile;
+mod rail;
+mod recording;
 mod resistance;
+mod rotation;
+mod run;
+mod scenario;
+mod setup;
+mod slide_protection;
+mod slide_runs;
+mod slip_control;
 mod stepped;
+mod tachometer;
 mod tractive_effort;
 mod train;
+mod vehicle;
 
 pub use driver::{Command, Driver, Phase, State, Style};
 pub use journey::{Call, Journey, JourneyError, Moment, Work};
 pub use profile::{
     LineError, LineParts, LineProblem, LineProfile, STEEPEST_PER_MILLE, Stop, TIGHTEST_PER_MILLE,
 };
+pub use recording::{
+    LineEnergy, LineEvent, LineEventKind, LineRun, LineSample, LineTruth, Turned, WheelSample, WheelTruth,
+};
 pub use resistance::{PerMille, Resistance};
+pub use run::LineConditions;
+pub use scenario::LineScenario;
 pub use stepped::Stepped;
 pub use tractive_effort::TractiveEffort;
 pub use train::{Brake, Train, TrainError};
+pub use vehicle::{LineBrake, LineVehicle, LineWheelset};

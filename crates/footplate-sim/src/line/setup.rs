@@ -1,0 +1,87 @@
+//! What a scenario sets up before the world runs by itself.
+
+use super::bogie::Conduct;
+use super::consist::{Kind, Placement};
+use super::creep_force::Film;
+use super::faults::Fault;
+use super::gradients::Gradients;
+use super::plan::Stage;
+use super::vehicle::BRAKE_TOLERANCE;
+
+/// A train on a line with a driver's plan, and what is in store for it. Times are since the first sample (s).
+#[derive(Debug, Clone)]
+pub(crate) struct Setup {
+    pub(crate) kind: Kind,
+    /// Which measured wheelsets are driven.
+    pub(crate) powered: [bool; 2],
+    pub(crate) placement: Placement,
+    /// How well diameters are known.
+    pub(crate) diameter_tolerance: f64,
+    /// Speed at the beginning (m/s).
+    pub(crate) speed: f64,
+    /// What the rail is like where nothing else is said.
+    pub(crate) base: Film,
+    pub(crate) gradients: Gradients,
+    /// No gradient is steeper (m/m).
+    pub(crate) steepest: f64,
+    pub(crate) stages: Vec<Stage>,
+    /// What comes onto the rail, in order of time.
+    pub(crate) films: Vec<Lay>,
+    /// What the bogie of the measured wheelsets does on its own, in order of time.
+    pub(crate) bogie: Vec<(f64, Conduct)>,
+    /// On which measured wheelsets slide protection works.
+    pub(crate) protected: [bool; 2],
+    pub(crate) fault: Fault,
+    pub(crate) has_balises: bool,
+    pub(crate) brake_tolerance: f64,
+    /// When it ends (s).
+    pub(crate) lasts: f64,
+}
+
+/// A film that comes onto the rail.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lay {
+    /// When.
+    pub(crate) at: f64,
+    /// How far ahead of the train it begins then (m); negative behind its front.
+    pub(crate) ahead: f64,
+    /// How long it is (m).
+    pub(crate) length: f64,
+    /// Over which length it comes up (m).
+    pub(crate) onset: f64,
+    pub(crate) film: Film,
+    /// By how much friction grows with each wheelset.
+    pub(crate) cleaning: f64,
+}
+
+/// How well the diameters of a train in service are known.
+const DIAMETER_TOLERANCE: f64 = 0.002;
+
+impl Setup {
+    /// A sound train at a speed on a dry, level line: the first measured wheelset driven, the other not.
+    pub(crate) fn new(kind: Kind, speed: f64, stages: Vec<Stage>, lasts: f64) -> Self {
+        Self {
+            kind,
+            powered: [true, false],
+            placement: Placement::TwoCars,
+            diameter_tolerance: DIAMETER_TOLERANCE,
+            speed,
+            base: Film::DRY,
+            gradients: Gradients::level(),
+            steepest: 0.0,
+            stages,
+            films: Vec::new(),
+            bogie: Vec::new(),
+            protected: [true; 2],
+            fault: Fault::None,
+            has_balises: false,
+            brake_tolerance: BRAKE_TOLERANCE,
+            lasts,
+        }
+    }
+
+    /// The same on a line with gradients up to the steepest (m/m).
+    pub(crate) fn with_gradients(self, gradients: Gradients, steepest: f64) -> Self {
+        Self { gradients, steepest, ..self }
+    }
+}

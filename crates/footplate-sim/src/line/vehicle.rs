@@ -1,0 +1,95 @@
+//! What the operator of a simulated train believes of it: everything that a vehicle file states.
+
+use footplate_core::{Acceleration, Length, Speed, TimeSpan};
+
+use super::consist::{Design, GRAVITY};
+
+/// A simulated train as its operator knows it. Every claim is true in the simulated world, as loosely as an operator
+/// would state it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineVehicle {
+    /// What people call it.
+    pub name: String,
+    /// The odometry period.
+    pub period: TimeSpan,
+    /// It never runs faster.
+    pub max_speed: Speed,
+    /// It never accelerates more, downhill included.
+    pub max_traction: Acceleration,
+    /// It never decelerates more, uphill included.
+    pub max_brake: Acceleration,
+    /// The wheelsets of the two tachometers.
+    pub wheelsets: [LineWheelset; 2],
+    /// What the brake command does when the rail carries it.
+    pub brake_command: LineBrake,
+    /// After how many pulses a running counter begins again; as large as the counter's register.
+    pub counter_modulus: i64,
+}
+
+/// A wheelset with a tachometer, as it is believed to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineWheelset {
+    /// Pulses per revolution.
+    pub teeth: u32,
+    /// The diameter it is believed to have.
+    pub diameter: Length,
+    /// The true diameter lies within this part of it, either way.
+    pub diameter_tolerance: f64,
+    /// Whether a motor drives it; all wheelsets are braked.
+    pub is_powered: bool,
+}
+
+/// What a brake command does when the rail carries it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineBrake {
+    /// Deceleration at effort −1 on level track; proportional below.
+    pub full: Acceleration,
+    /// The true deceleration lies within this part of it, either way.
+    pub tolerance: f64,
+    /// What gradients and resistance may add to it, either way.
+    pub gradient: Acceleration,
+    /// How long the brake takes from nothing to its full force, and back.
+    pub build_up: TimeSpan,
+}
+
+/// How much more than a train's design is claimed: its strength is drawn within 7 %.
+pub(crate) const BRAKE_TOLERANCE: f64 = 0.1;
+/// The same where the two measured wheelsets of 32 do not brake with the train.
+pub(crate) const LOOSE_BRAKE_TOLERANCE: f64 = 0.15;
+/// What is left out of the sums behind a claim: steps of rounding, rotation, creepage (m/s²).
+const ROOM_M_PER_S2: f64 = 0.05;
+/// Filling times of a brake cylinder that come on top of the ramp of the command (s).
+const BUILD_UP_S: f64 = 1.6;
+/// Sixteen bits.
+const COUNTER_MODULUS: i64 = 1 << 16;
+
+impl LineVehicle {
+    /// What is claimed of a design on a line with gradients up to the steepest (m/m).
+    pub(crate) fn claimed(
+        name: &str,
+        design: &Design,
+        steepest: f64,
+        brake_tolerance: f64,
+        period: TimeSpan,
+        wheelsets: [LineWheelset; 2],
+    ) -> Self {
+        let slope = steepest * GRAVITY + ROOM_M_PER_S2;
+        let gradient = slope + design.strongest_resistance();
+        let hundredths = |value: f64| Acceleration::from_m_per_s2((100.0 * value).ceil() / 100.0);
+        Self {
+            name: name.to_owned(),
+            period,
+            max_speed: Speed::from_m_per_s(design.max_speed),
+            max_traction: hundredths(design.start * (1.0 + BRAKE_TOLERANCE) + slope),
+            max_brake: hundredths(design.full_brake * (1.0 + BRAKE_TOLERANCE) + gradient),
+            wheelsets,
+            brake_command: LineBrake {
+                full: Acceleration::from_m_per_s2(design.full_brake),
+                tolerance: brake_tolerance,
+                gradient: hundredths(gradient),
+                build_up: TimeSpan::from_s(design.full_brake / design.jerk + BUILD_UP_S),
+            },
+            counter_modulus: COUNTER_MODULUS,
+        }
+    }
+}
