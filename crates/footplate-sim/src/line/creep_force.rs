@@ -19,6 +19,9 @@ const STIFFNESS_N: f64 = 8.4e10 * PI * 6.6e-3 * 6.0e-3 * 4.3 / 4.0;
 /// Creepage is taken relative to no less than this speed (m/s), so that it stays finite at standstill.
 const SLOWEST_M_PER_S: f64 = 0.5;
 
+/// Below this the arc tangent is its argument to the last bit.
+const LEAST_SLIPPING: f64 = 1e-8;
+
 /// What lies between wheel and rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Film {
@@ -34,13 +37,14 @@ pub(crate) struct Film {
     pub(crate) slipping: f64,
 }
 
-/// A force and how it changes with the wheel's speed.
+/// A force along the track and the creepage that makes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CreepForce {
-    /// Along the track on the train (N); drives it forward if the wheel is faster than the train.
+    /// On the train (N); drives it forward if the wheel is faster than the train.
     pub(crate) force: f64,
-    /// Derivative by the wheel's speed (N s/m).
-    pub(crate) slope: f64,
+    /// The force divided by the wheel's speed relative to the train (N s/m): what holds the wheel back when both are
+    /// small, and still a number when there is no creepage.
+    pub(crate) stiffness: f64,
 }
 
 impl Film {
@@ -74,22 +78,16 @@ impl Film {
     pub(crate) fn creep_force(&self, load: f64, wheel: f64, train: f64) -> CreepForce {
         let creep = wheel - train;
         let w = creep.abs();
-        let falling = (1.0 - self.kept) * libm::exp(-self.fall * w);
-        let mu = self.friction * (falling + self.kept);
-        let mu_slope = -self.friction * self.fall * falling;
-        let per_w = STIFFNESS_N / (train.abs().max(SLOWEST_M_PER_S) * load * mu);
-        let eps = per_w * w;
-        let eps_slope = per_w - eps * mu_slope / mu;
-        let (adhering, slipping) = (self.adhering * eps, self.slipping * eps);
-        let square = 1.0 + adhering * adhering;
-        let shape = adhering / square + libm::atan(slipping);
-        let shape_slope =
-            self.adhering * (2.0 - square) / (square * square) + self.slipping / (1.0 + slipping * slipping);
-        let scale = 2.0 * load / PI;
-        CreepForce {
-            force: (scale * mu * shape).copysign(creep),
-            slope: scale * (mu_slope * shape + mu * shape_slope * eps_slope),
-        }
+        let mu = self.friction * ((1.0 - self.kept) * libm::exp(-self.fall * w) + self.kept);
+        let eps_per_w = STIFFNESS_N / (train.abs().max(SLOWEST_M_PER_S) * load * mu);
+        let scale = 2.0 * load * mu / PI;
+        let adhering = self.adhering * eps_per_w * w;
+        let slipping = self.slipping * eps_per_w * w;
+        let adhesion = self.adhering * eps_per_w / (1.0 + adhering * adhering);
+        // The arc tangent over its argument is 1 where both vanish.
+        let arc = if slipping > LEAST_SLIPPING { libm::atan(slipping) / slipping } else { 1.0 };
+        let stiffness = scale * (adhesion + self.slipping * eps_per_w * arc);
+        CreepForce { force: stiffness * creep, stiffness }
     }
 
     /// The largest part of a wheel's load that goes into the rail at a speed, over all creepages; to 1 %.
@@ -144,26 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_is_the_derivative() {
-        for film in [Film::DRY, Film::WET, Film::LOW, Film::LEAVES] {
-            for (train, creep) in
-                [(20.0, 0.01), (20.0, 0.3), (20.0, -2.0), (0.1, 0.2), (0.1, -0.001), (80.0, 8.0)]
-            {
-                let force = |wheel: f64| film.creep_force(70e3, wheel, train).force;
-                let wheel = train + creep;
-                let h = 1e-5 * creep;
-                let numeric = (force(wheel + h) - force(wheel - h)) / (2.0 * h);
-                let slope = film.creep_force(70e3, wheel, train).slope;
-                assert!((slope - numeric).abs() <= 1e-5 * (slope.abs() + 10.0), "{slope} {numeric}");
-            }
-        }
-    }
-
-    #[test]
     fn small_creepage_is_linear_with_the_known_stiffness() {
         // (kA + kS) G a b c11 / 2 per unit of creepage, whatever the friction and the load.
         let known = 1.4 * 8.4e10 * 6.6e-3 * 6.0e-3 * 4.3 / 2.0;
-        let slope = Film::DRY.creep_force(70e3, 20.0, 20.0).slope * 20.0;
-        assert!((slope / known - 1.0).abs() < 1e-12, "{slope} {known}");
+        for creep in [0.0, 1e-9, -1e-6] {
+            let stiffness = Film::DRY.creep_force(70e3, 20.0 + creep, 20.0).stiffness * 20.0;
+            assert!((stiffness / known - 1.0).abs() < 1e-4, "{stiffness} {known}");
+        }
+        let force = Film::DRY.creep_force(70e3, 20.0 - 1e-6, 20.0).force;
+        assert!((force * 20e6 / known + 1.0).abs() < 1e-4, "{force}");
     }
 }

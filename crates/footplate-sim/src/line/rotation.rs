@@ -5,8 +5,10 @@
 //! ```
 //!
 //! Steel on clean steel is so stiff that the wheel finds its creepage within a fraction of a millisecond. The step is
-//! therefore semi-implicit: the force is taken at the end of the step, along its tangent. What acts on the train is
-//! the same force, so that what the wheelset gains the train loses, to the last bit of arithmetic.
+//! therefore semi-implicit: the force is the stiffness at the beginning of the step times the creepage at its end. The
+//! chord from the origin is taken and not the tangent: from beyond the peak of the curve, tangents jump from one side
+//! of the train's speed to the other for ever. What acts on the train is the same force, so that what the wheelset
+//! gains the train loses, to the last bit of arithmetic.
 
 use super::creep_force::Film;
 
@@ -57,9 +59,9 @@ impl Rotation {
     pub(crate) fn step(&mut self, dt: f64, train: f64, film: &Film, torques: Torques) -> Step {
         let (r, before) = (self.radius, self.omega);
         let rail = film.creep_force(0.5 * self.load, r * before, train);
-        // Two wheels; beyond the peak the slope is negative, and an explicit step is the stable one.
-        let (force, slope) = (2.0 * rail.force, 2.0 * rail.slope.max(0.0));
-        let per_torque = dt / (self.inertia + dt * (slope * r * r + torques.drive_stiffness));
+        // Two wheels.
+        let (force, stiffness) = (2.0 * rail.force, 2.0 * rail.stiffness);
+        let per_torque = dt / (self.inertia + dt * (stiffness * r * r + torques.drive_stiffness));
         let free = before + per_torque * (torques.drive - r * force);
         // Friction in the brake: it takes rotation away until none is left, then it holds.
         let most = per_torque * torques.brake;
@@ -67,7 +69,7 @@ impl Rotation {
         self.omega = after;
         self.angle += 0.5 * dt * (before + after);
         Step {
-            force: force + slope * r * (after - before),
+            force: force + stiffness * r * (after - before),
             braked: (free - after) / per_torque,
             driven: torques.drive - torques.drive_stiffness * (after - before),
         }
@@ -113,6 +115,21 @@ mod tests {
             let expected = -140e3 / 9.81 * 0.7 / (2.0 * stiffness);
             let creepage = wheel.speed() / 20.0 - 1.0;
             assert!((creepage / expected - 1.0).abs() < 0.1, "{creepage} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_wheel_that_lags_comes_back_to_the_train_and_stays() {
+        for dt in [0.0005, 0.005] {
+            let mut wheel = wheelset(200.0, 0.9);
+            let mut last = 0.1;
+            for _ in 0..(2.0 / dt) as usize {
+                wheel.step(dt, 1.0, &Film::DRY, Torques::default());
+                let lag = 1.0 - wheel.speed();
+                assert!((0.0..=last).contains(&lag), "never beyond the train");
+                last = lag;
+            }
+            assert!(last < 1e-6, "{last}");
         }
     }
 
