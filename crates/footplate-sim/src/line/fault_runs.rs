@@ -26,5 +26,5 @@ pub(crate) fn two_stops(fault: Fault, draws: &mut Draws) -> Setup {
     }
     stages.push(Stage::new(At(-0.5), Until::Time(1e9)));
     let line = Gradients::draw(STEEPEST, 10_000.0, draws);
-    Setup { fault, ..Setup::new(Kind::Suburban, 0.0, stages, 280.0) }.with_gradients(line, STEEPEST)
+    Setup { fault, ..Setup::new(Kind::Suburban, 0.0, stages, 330.0) }.with_gradients(line, STEEPEST)
 }

@@ -25,7 +25,7 @@ pub(crate) fn high_speed(draws: &mut Draws) -> Setup {
         Stage::new(Keep(16.0), Until::Time(200.0)),
         Stage::new(At(draws.uniform(0.85..1.0)), Until::Faster(88.5)),
         Stage::new(Keep(89.0), Until::Time(575.0)),
-        Stage::new(At(-draws.uniform(0.55..0.65)), Until::Slower(0.0)),
+        Stage::new(At(-draws.uniform(0.58..0.66)), Until::Slower(0.0)),
         Stage::new(At(-0.5), Until::Time(1e9)),
     ];
     let line = Gradients::draw(HIGH_SPEED_GRADIENT, LINE_M, draws);
@@ -64,7 +64,7 @@ pub(crate) fn creeping(draws: &mut Draws) -> Setup {
         }
     }
     stages.push(Stage::new(At(-0.4), Until::Time(1e9)));
-    Setup { base: base(draws), ..Setup::new(Kind::Suburban, 0.0, stages, 240.0) }
+    Setup { base: base(draws), ..Setup::new(Kind::Suburban, 0.0, stages, 270.0) }
 }
 
 /// N4: up and down steep gradients.
@@ -87,7 +87,7 @@ pub(crate) fn hilly(draws: &mut Draws) -> Setup {
         place += draws.uniform(700.0..1500.0);
         sign = -sign;
     }
-    Setup { base: base(draws), ..Setup::new(Kind::Suburban, speed, stages, 400.0) }
+    Setup { base: base(draws), ..Setup::new(Kind::Suburban, speed, stages, 430.0) }
         .with_gradients(Gradients::given(&sections), STEEPEST)
 }
 
@@ -128,7 +128,7 @@ pub(crate) fn wrong_diameters(draws: &mut Draws) -> Setup {
         Stage::new(At(-0.5), Until::Time(1e9)),
     ];
     let line = Gradients::draw(HIGH_SPEED_GRADIENT, LINE_M, draws);
-    let setup = Setup::new(Kind::HighSpeed, 30.0, stages, 450.0);
+    let setup = Setup::new(Kind::HighSpeed, 30.0, stages, 470.0);
     Setup { base: base(draws), diameter_tolerance: 0.012, has_balises: true, ..setup }
         .with_gradients(line, HIGH_SPEED_GRADIENT)
 }

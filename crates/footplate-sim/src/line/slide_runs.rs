@@ -39,7 +39,7 @@ fn single_slide(length: f64, draws: &mut Draws) -> Setup {
     stages.extend(stop(-0.5));
     let low = Film::LOW.with_friction(draws.uniform(0.025..0.045));
     let films = vec![film(SINGLE_SLIDE_S, length, low, THIN)];
-    Setup { films, ..Setup::new(Kind::Suburban, speed, stages, 95.0) }
+    Setup { films, brake_tolerance: LOOSE_BRAKE_TOLERANCE, ..Setup::new(Kind::Suburban, speed, stages, 95.0) }
 }
 
 /// S1: the first wheelset takes the film off the rail for all others.

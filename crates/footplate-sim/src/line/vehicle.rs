@@ -54,7 +54,7 @@ pub struct LineBrake {
 
 /// How much more than a train's design is claimed: its strength is drawn within 7 %.
 pub(crate) const BRAKE_TOLERANCE: f64 = 0.1;
-/// The same where the two measured wheelsets of 32 do not brake with the train.
+/// The same where one wheelset of 16, or two of 32, do not brake with the train.
 pub(crate) const LOOSE_BRAKE_TOLERANCE: f64 = 0.15;
 /// What is left out of the sums behind a claim: steps of rounding, rotation, creepage (m/s²).
 const ROOM_M_PER_S2: f64 = 0.05;
