@@ -55,7 +55,8 @@ impl Covariance {
     #[must_use]
     pub fn determinant(self) -> f64 {
         let product = self.speed * self.acceleration;
-        (product - self.mixed * self.mixed).max(LEAST_DETERMINANT * product)
+        let (difference, least) = (product - self.mixed * self.mixed, LEAST_DETERMINANT * product);
+        if difference > least { difference } else { least }
     }
 
     /// The information that belongs to a covariance, and the other way round.

@@ -130,11 +130,19 @@ impl FederatedFilter {
         // A filter that has nothing of its own, or that nobody believes, follows the train: it is ready to begin
         // where the train is, and does not bring a slide back when its wheelset is believed again.
         for ((local, innovation), share) in self.locals.iter_mut().zip(&innovations).zip([b1, b2, b3]) {
-            let on_its_own = innovation.taken && share >= LEAST_SHARE_OF_ITS_OWN;
-            *local = if on_its_own { *local } else { self.master };
+            if !innovation.taken || share < LEAST_SHARE_OF_ITS_OWN {
+                follow(local, &self.master);
+            }
         }
         innovations
     }
+}
+
+/// Apart from the rest, so that a filter on its own does not wait for the master.
+#[cold]
+#[inline(never)]
+fn follow(local: &mut LocalFilter, master: &LocalFilter) {
+    *local = *master;
 }
 
 /// Information that has been brought together so far, with states counted from a point near all of them, so that

@@ -101,26 +101,32 @@ impl LocalFilter {
 
     /// The same with a measurement that has only so large a share: its variance is divided by it.
     pub(super) fn update_with_share(&mut self, measured: MeasuredSpeed, share: f64) -> Innovation {
+        if !measured.is_usable() {
+            return self.refuse();
+        }
         let [speed, acceleration] = self.state;
         let p = self.covariance;
-        let taken = measured.is_usable();
-        let r = if taken { measured.variance / share } else { 1.0 };
-        let value = if taken { measured.speed - speed } else { 0.0 };
-        let variance = if taken { p.speed + r } else { p.speed };
-        let inverse = 1.0 / (p.speed + r);
+        let r = measured.variance / share;
+        let value = measured.speed - speed;
+        let variance = p.speed + r;
+        let inverse = 1.0 / variance;
         let surprise = value * inverse;
-        let updated = [speed + p.speed * surprise, acceleration + p.mixed * surprise];
-        // What nothing corrects drifts; beyond any train it would outrun its own covariance.
-        let drifting = [speed.clamp(-LARGEST_SPEED, LARGEST_SPEED), acceleration];
-        self.state = if taken { updated } else { drifting };
+        self.state = [speed + p.speed * surprise, acceleration + p.mixed * surprise];
         let kept = r * inverse;
-        let after = Covariance {
+        self.covariance = Covariance {
             speed: p.speed * kept,
             mixed: p.mixed * kept,
             acceleration: p.acceleration * kept + p.determinant() * inverse,
         };
-        self.covariance = if taken { after } else { p };
-        Innovation { value, variance, taken }
+        Innovation { value, variance, taken: true }
+    }
+
+    /// What nothing corrects drifts; beyond any train it would outrun its own covariance.
+    #[cold]
+    fn refuse(&mut self) -> Innovation {
+        let [speed, acceleration] = self.state;
+        self.state = [speed.clamp(-LARGEST_SPEED, LARGEST_SPEED), acceleration];
+        Innovation { value: 0.0, variance: self.covariance.speed, taken: false }
     }
 }
 

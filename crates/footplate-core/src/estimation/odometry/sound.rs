@@ -4,9 +4,10 @@
 const LONGEST_PERIOD_S: f64 = 60.0;
 
 /// The value if it lies within, the nearer bound if not, and the lower one for what is no number: unlike
-/// [`f64::clamp`], which hands that on.
+/// [`f64::clamp`], which hands that on. One instruction a bound.
 pub(super) fn sound(value: f64, least: f64, most: f64) -> f64 {
-    value.max(least).min(most)
+    let at_least = if value > least { value } else { least };
+    if at_least < most { at_least } else { most }
 }
 
 /// A period (s): not negative, not absurd; what is no number is no time.
