@@ -48,14 +48,35 @@ fn scaled_float(text: &str, decimals: u32) -> Option<i64> {
 
 /// `number` divided by ten to the power of `decimals`, without the zeros that say nothing.
 pub(crate) fn unscaled(number: i64, decimals: u32) -> String {
-    let unit = 10_u64.pow(decimals);
-    let sign = if number < 0 { "-" } else { "" };
-    let (whole, fraction) = (number.unsigned_abs() / unit, number.unsigned_abs() % unit);
-    if fraction == 0 {
-        return format!("{sign}{whole}");
+    let mut text = Vec::new();
+    push_unscaled(&mut text, number, decimals);
+    text.into_iter().map(char::from).collect()
+}
+
+/// Writes what [`unscaled`] returns, without memory of its own.
+pub(crate) fn push_unscaled(text: &mut Vec<u8>, number: i64, decimals: u32) {
+    /// As many as the largest `u64` has, which is more than any `i64` has with its leading zeros.
+    const DIGITS: usize = 20;
+    let mut digits = [b'0'; DIGITS];
+    let mut rest = number.unsigned_abs();
+    for digit in digits.iter_mut().rev() {
+        *digit += (rest % 10) as u8;
+        rest /= 10;
+        if rest == 0 {
+            break;
+        }
     }
-    let digits = format!("{fraction:0width$}", width = decimals as usize);
-    format!("{sign}{whole}.{}", digits.trim_end_matches('0'))
+    let (whole, fraction) = digits.split_at(DIGITS - decimals as usize);
+    if number < 0 {
+        text.push(b'-');
+    }
+    let leading = whole.iter().take_while(|digit| **digit == b'0').count();
+    text.extend(whole.get(leading.min(whole.len() - 1)..).unwrap_or_default());
+    let kept = fraction.iter().rposition(|digit| *digit != b'0').map_or(0, |last| last + 1);
+    if let Some(fraction) = fraction.get(..kept).filter(|fraction| !fraction.is_empty()) {
+        text.push(b'.');
+        text.extend(fraction);
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod calibration_file;
 mod content_hash;
 mod decimal;
 mod layout_file;
+pub mod odometry;
 mod published_table;
 mod recording;
 pub mod score;
@@ -16,6 +17,8 @@ mod sensor_log;
 mod sensor_names;
 mod store;
 mod table;
+mod tachometer;
+mod vehicle_file;
 mod whole_file;
 
 pub use batch::{Batch, BatchError, BatchEvent, BatchRun, Polling};
@@ -44,4 +47,12 @@ pub use store::{
     SalvagedTable, Store, StoreError, StoredEvent, StoredRecording, StoredRun, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
-pub use whole_file::write_whole;
+pub use tachometer::{
+    RowPlace, TachometerBlock, TachometerColumns, TachometerError, TachometerNote, TachometerOddity,
+    TachometerReader, TimeFaults, Truth,
+};
+pub use vehicle_file::{
+    DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,
+    parse_vehicle, read_vehicle, write_vehicle,
+};
+pub use whole_file::{WholeFile, write_whole};

@@ -3,7 +3,7 @@
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
 /// The fields of one line, unquoted.
-pub(super) struct Fields {
+pub(crate) struct Fields {
     /// Built once: that takes as long as parsing a hundred lines.
     parser: csv_core::Reader,
     text: String,
@@ -25,14 +25,14 @@ impl Default for Fields {
 }
 
 /// Why a line has no fields.
-pub(super) enum SplitError {
+pub(crate) enum SplitError {
     NotText { byte: usize },
     QuoteNotClosed,
 }
 
 impl Fields {
     /// Splits a line that ends with a line feed.
-    pub(super) fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
+    pub(crate) fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
         self.text.clear();
         self.ends.clear();
         let text = std::str::from_utf8(line)
@@ -54,21 +54,21 @@ impl Fields {
         Ok(())
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.ends.len()
     }
 
-    pub(super) fn get(&self, index: usize) -> &str {
+    pub(crate) fn get(&self, index: usize) -> &str {
         let begin = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
         let end = self.ends.get(index).copied().unwrap_or(begin);
         self.text.get(begin..end).unwrap_or_default().trim()
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &str> {
         (0..self.len()).map(|index| self.get(index))
     }
 }

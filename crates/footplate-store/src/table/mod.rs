@@ -10,5 +10,6 @@ mod rows;
 
 pub use error::TableError;
 pub(crate) use error::shown;
+pub(crate) use fields::{Fields, SplitError};
 pub use rows::LONGEST_LINE;
 pub(crate) use rows::{Column, LastLine, Row, Table};

@@ -2,6 +2,7 @@
 
 mod bad_layouts;
 mod bad_logs;
+mod bad_tachometer_recordings;
 mod built_in_layouts;
 mod child_process;
 mod layout_tables;
@@ -17,3 +18,5 @@ mod store_remembers;
 mod store_shared;
 mod store_survives;
 mod stores;
+mod tachometer_recordings;
+mod vehicle_files;

@@ -1,0 +1,18 @@
+//! Recordings through the odometer: what each run comes to, and how good that is where the truth is known.
+//!
+//! An [`OdometryRun`] takes the rows of one run and returns an estimate for each. If it is told to score, it walks
+//! both presets and what others would do beside it, and compares all of them with the truth.
+
+mod counted_way;
+mod detection;
+mod result_csv;
+mod rival;
+mod run;
+mod score;
+mod summary;
+
+pub use result_csv::{RESULT_COLUMNS, ResultCsv};
+pub use rival::Rival;
+pub use run::{OdometryRun, Preset, RunContext, RunScores};
+pub use score::OdometryScore;
+pub use summary::{FlagCounts, ModeCounts, RunSummary};

@@ -1,0 +1,187 @@
+//! One run of a train through the odometer.
+
+use footplate_core::estimation::odometry::{MotionEstimate, Odometer, OdometrySettings};
+use footplate_core::wheels::{Period, Vehicle, VehicleError};
+
+use super::counted_way::WayCounter;
+use super::detection::{FlagWatch, SlipWatch};
+use super::rival::{Rival, RivalOdometer};
+use super::score::{Claim, OdometryScore, Scorer};
+use super::summary::RunSummary;
+use crate::tachometer::Truth;
+
+/// Which of the ways to estimate is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// The published algorithm.
+    Paper,
+    /// What is best on every scenario.
+    Recommended,
+}
+
+impl Preset {
+    /// Both, in the order of tables.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Recommended];
+
+    /// What it is called on the command line and in files.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Recommended => "recommended",
+        }
+    }
+
+    /// How an odometer of this preset works.
+    #[must_use]
+    pub fn settings(self) -> OdometrySettings {
+        match self {
+            Self::Paper => OdometrySettings::paper(),
+            Self::Recommended => OdometrySettings::recommended(),
+        }
+    }
+}
+
+/// What is known before a run begins.
+#[derive(Debug, Clone, Copy)]
+pub struct RunContext {
+    /// The train.
+    pub vehicle: Vehicle,
+    /// Which estimate is wanted.
+    pub preset: Preset,
+    /// Whether estimates are compared with the truth, and with what others would make of the same counts.
+    pub score: bool,
+}
+
+/// One run of a train through the odometer.
+#[derive(Debug, Clone)]
+pub struct OdometryRun {
+    odometer: Odometer,
+    summary: RunSummary,
+    scoring: Option<Box<Scoring>>,
+}
+
+/// How good each estimate of a run was, or of several.
+#[derive(Debug, Clone)]
+pub struct RunScores {
+    presets: [Scorer; 2],
+    rivals: [Scorer; 3],
+}
+
+#[derive(Debug, Clone)]
+struct Scoring {
+    preset: Preset,
+    /// The odometer of the other preset.
+    other: Odometer,
+    counter: WayCounter,
+    rivals: [RivalOdometer; 3],
+    slip: SlipWatch,
+    flags: [FlagWatch; 2],
+    scores: RunScores,
+}
+
+impl OdometryRun {
+    /// A run that has not begun.
+    ///
+    /// # Errors
+    /// The first value of the vehicle that no railway has.
+    pub fn new(context: &RunContext) -> Result<Self, VehicleError> {
+        let odometer = Odometer::new(context.vehicle, context.preset.settings())?;
+        let scoring = if context.score { Some(Box::new(Scoring::new(context)?)) } else { None };
+        Ok(Self { odometer, summary: RunSummary::default(), scoring })
+    }
+
+    /// Takes in the readings of one period. The truth is for the score only.
+    #[inline]
+    pub fn step(&mut self, period: &Period, truth: impl FnOnce() -> Truth) -> MotionEstimate {
+        let estimate = self.odometer.step(period);
+        self.summary.see(&estimate);
+        if let Some(scoring) = &mut self.scoring {
+            scoring.see(period, &estimate, &truth());
+        }
+        estimate
+    }
+
+    /// What it comes to up to now.
+    #[must_use]
+    pub fn summary(&self) -> &RunSummary {
+        &self.summary
+    }
+
+    /// How good its estimates were, if that was asked for.
+    #[must_use]
+    pub fn scores(&self) -> Option<&RunScores> {
+        self.scoring.as_ref().map(|scoring| &scoring.scores)
+    }
+}
+
+impl Scoring {
+    fn new(context: &RunContext) -> Result<Self, VehicleError> {
+        let RunContext { vehicle, preset, .. } = context;
+        let other = match preset {
+            Preset::Paper => Preset::Recommended,
+            Preset::Recommended => Preset::Paper,
+        };
+        let counter = WayCounter::new(vehicle);
+        Ok(Self {
+            preset: *preset,
+            other: Odometer::new(*vehicle, other.settings())?,
+            rivals: Rival::ALL.map(|rival| RivalOdometer::new(rival, vehicle)),
+            slip: SlipWatch::new(counter.pitches()),
+            flags: [FlagWatch::default(); 2],
+            counter,
+            scores: RunScores { presets: Default::default(), rivals: Default::default() },
+        })
+    }
+
+    fn see(&mut self, period: &Period, estimate: &MotionEstimate, truth: &Truth) {
+        let other = self.other.step(period);
+        let estimates = match self.preset {
+            Preset::Paper => [estimate, &other],
+            Preset::Recommended => [&other, estimate],
+        };
+        let counted = self.counter.count(period);
+        let slip = self.slip.see(period.time, &counted, truth);
+        for ((scorer, flags), estimate) in self.scores.presets.iter_mut().zip(&mut self.flags).zip(estimates)
+        {
+            flags.see(period.time, slip, estimate.wheels);
+            scorer.see(&claim(estimate), truth);
+            scorer.set_detect_delay(flags.delay_s());
+        }
+        for (scorer, rival) in self.scores.rivals.iter_mut().zip(&mut self.rivals) {
+            scorer.see(&rival.step(&counted), truth);
+        }
+    }
+}
+
+impl RunScores {
+    /// That of an estimate of ours.
+    #[must_use]
+    pub fn preset(&self, preset: Preset) -> OdometryScore {
+        match (preset, &self.presets) {
+            (Preset::Paper, [scorer, _]) | (Preset::Recommended, [_, scorer]) => scorer.score(),
+        }
+    }
+
+    /// Those of what others would make of the same counts.
+    pub fn rivals(&self) -> impl Iterator<Item = (Rival, OdometryScore)> {
+        Rival::ALL.into_iter().zip(self.rivals.iter().map(Scorer::score))
+    }
+
+    /// Adds those of another run.
+    pub fn merge(&mut self, other: &Self) {
+        let ours = self.presets.iter_mut().chain(&mut self.rivals);
+        for (scorer, other) in ours.zip(other.presets.iter().chain(&other.rivals)) {
+            scorer.merge(other);
+        }
+    }
+}
+
+fn claim(estimate: &MotionEstimate) -> Claim {
+    Claim {
+        speed: estimate.speed,
+        distance: estimate.distance,
+        speed_bounds: Some([estimate.speed_low, estimate.speed_high]),
+        distance_bounds: Some([estimate.distance_low, estimate.distance_high]),
+    }
+}

@@ -1,0 +1,301 @@
+//! A recording in CSV, read in one pass over a large buffer.
+//!
+//! Nearly every row is plain digits and commas, and [`csv_bytes`](super::csv_bytes) reads it as it comes. A row that
+//! is not goes through [`csv_line`](super::csv_line). A block is handed over as soon as the input has no further
+//! complete line at hand, so that a live recording is never held back.
+
+use std::io::{ErrorKind, Read};
+
+use footplate_core::Timestamp;
+
+use super::block::{BLOCK_ROWS, TachometerBlock};
+use super::columns::{Slot, TachometerColumns};
+use super::csv_bytes;
+use super::csv_line::{Line, LineReader};
+use super::error::TachometerError;
+use super::note::{RowPlace, TachometerNote, TachometerOddity};
+use super::run_names::RunNames;
+use super::time_watch::TimeWatch;
+use crate::table::{LONGEST_LINE, TableError};
+
+/// How much is asked of the input at once, and four times the longest line.
+const BUFFER: usize = 256 * 1024;
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// A CSV file that is being read.
+pub(super) struct CsvReader<R> {
+    lines: Lines<R>,
+    columns: TachometerColumns,
+    line_reader: LineReader,
+    runs: RunNames,
+    times: TimeWatch,
+    /// What the header had that is odd, until the first block takes it along.
+    notes: Vec<TachometerNote>,
+    has_rows: bool,
+}
+
+impl<R: Read> CsvReader<R> {
+    /// Reads the header. `file` is what messages call the file.
+    pub(super) fn open(file: &str, input: R) -> Result<Self, TachometerError> {
+        let mut lines = Lines::new(file, input);
+        let mut line_reader = LineReader::default();
+        let names = loop {
+            let Some(line) = lines.next_line()? else {
+                return Err(TableError::Empty { file: file.to_owned() }.into());
+            };
+            let names = line_reader.header(line)?;
+            if !names.is_empty() {
+                break names;
+            }
+        };
+        let place = Some(RowPlace::Line(lines.line));
+        let (columns, oddities) = TachometerColumns::of_header(file, names)?;
+        let notes = oddities.into_iter().map(|oddity| TachometerNote { place, oddity }).collect();
+        Ok(Self {
+            lines,
+            columns,
+            line_reader,
+            runs: RunNames::default(),
+            times: TimeWatch::default(),
+            notes,
+            has_rows: false,
+        })
+    }
+
+    pub(super) fn columns(&self) -> &TachometerColumns {
+        &self.columns
+    }
+
+    /// The next rows or notes, as many as are at hand; `false` at the end.
+    pub(super) fn read_block(&mut self, block: &mut TachometerBlock) -> Result<bool, TachometerError> {
+        block.begin(&self.columns);
+        block.notes.append(&mut self.notes);
+        loop {
+            while block.len() < BLOCK_ROWS && self.lines.has_line() {
+                self.read_row(block)?;
+            }
+            block.time_faults = self.times.faults();
+            block.read_up_to = self.lines.taken;
+            self.has_rows |= !block.is_empty();
+            // What is odd about the header or the end is worth a block without rows.
+            if !block.is_empty() || !block.notes.is_empty() {
+                return Ok(true);
+            }
+            if !self.lines.fill()? {
+                let file = self.lines.file.clone();
+                return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows { file }) };
+            }
+        }
+    }
+
+    /// Reads the line at hand: the quick way, or if that does not know it, the slow one.
+    fn read_row(&mut self, block: &mut TachometerBlock) -> Result<(), TachometerError> {
+        let row = block.len();
+        let is_last = self.lines.is_last_without_end();
+        let plain = plain_row(self.lines.at_hand(), &self.columns.slots, &mut self.runs, block);
+        if let Some(end) = plain.filter(|end| *end <= LONGEST_LINE) {
+            self.lines.take(end);
+        } else {
+            block.truncate(row);
+            let Some(line) = self.lines.next_line()? else { return Ok(()) };
+            let note = |oddity| TachometerNote { place: Some(RowPlace::Line(line.number)), oddity };
+            match self.line_reader.read(line, &self.columns, &mut self.runs, block) {
+                Ok(true) => {}
+                Ok(false) => return Ok(()),
+                Err(_) if is_last => {
+                    block.notes.push(note(TachometerOddity::LineCutOff));
+                    return Ok(());
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        let place = Some(RowPlace::Line(self.lines.line));
+        let time = block.times.last().copied().unwrap_or_default();
+        if let Some(oddity) = self.times.see(block.run(row), time) {
+            block.notes.push(TachometerNote { place, oddity });
+        }
+        if is_last {
+            block.notes.push(TachometerNote { place, oddity: TachometerOddity::LineNotEnded });
+        }
+        Ok(())
+    }
+}
+
+/// Adds the row that `text` begins with and says where it ends; `None` if it is not written the plain way.
+#[inline]
+fn plain_row(text: &[u8], slots: &[Slot], runs: &mut RunNames, block: &mut TachometerBlock) -> Option<usize> {
+    let mut at = 0;
+    let last = slots.len() - 1;
+    for (column, slot) in slots.iter().enumerate() {
+        at = match *slot {
+            Slot::Time => {
+                let (ns, end) = csv_bytes::time_ns(text, at)?;
+                block.times.push(Timestamp::from_ns(ns));
+                end
+            }
+            Slot::Pulses(wheel) | Slot::Counter(wheel) => {
+                let (count, end) = csv_bytes::count(text, at)?;
+                block.counts[wheel].push(count);
+                end
+            }
+            Slot::Direction(wheel) => {
+                let (direction, end) = csv_bytes::direction(text, at)?;
+                block.directions[wheel].push(direction);
+                end
+            }
+            Slot::Edge(wheel) => {
+                let (ns, end) = csv_bytes::time_or_nothing(text, at)?;
+                block.edges[wheel].push(ns);
+                end
+            }
+            Slot::Number(quantity) => {
+                let (value, end) = csv_bytes::number(text, at)?;
+                if !(value.is_nan() || quantity.fits(value)) {
+                    return None;
+                }
+                block.numbers[quantity.slot()].push(value);
+                end
+            }
+            Slot::Run => {
+                let (run, end) = csv_bytes::run(text, at, runs)?;
+                block.runs.push(run);
+                end
+            }
+            Slot::Unused => csv_bytes::skip(text, at)?,
+        };
+        let separator = *text.get(at)?;
+        at += 1;
+        if column < last {
+            if separator != b',' {
+                return None;
+            }
+        } else if separator == b'\r' {
+            if *text.get(at)? != b'\n' {
+                return None;
+            }
+            at += 1;
+        } else if separator != b'\n' {
+            return None;
+        }
+    }
+    Some(at)
+}
+
+/// The lines of an input, as many at hand as one read brought.
+struct Lines<R> {
+    file: String,
+    input: R,
+    buffer: Vec<u8>,
+    /// Where in the buffer the lines that are not taken begin, where the last complete one ends, and where what
+    /// was read ends.
+    begin: usize,
+    complete: usize,
+    end: usize,
+    /// The line that was taken last, counted from 1, and how many bytes have been taken with it.
+    line: u64,
+    taken: u64,
+    /// The input has ended, and its last line had no end of its own.
+    end_was_added: bool,
+    ended: bool,
+}
+
+impl<R: Read> Lines<R> {
+    fn new(file: &str, input: R) -> Self {
+        Self {
+            file: file.to_owned(),
+            input,
+            // One more for the line feed that may have to be added.
+            buffer: vec![0; BUFFER + 1],
+            begin: 0,
+            complete: 0,
+            end: 0,
+            line: 0,
+            taken: 0,
+            end_was_added: false,
+            ended: false,
+        }
+    }
+
+    fn has_line(&self) -> bool {
+        self.begin < self.complete
+    }
+
+    /// The complete lines that are not taken yet.
+    fn at_hand(&self) -> &[u8] {
+        self.buffer.get(self.begin..self.complete).unwrap_or_default()
+    }
+
+    /// Takes a line of so many bytes.
+    fn take(&mut self, bytes: usize) {
+        self.begin += bytes;
+        self.taken += bytes as u64;
+        self.line += 1;
+    }
+
+    /// Whether the line at hand is the last one and the file breaks off in it.
+    fn is_last_without_end(&self) -> bool {
+        self.end_was_added && {
+            let rest = self.at_hand();
+            rest.iter().position(|byte| *byte == b'\n').is_some_and(|end| end + 1 == rest.len())
+        }
+    }
+
+    /// Takes the next line, reading on if none is at hand.
+    fn next_line(&mut self) -> Result<Option<Line<'_>>, TableError> {
+        while !self.has_line() {
+            if !self.fill()? {
+                return Ok(None);
+            }
+        }
+        let length = self.at_hand().iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let begin = self.begin;
+        self.take(length);
+        if length > LONGEST_LINE {
+            return Err(TableError::LineTooLong { file: self.file.clone(), line: self.line });
+        }
+        let bytes = self.buffer.get(begin..begin + length).unwrap_or_default();
+        let bytes = if self.line == 1 { bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes) } else { bytes };
+        Ok(Some(Line { file: &self.file, number: self.line, bytes }))
+    }
+
+    /// Reads on, once; `false` at the end of the input.
+    fn fill(&mut self) -> Result<bool, TableError> {
+        if self.ended {
+            return Ok(false);
+        }
+        self.buffer.copy_within(self.begin..self.end, 0);
+        self.end -= self.begin;
+        self.complete -= self.begin;
+        self.begin = 0;
+        if self.end - self.complete > LONGEST_LINE {
+            return Err(TableError::LineTooLong { file: self.file.clone(), line: self.line + 1 });
+        }
+        let free = self.buffer.get_mut(self.end..BUFFER).unwrap_or_default();
+        let count = loop {
+            match self.input.read(free) {
+                Ok(count) => break count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(source) => return Err(TableError::Read { file: self.file.clone(), source }),
+            }
+        };
+        let new = self.end..self.end + count;
+        self.end = new.end;
+        if count > 0 {
+            let new_line = self.buffer.get(new.clone()).and_then(|new| new.iter().rposition(|b| *b == b'\n'));
+            if let Some(at) = new_line {
+                self.complete = new.start + at + 1;
+            }
+            return Ok(true);
+        }
+        self.ended = true;
+        if self.complete < self.end {
+            if let Some(byte) = self.buffer.get_mut(self.end) {
+                *byte = b'\n';
+            }
+            self.end += 1;
+            self.complete = self.end;
+            self.end_was_added = true;
+        }
+        Ok(self.has_line())
+    }
+}

@@ -1,0 +1,42 @@
+//! Why a tachometer recording could not be read: where, what stands there and what would be right.
+
+use crate::table::TableError;
+
+/// A tachometer recording that could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TachometerError {
+    /// A line or a field of a CSV file is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Columns that no recording can do without.
+    #[error(
+        "{file}: missing columns: {}; the header names {found} (docs/formats/tachometer-recording.md)",
+        missing.join(", ")
+    )]
+    MissingColumns {
+        /// The file.
+        file: String,
+        /// What the header names, shortened if long.
+        found: String,
+        /// What is missing.
+        missing: Vec<&'static str>,
+    },
+    /// There is a header and nothing below it.
+    #[error("{file}: no rows below the header; a recording has at least one")]
+    NoRows {
+        /// The file.
+        file: String,
+    },
+    /// The times stand in another column.
+    #[error(
+        "{file}: `t_s` does not increase from row to row and `{column}` does; are the two columns swapped in the \
+         header?"
+    )]
+    Swapped {
+        /// The file.
+        file: String,
+        /// The column that looks like time.
+        column: String,
+    },
+}
