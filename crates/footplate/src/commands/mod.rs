@@ -11,6 +11,7 @@ mod completions;
 mod convert;
 mod layout;
 mod log_file;
+mod odometry;
 mod predict;
 mod report;
 mod simulate;

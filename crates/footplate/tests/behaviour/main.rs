@@ -6,6 +6,7 @@ mod calibrations_are_true;
 mod compare;
 mod forecasts_hold;
 mod layout;
+mod odometry;
 mod predict;
 mod program;
 mod report;

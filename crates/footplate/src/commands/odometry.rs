@@ -1,0 +1,126 @@
+//! `footplate odometry`: tachometer recordings to speed, distance and bounds that hold.
+
+mod block_stream;
+mod json;
+mod recording;
+mod results;
+mod tables;
+mod walked;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use footplate_store::odometry::{Preset, RunContext};
+use footplate_store::{default_vehicle, read_vehicle};
+
+use super::Outcome;
+use recording::{OpenRecording, WalkedRecording};
+use results::Results;
+use walked::Walked;
+
+/// Estimate speed and distance, with bounds, from what two wheelsets counted.
+///
+/// Recordings are CSV or Parquet with the columns t_s, pulses_1, pulses_2 (or counter_1, counter_2) and those that
+/// docs/formats/tachometer-recording.md lists; `-` is standard input, whose every line is answered at once with
+/// `--out -`. Runs that are told apart by `run_id` are independent of each other. With `--score`, estimates are
+/// compared with the truth in the recording (true_speed_m_s, true_distance_m), and so are both presets and what
+/// simpler odometers make of the same counts.
+#[derive(Args)]
+#[command(
+    after_help = "Example: footplate odometry run.csv --vehicle train.toml --score --out result.parquet\n\
+                  Live:    tachometer | footplate odometry - --out -\n\n\
+                  Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
+)]
+pub(crate) struct Arguments {
+    /// Tachometer recordings, CSV or Parquet; `-` for standard input.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// What is known of the train (docs/formats/vehicle.md); without it, two powered wheelsets of 80 teeth.
+    #[arg(long, value_name = "V.toml")]
+    vehicle: Option<PathBuf>,
+    /// Which of the ways to estimate.
+    #[arg(long, value_enum, default_value_t = PresetName::Recommended)]
+    preset: PresetName,
+    /// Write an estimate a period to this file, CSV or Parquet by its ending; `-` for CSV on standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Compare with the truth that the recording holds.
+    #[arg(long)]
+    score: bool,
+    /// Write JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PresetName {
+    /// The published algorithm, as closely as it can be read.
+    Paper,
+    /// What is best on every scenario.
+    Recommended,
+}
+
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Paper => Self::Paper,
+            PresetName::Recommended => Self::Recommended,
+        }
+    }
+}
+
+/// The name that stands for standard input and output.
+const STANDARD: &str = "-";
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let to_standard = self.out.as_ref().is_some_and(|out| out.as_os_str() == STANDARD);
+        if to_standard && (self.json || self.score) {
+            bail!(
+                "--out - fills standard output with estimates; write them to a file beside --json or --score"
+            );
+        }
+        if self.files.iter().filter(|file| file.as_os_str() == STANDARD).count() > 1 {
+            bail!("`-` is given twice, and there is only one standard input");
+        }
+        let vehicle = match &self.vehicle {
+            Some(path) => read_vehicle(path)?,
+            None => default_vehicle()?,
+        };
+        let preset = Preset::from(self.preset);
+        let context = RunContext { vehicle: vehicle.vehicle, preset, score: self.score };
+        let recordings = self.walk(&context, output)?;
+        if to_standard {
+            return Ok(Outcome::Done);
+        }
+        let walked = Walked { vehicle: vehicle.name, preset, recordings };
+        if self.json {
+            writeln!(output, "{}", serde_json::to_string_pretty(&json::walked(&walked))?)?;
+        } else {
+            tables::write(output, &walked)?;
+        }
+        Ok(if walked.falls_short() { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    /// Walks all recordings and writes what was asked for of their estimates.
+    fn walk(&self, context: &RunContext, output: &mut dyn Write) -> anyhow::Result<Vec<WalkedRecording>> {
+        let mut output = Some(output);
+        let mut results = None;
+        let mut walked = Vec::new();
+        for file in &self.files {
+            let recording = OpenRecording::open(file, self.score)?;
+            if let (Some(out), Some(output)) = (&self.out, output.take()) {
+                let with_runs = self.files.len() > 1 || recording.has_run_ids();
+                let begun = Results::begin(out, output, with_runs);
+                results = Some(begun.with_context(|| format!("writing {}", out.display()))?);
+            }
+            walked.push(recording.walk(context, results.as_mut())?);
+        }
+        if let (Some(results), Some(out)) = (results, &self.out) {
+            results.finish().with_context(|| format!("writing {}", out.display()))?;
+        }
+        Ok(walked)
+    }
+}

@@ -1,0 +1,90 @@
+//! What recordings come to, for machines.
+
+use footplate_store::odometry::{OdometryScore, Preset, RunScores};
+use serde_json::{Map, Value, json};
+
+use super::recording::{WalkedRecording, WalkedRun};
+use super::walked::Walked;
+
+/// Everything, as docs/formats/odometry-result.md describes it.
+pub(super) fn walked(walked: &Walked) -> Value {
+    let mut whole = Map::new();
+    whole.insert("preset".into(), json!(walked.preset.key()));
+    whole.insert("vehicle".into(), json!(walked.vehicle));
+    if let Some(scores) = walked.scores() {
+        let mut overall = Map::new();
+        insert_scores(&mut overall, &scores, walked.preset);
+        whole.insert("overall".into(), overall.into());
+    }
+    whole.insert("recordings".into(), walked.recordings.iter().map(recording).collect());
+    let runs = walked
+        .recordings
+        .iter()
+        .flat_map(|recording| recording.runs.iter().map(|each| run(&recording.file, each, walked.preset)));
+    whole.insert("runs".into(), runs.collect());
+    whole.into()
+}
+
+fn recording(recording: &WalkedRecording) -> Value {
+    let faults = recording.time_faults;
+    json!({
+        "file": recording.file,
+        "runs": recording.runs.len(),
+        "notes": recording.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "time_stood_still": faults.stood_still,
+        "time_went_back": faults.went_back,
+        "gaps": faults.gaps,
+    })
+}
+
+fn run(file: &str, run: &WalkedRun, preset: Preset) -> Value {
+    let summary = run.odometry.summary();
+    let mut fields = Map::new();
+    fields.insert("file".into(), json!(file));
+    fields.insert("run_id".into(), json!(run.id));
+    fields.insert("periods".into(), json!(summary.periods));
+    fields.insert("duration_s".into(), figure(summary.duration().as_s()));
+    if let Some(last) = summary.last {
+        for (key, value) in [
+            ("distance_m", last.distance),
+            ("distance_low_m", last.distance_low),
+            ("distance_high_m", last.distance_high),
+            ("over_m", last.over),
+            ("under_m", last.under),
+        ] {
+            fields.insert(key.into(), figure(value.as_m()));
+        }
+    }
+    fields.insert("top_speed_m_s".into(), figure(summary.top_speed.as_m_per_s()));
+    fields.insert("modes".into(), json!(summary.modes));
+    fields.insert("wheels".into(), json!(summary.flags));
+    if let Some(scores) = run.odometry.scores() {
+        insert_scores(&mut fields, scores, preset);
+    }
+    fields.into()
+}
+
+/// The score of the preset that was asked for, and beside it those of both and of what others would make of it.
+fn insert_scores(fields: &mut Map<String, Value>, scores: &RunScores, preset: Preset) {
+    if let Value::Object(own) = score(&scores.preset(preset)) {
+        fields.extend(own);
+    }
+    let presets =
+        Preset::ALL.into_iter().map(|preset| (preset.key().to_owned(), score(&scores.preset(preset))));
+    fields.insert("presets".into(), Value::Object(presets.collect()));
+    let rivals = scores.rivals().map(|(rival, of)| (rival.key().to_owned(), score(&of)));
+    fields.insert("baselines".into(), Value::Object(rivals.collect()));
+}
+
+fn score(score: &OdometryScore) -> Value {
+    let figures =
+        score.figures().into_iter().map(|(key, value)| (key.to_owned(), value.map_or(Value::Null, figure)));
+    let mut fields: Map<String, Value> = figures.collect();
+    fields.insert("scored".into(), json!(score.scored));
+    fields.into()
+}
+
+/// To a micrometre or a millionth of a per cent, so that files do not show the rounding of sums.
+fn figure(value: f64) -> Value {
+    json!((value * 1e6).round() / 1e6 + 0.0)
+}

@@ -1,0 +1,129 @@
+//! One recording through the odometer, every run of it.
+
+use std::io;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use anyhow::bail;
+use footplate_store::odometry::{OdometryRun, RunContext};
+use footplate_store::{TachometerBlock, TachometerNote, TachometerReader, TimeFaults};
+
+use super::STANDARD;
+use super::block_stream::each_block;
+use super::results::Results;
+use crate::progress::with_progress;
+
+/// A recording whose columns are known and whose rows are not read yet.
+pub(super) struct OpenRecording {
+    file: String,
+    reader: TachometerReader,
+}
+
+/// What a recording comes to.
+pub(super) struct WalkedRecording {
+    /// What messages call the file.
+    pub(super) file: String,
+    /// Its runs in the order of first appearance.
+    pub(super) runs: Vec<WalkedRun>,
+    /// What was odd in it.
+    pub(super) notes: Vec<TachometerNote>,
+    /// How many rows had a time that makes no period.
+    pub(super) time_faults: TimeFaults,
+}
+
+/// What a run comes to.
+pub(super) struct WalkedRun {
+    /// Its `run_id`, where the recording has that column.
+    pub(super) id: Option<String>,
+    /// What rows of results call it.
+    pub(super) name: String,
+    pub(super) odometry: OdometryRun,
+}
+
+impl OpenRecording {
+    /// Opens a recording; with `score`, one that holds the truth.
+    pub(super) fn open(path: &Path, score: bool) -> anyhow::Result<Self> {
+        let is_standard = path.as_os_str() == STANDARD;
+        let file = if is_standard { "standard input".to_owned() } else { path.display().to_string() };
+        let reader = if is_standard {
+            TachometerReader::of_stream(&file, Box::new(io::stdin()))?
+        } else {
+            TachometerReader::open(path)?
+        };
+        let columns = reader.columns();
+        if score && !(columns.has_true_speed() || columns.has_true_distance()) {
+            bail!(
+                "{file}: --score needs the truth, and there is no column true_speed_m_s or true_distance_m"
+            );
+        }
+        Ok(Self { file, reader })
+    }
+
+    /// Whether its rows say which run they belong to.
+    pub(super) fn has_run_ids(&self) -> bool {
+        self.reader.columns().has_run_ids()
+    }
+
+    /// Walks it; what is odd in it is said on standard error as it is found.
+    pub(super) fn walk(
+        self,
+        context: &RunContext,
+        mut results: Option<&mut Results<'_>>,
+    ) -> anyhow::Result<WalkedRecording> {
+        let has_run_ids = self.has_run_ids();
+        let Self { file, reader } = self;
+        let mut walked =
+            WalkedRecording { file, runs: Vec::new(), notes: Vec::new(), time_faults: TimeFaults::default() };
+        if !has_run_ids {
+            walked.add_run(None, context)?;
+        }
+        let extent = reader.extent().and_then(|extent| usize::try_from(extent).ok());
+        with_progress("estimating", extent.unwrap_or_default(), |done| {
+            each_block(reader, |block| {
+                walked.take(block, context, results.as_deref_mut())?;
+                done.store(block.read_up_to, Ordering::Relaxed);
+                Ok(())
+            })
+        })?;
+        Ok(walked)
+    }
+}
+
+impl WalkedRecording {
+    fn add_run(&mut self, id: Option<&str>, context: &RunContext) -> anyhow::Result<()> {
+        let name = id.map_or_else(|| self.file.clone(), ToOwned::to_owned);
+        self.runs.push(WalkedRun {
+            id: id.map(ToOwned::to_owned),
+            name,
+            odometry: OdometryRun::new(context)?,
+        });
+        Ok(())
+    }
+
+    fn take(
+        &mut self,
+        block: &TachometerBlock,
+        context: &RunContext,
+        mut results: Option<&mut Results<'_>>,
+    ) -> anyhow::Result<()> {
+        for id in &block.new_runs {
+            self.add_run(Some(id), context)?;
+        }
+        for note in &block.notes {
+            eprintln!("{}, {note}", self.file);
+        }
+        self.notes.extend_from_slice(&block.notes);
+        self.time_faults = block.time_faults;
+        for row in 0..block.len() {
+            let Some(run) = self.runs.get_mut(block.run(row)) else { continue };
+            let estimate = run.odometry.step(&block.period(row), || block.truth(row));
+            if let Some(results) = &mut results {
+                results.push(&run.name, &estimate)?;
+            }
+        }
+        if let Some(results) = results {
+            results.end_block()?;
+        }
+        Ok(())
+    }
+}

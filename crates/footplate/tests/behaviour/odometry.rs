@@ -1,0 +1,162 @@
+//! `footplate odometry` turns recordings into estimates, scores them, and answers a live input line by line.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::program::{Run, footplate};
+
+const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/plain.csv");
+const RUNS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/runs.csv");
+
+/// The fields of every score, as docs/formats/odometry-result.md names them.
+const FIELDS: [&str; 11] = [
+    "speed_rms_m_s",
+    "speed_max_m_s",
+    "distance_end_m",
+    "distance_end_pct",
+    "speed_inside_pct",
+    "distance_inside_pct",
+    "speed_width_mean_m_s",
+    "distance_width_end_m",
+    "etcs_speed_violation_pct",
+    "etcs_distance_violation_pct",
+    "scored",
+];
+
+const HEADER: &str = "t_s,speed_m_s,speed_low_m_s,speed_high_m_s,accel_m_s2,distance_m,distance_low_m,distance_high_m,\
+                      over_m,under_m,wheel_1,wheel_2,mode,share_1,share_2,share_3";
+
+fn odometry(arguments: &[&str]) -> Run {
+    footplate(&[&["odometry"], arguments].concat())
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    folder
+}
+
+#[test]
+fn json_carries_the_score_of_all_presets_and_baselines() {
+    let run = odometry(&[PLAIN, "--score", "--json"]);
+    assert!(run.status < 2, "{}", run.errors);
+    let score: Value = serde_json::from_str(&run.output).unwrap();
+    assert_eq!(score["preset"], "recommended");
+    for scored in [&score["overall"], &score["runs"][0]] {
+        for ours in [scored, &scored["presets"]["paper"], &scored["presets"]["recommended"]] {
+            assert!(FIELDS.iter().all(|field| ours[*field].is_number()), "{ours}");
+            assert!(ours["detect_delay_s"].is_null(), "nothing slips");
+        }
+        for baseline in ["raw_mean", "raw_max", "wheels_only"] {
+            let theirs = &scored["baselines"][baseline];
+            assert!(FIELDS[..4].iter().all(|field| theirs[*field].is_number()), "{theirs}");
+            assert!(theirs["speed_inside_pct"].is_null(), "it states no interval");
+        }
+    }
+    assert_eq!(score["runs"][0]["periods"], 40);
+    // The mean of two equal counts is off by less than a pulse (33.8 mm) at the end.
+    let end = score["overall"]["baselines"]["raw_mean"]["distance_end_m"].as_f64().unwrap();
+    assert!(end.abs() < 0.034, "{end}");
+}
+
+#[test]
+fn estimates_come_in_the_columns_of_the_contract() {
+    let folder = folder("odometry-results");
+    let out = folder.join("result.csv").display().to_string();
+    let run = odometry(&[PLAIN, "--out", &out]);
+    assert_eq!((run.status, run.errors.as_str()), (0, ""));
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert_eq!(text.lines().next(), Some(HEADER));
+    assert_eq!(text.lines().count(), 41);
+    assert!(text.lines().nth(2).unwrap().starts_with("0.05,"), "times are exact");
+    // The same on standard output, and nothing else.
+    assert_eq!(odometry(&[PLAIN, "--out", "-"]).output, text);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1, "nothing is left beside the result");
+}
+
+#[test]
+fn runs_are_independent_of_each_other() {
+    let folder = folder("odometry-runs");
+    let [whole, part] = ["whole.csv", "part.csv"].map(|name| folder.join(name).display().to_string());
+    assert_eq!(odometry(&[RUNS, "--out", &whole]).status, 0);
+    // The rows of run b alone, as a recording of its own.
+    let text = std::fs::read_to_string(RUNS).unwrap();
+    let of_b: Vec<&str> = text.lines().filter(|line| !line.starts_with("a,")).collect();
+    std::fs::write(&part, of_b.join("\n") + "\n").unwrap();
+    let alone = odometry(&[&part, "--out", "-"]);
+    let estimates = std::fs::read_to_string(&whole).unwrap();
+    let of_b: Vec<&str> = estimates.lines().filter(|line| !line.ends_with(",a")).collect();
+    assert_eq!(of_b.len(), 41);
+    assert_eq!(alone.output.lines().collect::<Vec<_>>(), of_b);
+    // Several files without names of runs are told apart by their names.
+    let both = odometry(&[PLAIN, PLAIN, "--out", "-"]).output;
+    assert!(both.lines().next().unwrap().ends_with(",run_id"));
+    assert_eq!(both.lines().filter(|line| line.ends_with("plain.csv")).count(), 80);
+}
+
+#[test]
+fn a_live_input_is_answered_line_by_line() {
+    let mut live = Command::new(env!("CARGO_BIN_EXE_footplate"))
+        .args(["odometry", "-", "--out", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut writer = live.stdin.take().unwrap();
+    let mut answers = BufReader::new(live.stdout.take().unwrap()).lines();
+    writer.write_all(b"t_s,pulses_1,pulses_2,wind\n0,0,0,1\n").unwrap();
+    assert!(answers.next().unwrap().unwrap().starts_with("t_s,speed_m_s,"));
+    assert!(answers.next().unwrap().unwrap().starts_with("0,"));
+    for period in 1..20 {
+        // Each line comes in two pieces and is answered before the next one is written.
+        let line = format!("{}.{:02},15,15,1\n", period / 20, 5 * period);
+        let (one, other) = line.split_at(3);
+        writer.write_all(one.as_bytes()).unwrap();
+        writer.flush().unwrap();
+        writer.write_all(other.as_bytes()).unwrap();
+        let answer = answers.next().unwrap().unwrap();
+        let time: f64 = answer.split(',').next().unwrap().parse().unwrap();
+        assert!((time - 0.05 * f64::from(period)).abs() < 1e-9, "{answer}");
+    }
+    drop(writer);
+    assert!(answers.next().is_none());
+    let end = live.wait_with_output().expect("it ends with its input");
+    assert!(end.status.success());
+    let said = String::from_utf8_lossy(&end.stderr).into_owned();
+    assert_eq!(said, "standard input, line 1: columns that are not used: wind\n", "one warning");
+}
+
+#[test]
+fn wrong_input_is_named_and_ends_with_status_2() {
+    let folder = folder("odometry-wrong");
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let wrong = |arguments: &[&str], says: &str| {
+        let run = odometry(arguments);
+        assert_eq!((run.status, run.output.as_str()), (2, ""), "{arguments:?}");
+        assert!(run.errors.contains(says), "{}", run.errors);
+    };
+    let bad_row = file("bad.csv", "t_s,pulses_1,pulses_2\n0,1,1\n0.05,fast,1\n");
+    let out = folder.join("result.csv").display().to_string();
+    wrong(
+        &[&bad_row, "--out", &out],
+        "bad.csv, line 3, column 2 (pulses_1): `fast` should be a whole number",
+    );
+    assert!(!Path::new(&out).exists(), "nothing is half written");
+    wrong(&["no-such.csv"], "no-such.csv: cannot be read");
+    wrong(&[&folder.display().to_string()], "it is a folder");
+    wrong(&[RUNS, "--score"], "--score needs the truth");
+    wrong(&[PLAIN, "--out", "-", "--json"], "--out - fills standard output");
+    wrong(&["-", "-"], "there is only one standard input");
+    let vehicle = file("train.toml", "max_speed = 70\n");
+    wrong(&[PLAIN, "--vehicle", &vehicle], "train.toml, line 1, column 1");
+    wrong(&[PLAIN, "--out", "missing-folder/result.csv"], "writing missing-folder/result.csv");
+}
