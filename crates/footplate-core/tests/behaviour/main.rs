@@ -3,6 +3,7 @@
 mod counted_run;
 mod draw;
 mod federated_filters;
+mod inertial;
 mod motion_checks;
 mod motion_models;
 mod profiles;

@@ -8,6 +8,7 @@ mod child_process;
 mod layout_tables;
 mod layouts_of_any_text;
 mod logs_round_trip;
+mod metro_trips;
 mod no_look_ahead;
 mod real_logs;
 mod recordings;
