@@ -30,13 +30,11 @@ const FIRST_COUNT: f64 = 1.0 / 6.0;
 /// Jerk density while the virtual sensor stands in (m²/s⁵): accelerations are known to 0.3 m/s² after a second.
 const BLIND_JERK: f64 = 0.1;
 
-/// Difference of speeds at which the wheel that seems to slip or slide loses half its share (m/s): three standard
-/// deviations of the difference of two wheels that roll.
-const APART: f64 = 0.25;
+/// Difference of speeds at which the wheel that seems to slip or slide loses half its share: three standard deviations
+/// of the difference of two wheels that roll (m/s), and what their diameters may differ by (part of the speed).
+const APART: (f64, f64) = (0.25, 0.004);
 /// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
 const CREEPING_SHARE: f64 = 0.05;
-/// No wheel that is trusted has less.
-const SMALLEST_SHARE: f64 = 1e-3;
 /// Wheels silent for longer in a slide are locked (s).
 const LOCKED_S: f64 = 0.15;
 
@@ -58,6 +56,8 @@ pub struct Odometer {
     /// 1 the way in which distance grows, −1 the other.
     way: f64,
     distance: f64,
+    /// How far the counts put the train ahead of where the filter believes it (m).
+    ahead: f64,
     blind: f64,
 }
 
@@ -168,6 +168,7 @@ impl Odometer {
             clock: 0.0,
             way: 1.0,
             distance: 0.0,
+            ahead: 0.0,
             blind: 0.0,
         }
     }
@@ -200,21 +201,12 @@ impl Odometer {
         let bounded = self.narrow(possible, &turns, &allowed, lost, t);
 
         let trusted = self.trusted(lost);
-        for ((wheel, counted), trusted) in self.wheels.iter_mut().zip(counted).zip(trusted) {
-            wheel.ahead += counted - way;
-            if trusted && !wheel.trusted {
-                wheel.ahead = 0.0;
-            }
-        }
         let shares = self.shares(trusted, &allowed);
         if trusted.contains(&true) {
-            way += self.correct(trusted, shares);
+            way += self.correct(counted, way, shares);
             self.blind = 0.0;
         } else {
             way = self.stand_in(lost, before, t);
-        }
-        for (wheel, trusted) in self.wheels.iter_mut().zip(trusted) {
-            wheel.trusted = trusted;
         }
         let kept = bounded.nearest(self.train.v);
         if kept != self.train.v {
@@ -331,7 +323,8 @@ impl Odometer {
                     } else {
                         0.0
                     };
-                    let apart = behind.max(0.0) / APART;
+                    let (noise, part) = APART;
+                    let apart = behind.max(0.0) / (noise + part * self.train.v.abs());
                     sharp * if creeps { CREEPING_SHARE } else { 1.0 } / (1.0 + apart * apart * apart * apart)
                 };
                 let (a, b) = (weight(first, second), weight(second, first));
@@ -341,18 +334,19 @@ impl Odometer {
     }
 
     /// Lets the trusted wheels correct the filter; by how much that moved the train (m).
-    fn correct(&mut self, trusted: [bool; 2], [first, second, _]: [f64; 3]) -> f64 {
-        self.stand_in = None;
-        let mut moved = 0.0;
-        for ((wheel, trusted), share) in self.wheels.iter_mut().zip(trusted).zip([first, second]) {
-            if trusted {
-                let r = wheel.pitch * wheel.pitch / (12.0 * share.max(SMALLEST_SHARE) * 2.0);
-                moved += self.train.place(wheel.ahead - moved, r).moved;
-            }
+    ///
+    /// The wheels are read as one counter to which each adds its share of every period. Two counters of their own would
+    /// drift apart by what their diameters differ, and tear at the filter whenever the shares change.
+    fn correct(&mut self, [first_counted, second_counted]: [f64; 2], way: f64, [a, b, _]: [f64; 3]) -> f64 {
+        if self.stand_in.take().is_some() {
+            self.ahead = 0.0;
         }
-        for wheel in &mut self.wheels {
-            wheel.ahead -= moved;
-        }
+        let [first, second] = &self.wheels;
+        let off = |wheel: &WheelChannel, share: f64| share * share * wheel.pitch * wheel.pitch * (1.0 / 12.0);
+        let r = off(first, a) + off(second, b);
+        self.ahead += a * first_counted + b * second_counted - way;
+        let moved = self.train.place(self.ahead, r).moved;
+        self.ahead -= moved;
         moved
     }
 
@@ -460,6 +454,7 @@ impl Odometer {
         self.ways.reverse();
         self.slips.clear();
         self.stand_in = None;
+        self.ahead = -self.ahead;
         for wheel in &mut self.wheels {
             wheel.reverse();
         }

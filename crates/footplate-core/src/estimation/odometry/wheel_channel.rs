@@ -34,11 +34,7 @@ pub(super) struct WheelChannel {
     pub(super) pulses: f64,
     /// Speed before the period's pulses (m/s).
     pub(super) speed_before: f64,
-    /// How far its counts put the train ahead of where the filter believes it (m).
-    pub(super) ahead: f64,
     pub(super) smooth_acceleration: f64,
-    /// It was trusted in the last period.
-    pub(super) trusted: bool,
     pub(super) missing_for: f64,
     tachometer: Tachometer,
     windows: CountWindows,
@@ -59,9 +55,7 @@ impl WheelChannel {
             quality: Quality::Missing,
             pulses: 0.0,
             speed_before: 0.0,
-            ahead: 0.0,
             smooth_acceleration: 0.0,
-            trusted: false,
             missing_for: 0.0,
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
@@ -156,7 +150,6 @@ impl WheelChannel {
     pub(super) fn reverse(&mut self) {
         self.tracker.reverse();
         self.windows.reverse();
-        self.ahead = -self.ahead;
         self.smooth_acceleration = -self.smooth_acceleration;
     }
 
