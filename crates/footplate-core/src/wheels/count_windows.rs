@@ -19,11 +19,15 @@ const LENGTHS_S: [f64; WINDOWS] = [0.1, 0.16, 0.25, 0.4, 0.6, 0.9];
 /// revolution, 0.5 % a tooth, each at both ends).
 const PITCH_ERROR: f64 = 0.1;
 
+/// Fewer pulses do not prove that a wheel turns.
+const SHAKEN: f64 = 3.0;
+
 /// The last counts of one wheel.
 #[derive(Debug, Clone)]
 pub struct CountWindows {
     times: [f64; RING],
     totals: [f64; RING],
+    doubts: [f64; RING],
     newest: usize,
     /// Readings in a row that are good, the newest included.
     good: usize,
@@ -35,15 +39,17 @@ impl CountWindows {
     #[must_use]
     pub fn new(period: f64) -> Self {
         let lags = LENGTHS_S.map(|length| (libm::round(length / period) as usize).clamp(1, RING - 1));
-        Self { times: [0.0; RING], totals: [0.0; RING], newest: 0, good: 0, lags }
+        Self { times: [0.0; RING], totals: [0.0; RING], doubts: [0.0; RING], newest: 0, good: 0, lags }
     }
 
-    /// So many pulses more by the time `now` (s).
-    pub fn counted(&mut self, now: f64, pulses: f64) {
+    /// So many pulses more by the time `now` (s), of which so many may be wrong.
+    pub fn counted(&mut self, now: f64, pulses: f64, doubt: f64) {
         let total = self.totals[self.newest] + pulses;
+        let doubts = self.doubts[self.newest] + doubt;
         self.newest = (self.newest + 1) % RING;
         self.times[self.newest] = now;
         self.totals[self.newest] = total;
+        self.doubts[self.newest] = doubts;
         self.good = (self.good + 1).min(RING);
     }
 
@@ -66,6 +72,7 @@ impl CountWindows {
         let mut speed = Range::ANY;
         let now = self.times[self.newest];
         let total = self.totals[self.newest];
+        let doubts = self.doubts[self.newest];
         for lag in self.lags {
             if lag >= self.good {
                 break;
@@ -74,8 +81,10 @@ impl CountWindows {
             let span = now - self.times[then];
             let pulses = total - self.totals[then];
             let per_second = 1.0 / span;
-            let fewest = pulses - 1.0 - PITCH_ERROR;
-            let most = pulses + 1.0 + PITCH_ERROR;
+            let off = 1.0 + PITCH_ERROR + doubts - self.doubts[then];
+            // A tooth that stands at the edge and is shaken over it to and fro is no motion.
+            let fewest = if pulses.abs() < SHAKEN { (pulses - off).min(0.0) } else { pulses - off };
+            let most = if pulses.abs() < SHAKEN { (pulses + off).max(0.0) } else { pulses + off };
             // A negative count is longest with the longest pitch.
             let slowest = fewest * if fewest < 0.0 { pitch.high } else { pitch.low };
             let fastest = most * if most < 0.0 { pitch.low } else { pitch.high };
@@ -98,7 +107,7 @@ mod tests {
         loop {
             let t = f64::from(k) * period;
             let pulses = libm::floor((v * t + 0.5 * a * t * t) / pitch + 0.37);
-            windows.counted(t, pulses - before);
+            windows.counted(t, pulses - before, 0.0);
             before = pulses;
             if t >= until {
                 return (windows, v + a * t);

@@ -4,8 +4,6 @@
 //! kg m² needs some tenths of a second to stop, a cable breaks between two periods. Every exclusion is taken back once
 //! the sensor agrees with the train for a while.
 
-/// Faster than any wheelset on rails was seen to lose its speed (m/s²).
-const FASTEST_LOCK: f64 = 40.0;
 /// Speed of the train above which a silent wheel that cannot slide is dead (m/s).
 const DEAD_ABOVE: f64 = 1.5;
 /// How long it has to be silent (s).
@@ -29,16 +27,16 @@ pub struct Shown {
     pub pulses: f64,
     /// Speed of the wheel followed (m/s).
     pub speed: f64,
-    /// Speed of the wheel before this period's pulses (m/s).
-    pub speed_before: f64,
     /// Speed of the other wheel (m/s), if it is believed.
     pub other: Option<f64>,
     /// Speed of the train (m/s).
     pub train: f64,
     /// Brake or traction can make this wheel turn otherwise than the train moves.
     pub may_differ: bool,
-    /// The count cannot be that of a wheel, whatever it does.
+    /// The count cannot be that of a wheel, whatever it does ...
     pub impossible: bool,
+    /// ... because no wheel can change its speed so fast.
+    pub too_sudden: bool,
 }
 
 /// Follows one tachometer.
@@ -76,15 +74,12 @@ impl SensorWatch {
         let same = shown.pulses == self.last;
         self.same_for = if same { self.same_for + t } else { 0.0 };
         self.last = shown.pulses;
-        let silent_before = self.silent_for;
         self.silent_for = if shown.pulses == 0.0 { self.silent_for + t } else { 0.0 };
 
         let away = |from: f64, (least, part): (f64, f64)| {
             (shown.speed - from).abs() > least.max(part * from.abs().max(shown.speed.abs()))
         };
         let silent = self.silent_for > 0.0;
-        let stopped_at_once =
-            silent && silent_before == 0.0 && shown.speed_before.abs() > FASTEST_LOCK * 2.0 * t;
         let dead =
             silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
         let disagrees = shown.other.is_some_and(|other| away(other, DISAGREE));
@@ -94,8 +89,13 @@ impl SensorWatch {
 
         let still_silent = silent && shown.train.abs() > DEAD_ABOVE;
         let wrong = shown.impossible || still_silent || stuck || away(shown.train, AGREE);
-        self.agreed_for = if wrong { 0.0 } else { self.agreed_for + t };
-        if stopped_at_once || dead || stuck || shown.impossible {
+        if wrong {
+            self.agreed_for = 0.0;
+        } else if !silent {
+            // A silent sensor agrees with a train that stands, dead or not.
+            self.agreed_for += t;
+        }
+        if dead || stuck || shown.impossible || shown.too_sudden {
             self.excluded = true;
             self.agreed_for = 0.0;
         } else if self.agreed_for >= AGREE_FOR_S {

@@ -2,7 +2,8 @@
 //!
 //! Nothing is overwritten silently: a count that no wheel can have made is replaced by what its wheel was expected to
 //! turn, and said to be [`Quality::Substituted`]. One such count is a spike; a second in a row is believed, and the
-//! first with it, because a real slide does not come alone.
+//! first with it, because a real slide does not come alone. But a wheel has inertia: what would change its speed
+//! faster than any wheelset on rails is not believed however often it is said ([`Quality::Excluded`]).
 
 use super::period::{Count, Direction, WheelReading};
 
@@ -33,6 +34,8 @@ pub struct Turn {
     pub pulses: f64,
     /// How good that is.
     pub quality: Quality,
+    /// By how many pulses it may be wrong, beyond the one that every count may be.
+    pub doubt: f64,
 }
 
 /// What the tachometer is expected to say, in signed pulses of the period.
@@ -44,6 +47,10 @@ pub struct Expected {
     pub more: f64,
     /// ... or smaller without surprise.
     pub fewer: f64,
+    /// By how much it can differ without surprise if the wheel rolls.
+    pub rolling: f64,
+    /// By how much it can differ from what it was at the last believed reading, whatever the wheel does.
+    pub ever: f64,
     /// The most pulses that the fastest wheel gives.
     pub most: f64,
 }
@@ -53,8 +60,10 @@ pub struct Expected {
 pub struct Heading {
     /// 1 the way in which distance grows, −1 the other.
     pub way: f64,
-    /// It is too fast to have turned round.
+    /// It is too fast to have turned round: a sensor that says so is wrong.
     pub certain: bool,
+    /// The two sensors say different ways, so that neither is believed.
+    pub disputed: bool,
 }
 
 /// Reads one tachometer.
@@ -71,13 +80,17 @@ pub struct Tachometer {
     /// The sensor is wired the wrong way round: 1 or −1.
     wiring: f64,
     contradictions: u32,
+    /// The way it turned at the last pulse, and whether this period's pulses were the other way: some of them may have
+    /// been both.
+    last_way: f64,
+    turned_round: bool,
 }
 
 impl Tachometer {
     /// A tachometer that has said nothing yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { counter: None, assumed: 0.0, unread: 0.0, withheld: 0.0, wiring: 1.0, contradictions: 0 }
+        Self { counter: None, assumed: 0.0, unread: 0.0, withheld: 0.0, wiring: 1.0, contradictions: 0, last_way: 0.0, turned_round: false }
     }
 
     /// What the wheel turned in a period that is `periods` odometry periods long.
@@ -88,6 +101,7 @@ impl Tachometer {
         heading: Heading,
         expected: &Expected,
     ) -> Turn {
+        self.turned_round = false;
         let read = self.increment(reading, periods, heading, expected);
         let (pulses, whole) = match read {
             Increment::Turned { pulses, whole } => (pulses, whole),
@@ -95,13 +109,13 @@ impl Tachometer {
                 self.assumed += expected.pulses;
                 self.unread += periods;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing };
+                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
             }
             Increment::Restarted => {
                 self.assumed = 0.0;
                 self.unread = 0.0;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing };
+                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
             }
         };
         self.assumed = 0.0;
@@ -110,16 +124,21 @@ impl Tachometer {
         if surprise <= expected.more && surprise >= -expected.fewer {
             self.withheld = 0.0;
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
-            return Turn { pulses, quality };
+            let unusual = if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
+            let doubt = unusual + if self.turned_round { 2.0 * pulses.abs() } else { 0.0 };
+            return Turn { pulses, quality, doubt };
         }
         if self.withheld * surprise > 0.0 {
+            if surprise.abs() > expected.ever {
+                return Turn { pulses: expected.pulses, quality: Quality::Excluded, doubt: f64::INFINITY };
+            }
             let believed = pulses + self.withheld;
             self.withheld = 0.0;
-            return Turn { pulses: believed, quality: Quality::Ok };
+            return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
         }
         let stand_in = libm::round(expected.pulses);
         self.withheld = pulses - stand_in;
-        Turn { pulses: stand_in, quality: Quality::Substituted }
+        Turn { pulses: stand_in, quality: Quality::Substituted, doubt: expected.more.max(expected.fewer) }
     }
 
     /// Signed pulses since the last reading, if they can be a count.
@@ -137,7 +156,11 @@ impl Tachometer {
             Count::Counter(value) => {
                 let moved = self.counter.replace(value).and_then(|before| unwrapped(before, value, most));
                 match moved {
-                    Some(turned) => Increment::Turned { pulses: turned - self.assumed, whole: true },
+                    Some(turned) => {
+                        let told = if turned < 0.0 { -self.wiring } else { self.wiring };
+                        let turned = turned.abs() * if turned == 0.0 { 1.0 } else { self.believed(told, heading) };
+                        Increment::Turned { pulses: turned - self.assumed, whole: true }
+                    }
                     None => Increment::Restarted,
                 }
             }
@@ -146,7 +169,12 @@ impl Tachometer {
                 if !(0.0..=most).contains(&counted) {
                     return Increment::Nothing;
                 }
-                let counted = counted * self.sign(reading.direction, heading);
+                let way = self.sign(reading.direction, heading, pulses != 0);
+                self.turned_round = pulses != 0 && way * self.last_way < 0.0;
+                if pulses != 0 {
+                    self.last_way = way;
+                }
+                let counted = counted * way;
                 let expected_in_all = expected.pulses + self.assumed;
                 let expected_in_one = expected_in_all / span.max(1.0);
                 // A count after lost rows may cover them or its own period only: whichever is nearer to the expected.
@@ -162,23 +190,29 @@ impl Tachometer {
     }
 
     /// Which way the pulses count, minding a sensor that is wired the wrong way round.
-    fn sign(&mut self, direction: Direction, heading: Heading) -> f64 {
+    fn sign(&mut self, direction: Direction, heading: Heading, turned: bool) -> f64 {
         let told = match direction {
             Direction::Unknown => return heading.way,
             Direction::Forward => self.wiring,
             Direction::Backward => -self.wiring,
         };
-        if !heading.certain || told == heading.way {
+        if turned { self.believed(told, heading) } else { heading.way }
+    }
+
+    /// Which way a wheel turned that is told to have turned so.
+    fn believed(&mut self, told: f64, heading: Heading) -> f64 {
+        if told == heading.way {
             self.contradictions = 0;
             return told;
         }
-        self.contradictions += 1;
-        if self.contradictions >= CONTRADICTIONS {
-            self.wiring = -self.wiring;
-            self.contradictions = 0;
+        if heading.certain {
+            self.contradictions += 1;
+            if self.contradictions >= CONTRADICTIONS {
+                self.wiring = -self.wiring;
+                self.contradictions = 0;
+            }
         }
-        // A train does not turn round at speed: the sensor is wrong.
-        heading.way
+        if heading.certain || heading.disputed { heading.way } else { told }
     }
 }
 
@@ -220,8 +254,9 @@ mod tests {
 
     use super::*;
 
-    const FORWARD: Heading = Heading { way: 1.0, certain: true };
-    const CALM: Expected = Expected { pulses: 20.0, more: 3.0, fewer: 3.0, most: 60.0 };
+    const FORWARD: Heading = Heading { way: 1.0, certain: true, disputed: false };
+    const CALM: Expected =
+        Expected { pulses: 20.0, more: 3.0, fewer: 3.0, rolling: 1.5, ever: 15.0, most: 60.0 };
 
     fn turns(counts: &[Count]) -> Vec<Turn> {
         let mut tachometer = Tachometer::new();
@@ -236,7 +271,7 @@ mod tests {
     #[test]
     fn a_spike_is_replaced_and_said_to_be() {
         let turns = turns(&[Count::Pulses(20), Count::Pulses(45), Count::Pulses(20)]);
-        assert_eq!(turns[1], Turn { pulses: 20.0, quality: Quality::Substituted });
+        assert_eq!((turns[1].pulses, turns[1].quality), (20.0, Quality::Substituted));
         assert_eq!(turns[2].quality, Quality::Ok);
         assert_eq!(total(&turns), 60.0);
     }
@@ -249,6 +284,13 @@ mod tests {
     }
 
     #[test]
+    fn a_sensor_that_dies_at_speed_is_not_taken_for_a_wheel_that_locks() {
+        let turns = turns(&[Count::Pulses(20), Count::Pulses(0), Count::Pulses(0), Count::Pulses(0)]);
+        assert_eq!(turns[2].quality, Quality::Excluded);
+        assert_eq!(total(&turns), 80.0, "it is expected to have gone on");
+    }
+
+    #[test]
     fn a_counter_wraps_and_goes_over_missing_readings() {
         let turns = turns(&[
             Count::Counter(65_500),
@@ -258,7 +300,7 @@ mod tests {
             Count::Counter(44),
         ]);
         assert_eq!(turns[0].quality, Quality::Missing, "the first value of a counter says nothing");
-        assert_eq!(turns[2], Turn { pulses: 20.0, quality: Quality::Ok });
+        assert_eq!((turns[2].pulses, turns[2].quality), (20.0, Quality::Ok));
         assert_eq!(turns[3].quality, Quality::Missing);
         assert_eq!(total(&turns[1..]), 80.0, "65 500 to 65 536 + 44");
     }
@@ -268,7 +310,7 @@ mod tests {
         let turns =
             turns(&[Count::Counter(1000), Count::Counter(1020), Count::Counter(0), Count::Counter(20)]);
         assert_eq!(turns[2].quality, Quality::Missing);
-        assert_eq!(turns[3], Turn { pulses: 20.0, quality: Quality::Ok });
+        assert_eq!((turns[3].pulses, turns[3].quality), (20.0, Quality::Ok));
     }
 
     #[test]
@@ -283,7 +325,7 @@ mod tests {
             let mut tachometer = Tachometer::new();
             let expected = Expected { pulses: 40.0, ..CALM };
             let turn = tachometer.read(&WheelReading::pulses(counted), 2.0, FORWARD, &expected);
-            assert_eq!(turn, Turn { pulses: 40.0, quality });
+            assert_eq!((turn.pulses, turn.quality), (40.0, quality));
         }
     }
 

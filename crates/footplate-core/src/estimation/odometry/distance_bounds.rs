@@ -41,6 +41,8 @@ impl Anchor {
 pub(super) struct Counted {
     /// Signed pulses in the direction of travel.
     pub(super) pulses: f64,
+    /// By how many of them the count may be wrong.
+    pub(super) doubt: f64,
     /// Pitch (m).
     pub(super) pitch: Range,
     /// The train moved at least as far.
@@ -87,10 +89,11 @@ impl DistanceBounds {
                 (wheel.pitch.low, wheel.pitch.high)
             };
             let off = PULSES_OFF * wheel.pitch.high;
-            if let Some(bound) = low_anchor.bound(wheel.at_least, wheel.pulses * short, -off) {
+            let doubt = wheel.doubt * wheel.pitch.high;
+            if let Some(bound) = low_anchor.bound(wheel.at_least, wheel.pulses * short - doubt, -off) {
                 low = low.max(bound);
             }
-            if let Some(bound) = high_anchor.bound(wheel.at_most, wheel.pulses * long, off) {
+            if let Some(bound) = high_anchor.bound(wheel.at_most, wheel.pulses * long + doubt, off) {
                 high = high.min(bound);
             }
         }

@@ -14,7 +14,7 @@ use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
 use crate::units::{Acceleration, Length, Speed};
 use crate::wheels::{
-    Heading, Loss, Period, Quality, Range, Shown, Signs, SlipSlide, TrainSigns, Vehicle, VehicleError,
+    Count, Direction, Heading, Loss, Period, Quality, Range, Shown, Signs, SlipSlide, TrainSigns, Vehicle, VehicleError, WheelReading,
 };
 
 /// A longer time without a period breaks the run: the train can have done anything (s).
@@ -182,11 +182,16 @@ impl Odometer {
             if a.min(b) < -a.max(b) { a.min(b) } else { a.max(b) }
         };
         let allowed = self.command.next(effort, seen, t, &self.vehicle);
-        let heading = Heading { way: self.way, certain: self.train.v.abs() > CERTAIN_HEADING };
+        let heading = Heading {
+            way: self.way,
+            certain: self.train.v.abs() > CERTAIN_HEADING,
+            disputed: disputed(&period.wheels),
+        };
+        let [first_lost, second_lost] = self.slips.lost();
         let at = (self.clock, t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
         let counted =
-            [first.read(period, 0, at, heading, &allowed), second.read(period, 1, at, heading, &allowed)];
+            [first.read(period, 0, at, heading, &allowed, first_lost), second.read(period, 1, at, heading, &allowed, second_lost)];
 
         let possible = self.bounds.possible(&allowed, t);
         let turns = [first.turns(allowed.acceleration), second.turns(allowed.acceleration)];
@@ -264,11 +269,11 @@ impl Odometer {
             let shown = Shown {
                 pulses: wheel.pulses,
                 speed: wheel.tracker.speed(),
-                speed_before: wheel.speed_before,
                 other,
                 train: train_speed,
                 may_differ: slides || slips,
                 impossible,
+                too_sudden: wheel.quality == Quality::Excluded,
             };
             wheel.watch.look(&shown, t);
         }
@@ -383,10 +388,11 @@ impl Odometer {
         let [first, second] = &self.wheels;
         let [first_lost, second_lost] = lost;
         let of = |wheel: &WheelChannel, lost: Option<Loss>| {
-            let good = wheel.quality == Quality::Ok && !wheel.watch.doubted();
+            let good = wheel.doubt.is_finite() && !wheel.watch.doubted();
             let axle = wheel.wheelset.axle;
             Counted {
                 pulses: wheel.pulses,
+                doubt: if good { wheel.doubt } else { 0.0 },
                 pitch: wheel.pitch_range,
                 at_least: good && lost != Some(Loss::Spin) && !(allowed.slip && axle.may_slip()),
                 at_most: good && lost != Some(Loss::Slide) && !(allowed.slide && axle.may_slide()),
@@ -399,7 +405,7 @@ impl Odometer {
         let [first, second] = &self.wheels;
         let [first_lost, second_lost] = lost;
         let state = |wheel: &WheelChannel, lost| match lost {
-            _ if wheel.watch.excluded() || wheel.quality == Quality::Missing => WheelState::Excluded,
+            _ if !wheel.is_read() => WheelState::Excluded,
             Some(Loss::Slide) => WheelState::Slide,
             Some(Loss::Spin) => WheelState::Spin,
             None => WheelState::Rolling,
@@ -459,6 +465,14 @@ impl Odometer {
             wheel.reverse();
         }
     }
+}
+
+/// Whether both wheels turned, one forward and the other backward: then neither says that the train has turned round.
+fn disputed([first, second]: &[WheelReading; 2]) -> bool {
+    let turned = |wheel: &WheelReading| !matches!(wheel.count, Count::Missing | Count::Pulses(0));
+    let opposite = |a, b| a == Direction::Forward && b == Direction::Backward;
+    let ways = (first.direction, second.direction);
+    turned(first) && turned(second) && (opposite(ways.0, ways.1) || opposite(ways.1, ways.0))
 }
 
 fn worse(one: Mode, other: Mode) -> Mode {

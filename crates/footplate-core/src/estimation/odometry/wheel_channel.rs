@@ -2,13 +2,17 @@
 
 use super::command_watch::Allowed;
 use crate::wheels::{
-    CountWindows, Expected, Heading, Period, Quality, Range, SensorWatch, Tachometer, Vehicle, WheelTracker,
+    CountWindows, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer, Vehicle, WheelTracker,
     Wheelset,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
-/// acceleration changed meanwhile.
+/// acceleration changed meanwhile ...
 const SURPRISE_PULSES: f64 = 2.2;
+/// ... and by which it rarely does.
+const RARE_PULSES: f64 = 1.5;
+/// No wheelset on rails was seen to change its speed faster (m/s²): locking on the poorest rail takes 20.
+const EVER: f64 = 40.0;
 /// Accelerations of a wheelset beyond which a count is not one of a wheel (m/s²): the train's and noise, a wheel that
 /// slips or slides, one that regains its grip.
 const ROLLING: f64 = 2.5;
@@ -32,10 +36,10 @@ pub(super) struct WheelChannel {
     pub(super) quality: Quality,
     /// Pulses of the period in the direction of travel.
     pub(super) pulses: f64,
-    /// Speed before the period's pulses (m/s).
-    pub(super) speed_before: f64,
     pub(super) smooth_acceleration: f64,
     pub(super) missing_for: f64,
+    /// By how many pulses its last count may be wrong.
+    pub(super) doubt: f64,
     tachometer: Tachometer,
     windows: CountWindows,
     readings: u32,
@@ -54,9 +58,9 @@ impl WheelChannel {
             watch: SensorWatch::new(),
             quality: Quality::Missing,
             pulses: 0.0,
-            speed_before: 0.0,
             smooth_acceleration: 0.0,
             missing_for: 0.0,
+            doubt: 0.0,
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,
@@ -72,17 +76,20 @@ impl WheelChannel {
         (now, t, nominal): (f64, f64, f64),
         heading: Heading,
         allowed: &Allowed,
+        lost: Option<Loss>,
     ) -> f64 {
         let Some(reading) = period.wheels.get(which) else { return 0.0 };
         let expected = self.tracker.expected(t) / self.pitch;
         let may_slide = allowed.slide && self.wheelset.axle.may_slide();
         let may_slip = allowed.slip && self.wheelset.axle.may_slip();
-        let (up, down) = match (may_slide, may_slip) {
-            (true, _) => (REGAINING, LOSING),
-            (false, true) => (LOSING, REGAINING),
-            (false, false) => (ROLLING, ROLLING),
+        // Only a wheel that has lost its grip can regain it.
+        let (up, down) = match (lost, may_slide, may_slip) {
+            (Some(_), ..) => (REGAINING, REGAINING),
+            (None, true, _) => (ROLLING, LOSING),
+            (None, false, true) => (LOSING, ROLLING),
+            (None, false, false) => (ROLLING, ROLLING),
         };
-        let warm = self.readings >= WARM;
+        let warm = self.readings >= WARM && !self.watch.excluded();
         let leeway = |acceleration: f64| {
             if warm { SURPRISE_PULSES + acceleration * t * t / self.pitch } else { f64::INFINITY }
         };
@@ -93,23 +100,26 @@ impl WheelChannel {
             pulses: expected * heading.way,
             more,
             fewer,
+            rolling: RARE_PULSES + ROLLING * t * t / self.pitch,
+            ever: SURPRISE_PULSES + EVER * 2.0 * t * t / self.pitch,
             most: self.most_per_second * t + SURPRISE_PULSES,
         };
         let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
         self.quality = turn.quality;
         self.pulses = turn.pulses * heading.way;
-        self.speed_before = self.tracker.speed();
         let counted = self.pulses * self.pitch;
-        self.windows.counted(now, self.pulses);
-        if turn.quality == Quality::Missing {
+        self.doubt = turn.doubt;
+        if turn.doubt.is_finite() {
+            self.windows.counted(now, self.pulses, turn.doubt);
+        } else {
+            self.windows.counted(now, self.pulses, 0.0);
             self.windows.interrupt();
+        }
+        if matches!(turn.quality, Quality::Missing | Quality::Excluded) {
             self.missing_for += t;
             self.readings = 0;
             self.tracker.turned(self.tracker.expected(t), t);
             return counted;
-        }
-        if turn.quality == Quality::Substituted {
-            self.windows.interrupt();
         }
         if self.readings == 0 && self.missing_for > 0.0 {
             self.tracker.restart(counted / t);
@@ -126,8 +136,9 @@ impl WheelChannel {
     pub(super) fn begin(&mut self, period: &Period, which: usize, t: f64) -> Option<f64> {
         let reading = period.wheels.get(which)?;
         let most = self.most_per_second * t + SURPRISE_PULSES;
-        let open = Expected { pulses: 0.0, more: f64::INFINITY, fewer: f64::INFINITY, most };
-        let uncertain = Heading { way: 1.0, certain: false };
+        let any = f64::INFINITY;
+        let open = Expected { pulses: 0.0, more: any, fewer: any, rolling: any, ever: any, most };
+        let uncertain = Heading { way: 1.0, certain: false, disputed: false };
         let turn = self.tachometer.read(reading, 1.0, uncertain, &open);
         self.quality = turn.quality;
         if turn.quality == Quality::Missing {
@@ -140,7 +151,7 @@ impl WheelChannel {
 
     /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
-        if self.watch.doubted() || self.quality != Quality::Ok {
+        if self.watch.doubted() || self.doubt.is_infinite() {
             return Range::ANY;
         }
         self.windows.speed(self.pitch_range, acceleration)
@@ -155,6 +166,6 @@ impl WheelChannel {
 
     /// Its sample was read and its sensor is believed.
     pub(super) fn is_read(&self) -> bool {
-        self.quality != Quality::Missing && !self.watch.excluded()
+        !matches!(self.quality, Quality::Missing | Quality::Excluded) && !self.watch.excluded()
     }
 }
