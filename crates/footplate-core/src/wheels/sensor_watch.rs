@@ -11,11 +11,13 @@ const DEAD_AFTER_S: f64 = 0.5;
 /// How long a count has to stand still before it can be stuck (s) ...
 const STUCK_AFTER_S: f64 = 1.0;
 /// ... and before it is no longer asked for bounds if the other wheelset disagrees (s).
-const DOUBTED_AFTER_S: f64 = 0.4;
+const DOUBTED_AFTER_S: f64 = 0.25;
 /// By how much the other wheelset has to disagree (m/s, and as part of the speed).
 const DISAGREE: (f64, f64) = (1.0, 0.05);
 /// By how much it may disagree before the bounds stop asking (m/s, and as part of the speed).
-const DOUBT: (f64, f64) = (0.25, 0.015);
+const DOUBT: (f64, f64) = (0.12, 0.006);
+/// A count that stands still for longer is not asked for bounds at all (s): at steady speed it moves to and fro by one.
+const TOO_STEADY_S: f64 = 0.7;
 /// How long a sensor has to agree with the train to be believed again (s), and how closely (m/s, part of the speed).
 const AGREE_FOR_S: f64 = 1.0;
 const AGREE: (f64, f64) = (0.4, 0.02);
@@ -84,8 +86,8 @@ impl SensorWatch {
             silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
         let disagrees = shown.other.is_some_and(|other| away(other, DISAGREE));
         let stuck = !silent && self.same_for > STUCK_AFTER_S && disagrees;
-        self.doubted =
-            !silent && self.same_for > DOUBTED_AFTER_S && shown.other.is_some_and(|other| away(other, DOUBT));
+        let parted = self.same_for > DOUBTED_AFTER_S && shown.other.is_some_and(|other| away(other, DOUBT));
+        self.doubted = !silent && (parted || self.same_for > TOO_STEADY_S);
 
         let still_silent = silent && shown.train.abs() > DEAD_ABOVE;
         let wrong = shown.impossible || still_silent || stuck || away(shown.train, AGREE);

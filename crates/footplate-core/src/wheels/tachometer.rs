@@ -90,7 +90,16 @@ impl Tachometer {
     /// A tachometer that has said nothing yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { counter: None, assumed: 0.0, unread: 0.0, withheld: 0.0, wiring: 1.0, contradictions: 0, last_way: 0.0, turned_round: false }
+        Self {
+            counter: None,
+            assumed: 0.0,
+            unread: 0.0,
+            withheld: 0.0,
+            wiring: 1.0,
+            contradictions: 0,
+            last_way: 0.0,
+            turned_round: false,
+        }
     }
 
     /// What the wheel turned in a period that is `periods` odometry periods long.
@@ -124,8 +133,10 @@ impl Tachometer {
         if surprise <= expected.more && surprise >= -expected.fewer {
             self.withheld = 0.0;
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
-            let unusual = if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
-            let doubt = unusual + if self.turned_round { 2.0 * pulses.abs() } else { 0.0 };
+            let unusual =
+                if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
+            let either_way = self.turned_round || heading.disputed;
+            let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
             return Turn { pulses, quality, doubt };
         }
         if self.withheld * surprise > 0.0 {
@@ -158,7 +169,10 @@ impl Tachometer {
                 match moved {
                     Some(turned) => {
                         let told = if turned < 0.0 { -self.wiring } else { self.wiring };
-                        let turned = turned.abs() * if turned == 0.0 { 1.0 } else { self.believed(told, heading) };
+                        // A running counter is counted down by a tooth that is shaken back: its sign is its own.
+                        let heading = Heading { disputed: false, ..heading };
+                        let turned =
+                            turned.abs() * if turned == 0.0 { 1.0 } else { self.believed(told, heading) };
                         Increment::Turned { pulses: turned - self.assumed, whole: true }
                     }
                     None => Increment::Restarted,
@@ -187,6 +201,12 @@ impl Tachometer {
                 }
             }
         }
+    }
+
+    /// 1, or −1 for a sensor that was found to be wired the wrong way round.
+    #[must_use]
+    pub fn wiring(&self) -> f64 {
+        self.wiring
     }
 
     /// Which way the pulses count, minding a sensor that is wired the wrong way round.

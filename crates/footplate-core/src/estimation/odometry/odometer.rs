@@ -14,7 +14,7 @@ use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
 use crate::units::{Acceleration, Length, Speed};
 use crate::wheels::{
-    Count, Direction, Heading, Loss, Period, Quality, Range, Shown, Signs, SlipSlide, TrainSigns, Vehicle, VehicleError, WheelReading,
+    Heading, Loss, Period, Quality, Range, Shown, Signs, SlipSlide, TrainSigns, Vehicle, VehicleError,
 };
 
 /// A longer time without a period breaks the run: the train can have done anything (s).
@@ -182,16 +182,20 @@ impl Odometer {
             if a.min(b) < -a.max(b) { a.min(b) } else { a.max(b) }
         };
         let allowed = self.command.next(effort, seen, t, &self.vehicle);
-        let heading = Heading {
-            way: self.way,
-            certain: self.train.v.abs() > CERTAIN_HEADING,
-            disputed: disputed(&period.wheels),
+        // One forward and the other backward: then neither says that the train has turned round.
+        let disputed = {
+            let [first, second] = &mut self.wheels;
+            let [first_reading, second_reading] = &period.wheels;
+            first.says(first_reading, t) * second.says(second_reading, t) < 0.0
         };
+        let heading = Heading { way: self.way, certain: self.train.v.abs() > CERTAIN_HEADING, disputed };
         let [first_lost, second_lost] = self.slips.lost();
         let at = (self.clock, t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
-        let counted =
-            [first.read(period, 0, at, heading, &allowed, first_lost), second.read(period, 1, at, heading, &allowed, second_lost)];
+        let counted = [
+            first.read(period, 0, at, heading, &allowed, first_lost),
+            second.read(period, 1, at, heading, &allowed, second_lost),
+        ];
 
         let possible = self.bounds.possible(&allowed, t);
         let turns = [first.turns(allowed.acceleration), second.turns(allowed.acceleration)];
@@ -465,14 +469,6 @@ impl Odometer {
             wheel.reverse();
         }
     }
-}
-
-/// Whether both wheels turned, one forward and the other backward: then neither says that the train has turned round.
-fn disputed([first, second]: &[WheelReading; 2]) -> bool {
-    let turned = |wheel: &WheelReading| !matches!(wheel.count, Count::Missing | Count::Pulses(0));
-    let opposite = |a, b| a == Direction::Forward && b == Direction::Backward;
-    let ways = (first.direction, second.direction);
-    turned(first) && turned(second) && (opposite(ways.0, ways.1) || opposite(ways.1, ways.0))
 }
 
 fn worse(one: Mode, other: Mode) -> Mode {

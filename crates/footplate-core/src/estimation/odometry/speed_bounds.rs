@@ -23,6 +23,8 @@ const TOGETHER_S: f64 = 3.0;
 const TOGETHER: (f64, f64) = (0.15, 0.006);
 /// Time over which their difference is smoothed (s): a followed speed is noisy by 0.1 m/s at 80 pulses a turn.
 const SMOOTHED_S: f64 = 0.5;
+/// By how much more a wheel may creep unseen beside one that slides.
+const SLIPPERY: f64 = 1.5;
 /// How far back a bound by braked wheels is taken from (s): a slide is seen earlier.
 const SLIDE_SEEN_S: f64 = 0.4;
 /// Share of full traction at which a powered wheel may creep by all that goes unseen; proportionally below.
@@ -78,6 +80,25 @@ impl Recent {
     }
 }
 
+/// The bound on which every wheel asked agrees, so that one sensor that is wrong cannot break it.
+#[derive(Debug, Clone, Copy)]
+struct Vote(Option<f64>);
+
+impl Vote {
+    const NONE: Self = Self(None);
+
+    fn also(self, bound: f64, looser: fn(f64, f64) -> f64) -> Self {
+        if bound.is_infinite() {
+            return self;
+        }
+        Self(Some(self.0.map_or(bound, |so_far| looser(so_far, bound))))
+    }
+
+    fn or(self, nothing: f64) -> f64 {
+        self.0.unwrap_or(nothing)
+    }
+}
+
 /// Follows the bounds of the speed, in the direction of travel.
 #[derive(Debug, Clone)]
 pub(super) struct SpeedBounds {
@@ -92,6 +113,12 @@ pub(super) struct SpeedBounds {
     together_for: f64,
     all_slid: bool,
     any_spun: bool,
+}
+
+impl WheelBounds {
+    fn is_asked(&self) -> bool {
+        self.turns.high.is_finite()
+    }
 }
 
 impl SpeedBounds {
@@ -157,14 +184,14 @@ impl SpeedBounds {
         t: f64,
     ) -> f64 {
         let creep = limits.thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
-        let mut rolling = f64::NEG_INFINITY;
+        let mut rolling = Vote::NONE;
         let mut powered = f64::NEG_INFINITY;
         let mut spun = false;
         for wheel in wheels {
             let driven = allowed.slip && wheel.axle.may_slip();
             spun |= wheel.lost == Some(Loss::Spin);
             if !driven {
-                rolling = rolling.max(wheel.turns.low);
+                rolling = rolling.also(wheel.turns.low, f64::min);
             } else if wheel.lost != Some(Loss::Spin) {
                 powered = powered.max(wheel.turns.low * (1.0 - creep));
             }
@@ -173,7 +200,7 @@ impl SpeedBounds {
         let powered = -self.by_powered.push(-powered, t);
         let free = if spun && !self.any_spun { free.min(-self.lowest.largest()) } else { free };
         self.any_spun = spun;
-        free.max(rolling).max(powered)
+        free.max(rolling.or(f64::NEG_INFINITY)).max(powered)
     }
 
     fn high(
@@ -184,7 +211,7 @@ impl SpeedBounds {
         limits: &Limits,
         t: f64,
     ) -> f64 {
-        let mut trusted = f64::INFINITY;
+        let mut trusted = Vote::NONE;
         let mut shown = f64::NEG_INFINITY;
         let mut sliding = 0;
         let mut braked = 0;
@@ -197,12 +224,12 @@ impl SpeedBounds {
                     shown = shown.max(wheel.turns.high);
                 }
             } else {
-                trusted = trusted.min(wheel.turns.high);
+                trusted = trusted.also(wheel.turns.high, f64::max);
             }
         }
         let together = self.together(wheels, sliding, t) && limits.independent;
         let kept_up = self.by_braked.push(if together { shown } else { f64::INFINITY }, t);
-        if trusted.is_finite() {
+        if let Some(trusted) = trusted.0 {
             self.all_slid = false;
             return free.min(trusted);
         }
@@ -217,7 +244,7 @@ impl SpeedBounds {
             return free.min(by_command);
         }
         // Below the peak of adhesion a wheel creeps without being seen, but that far only where adhesion is poor.
-        let creep = if sliding > 0 { limits.thresholds.creepage } else { 0.0 };
+        let creep = if sliding > 0 { limits.thresholds.rolling_creepage * SLIPPERY } else { 0.0 };
         let not_below = shown / (1.0 - creep);
         let not_above = kept_up / (1.0 - limits.thresholds.rolling_creepage * allowed.brake_effort);
         free.min(by_command.max(not_below)).min(not_above)
@@ -226,10 +253,11 @@ impl SpeedBounds {
     /// Whether both wheels have turned alike for long enough.
     fn together(&mut self, [first, second]: &[WheelBounds; 2], sliding: i32, t: f64) -> bool {
         let (least, part) = TOGETHER;
-        let known = first.turns.high.is_finite() && second.turns.high.is_finite();
+        let (one, both) = (first.is_asked() || second.is_asked(), first.is_asked() && second.is_asked());
         self.apart += (first.speed - second.speed - self.apart) * (t / SMOOTHED_S).min(1.0);
-        let alike = self.apart.abs() < least.max(part * first.speed);
-        self.together_for = if known && alike && sliding == 0 { self.together_for + t } else { 0.0 };
+        // A wheel whose fellow is not believed keeps up with nobody; it does so as long as it is not seen to slide.
+        let alike = !both || self.apart.abs() < least.max(part * first.speed);
+        self.together_for = if one && alike && sliding == 0 { self.together_for + t } else { 0.0 };
         self.together_for >= TOGETHER_S
     }
 }

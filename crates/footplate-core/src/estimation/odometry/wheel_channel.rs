@@ -2,8 +2,8 @@
 
 use super::command_watch::Allowed;
 use crate::wheels::{
-    CountWindows, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer, Vehicle, WheelTracker,
-    Wheelset,
+    Count, CountWindows, Direction, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer,
+    Vehicle, WheelReading, WheelTracker, Wheelset,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
@@ -18,6 +18,8 @@ const EVER: f64 = 40.0;
 const ROLLING: f64 = 2.5;
 const LOSING: f64 = 20.0;
 const REGAINING: f64 = 30.0;
+/// How long it counts which way a sensor said it turned (s): two wheels that start together say so within half of it.
+const SAID_S: f64 = 1.0;
 /// Readings before the tracker knows enough to be surprised.
 const WARM: u32 = 8;
 /// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
@@ -40,6 +42,9 @@ pub(super) struct WheelChannel {
     pub(super) missing_for: f64,
     /// By how many pulses its last count may be wrong.
     pub(super) doubt: f64,
+    doubt_before: f64,
+    /// Which way it last said it turned (1, −1, or 0 if it never did), and how long ago (s).
+    told: (f64, f64),
     tachometer: Tachometer,
     windows: CountWindows,
     readings: u32,
@@ -61,6 +66,8 @@ impl WheelChannel {
             smooth_acceleration: 0.0,
             missing_for: 0.0,
             doubt: 0.0,
+            doubt_before: 0.0,
+            told: (0.0, 0.0),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,
@@ -110,8 +117,11 @@ impl WheelChannel {
         let counted = self.pulses * self.pitch;
         self.doubt = turn.doubt;
         if turn.doubt.is_finite() {
-            self.windows.counted(now, self.pulses, turn.doubt);
+            // A row that was read late is short of nothing, but the next window may begin with it.
+            self.windows.counted(now, self.pulses, turn.doubt + self.doubt_before);
+            self.doubt_before = turn.doubt;
         } else {
+            self.doubt_before = 0.0;
             self.windows.counted(now, self.pulses, 0.0);
             self.windows.interrupt();
         }
@@ -130,6 +140,24 @@ impl WheelChannel {
         self.smooth_acceleration +=
             (self.tracker.acceleration() - self.smooth_acceleration) * (t / SMOOTHED_S).min(1.0);
         counted
+    }
+
+    /// Minds which way the sensor says it turned; says which way it lately did, 0 if it did not turn.
+    pub(super) fn says(&mut self, reading: &WheelReading, t: f64) -> f64 {
+        let (way, age) = &mut self.told;
+        *age += t;
+        let turned = matches!(reading.count, Count::Pulses(pulses) if pulses > 0);
+        let says = match reading.direction {
+            Direction::Forward => 1.0,
+            Direction::Backward => -1.0,
+            Direction::Unknown => 0.0,
+        };
+        if turned && says != 0.0 {
+            self.told = (says, 0.0);
+        } else if *age > SAID_S {
+            *way = 0.0;
+        }
+        self.told.0 * self.tachometer.wiring()
     }
 
     /// The first reading of a run: only a speed is known from it.
