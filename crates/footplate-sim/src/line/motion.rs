@@ -189,7 +189,8 @@ impl Motion {
     fn is_near_limit(&self, bogie: &Bogie) -> bool {
         let loaded =
             |(force, film): (&f64, &Film)| force.abs() > NEAR_LIMIT * film.friction * self.consist.load;
-        self.speed.abs() < SLOW_M_PER_S
+        let stands = self.speed == 0.0 && self.wheels.iter().all(|wheel| wheel.omega == 0.0);
+        (self.speed.abs() < SLOW_M_PER_S && !stands)
             || self.protection.is_active()
             || self.slip_control.is_active()
             || bogie.is_disturbed()

@@ -15,6 +15,8 @@ pub struct LineRun {
     pub truth: Vec<LineTruth>,
     /// What happened in between, in order.
     pub events: Vec<LineEvent>,
+    /// What the diameters of the measured wheelsets really are.
+    pub diameters: [Length; 2],
     /// Where its energy came from and went.
     pub energy: LineEnergy,
 }

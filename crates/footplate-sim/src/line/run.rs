@@ -218,7 +218,8 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
     }
     let mut energy = world.motion.energy;
     energy.gained_j = world.motion.moving() - begins_with;
-    LineRun { vehicle, samples, truth, events: diary.events, energy }
+    let diameters = radii.map(|radius| Length::from_m(2.0 * radius));
+    LineRun { vehicle, samples, truth, events: diary.events, diameters, energy }
 }
 
 /// Writes down what happens, when it changes.

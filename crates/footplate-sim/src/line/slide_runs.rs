@@ -66,7 +66,7 @@ pub(crate) fn both_to_a_lock(draws: &mut Draws) -> Setup {
     let speed = 5.45;
     let stages = vec![
         Stage::new(Keep(speed), Until::Time(LEAD_S - 0.6)),
-        Stage::new(At(-0.325), Until::Slower(0.0)),
+        Stage::new(At(-0.305), Until::Slower(0.0)),
         Stage::new(At(-0.4), Until::Time(1e9)),
     ];
     let low = Film::LOW.with_friction(draws.uniform(0.05..0.055));
@@ -112,8 +112,8 @@ pub(crate) fn common_creep(draws: &mut Draws) -> Setup {
         Stage::new(Keep(30.0), Until::Time(75.0)),
     ];
     stages.extend(stop(-0.5));
-    let worse = Film::WET.with_friction(draws.uniform(0.14..0.17));
-    let lay = Lay { ahead: 50.0, onset: draws.uniform(500.0..900.0), ..film(10.0, FAR_M, worse, LASTING) };
+    let worse = Film::WET.with_friction(draws.uniform(0.105..0.12));
+    let lay = Lay { ahead: 50.0, onset: draws.uniform(500.0..700.0), ..film(10.0, FAR_M, worse, LASTING) };
     Setup {
         powered: [true; 2],
         placement: Placement::OneBogie,

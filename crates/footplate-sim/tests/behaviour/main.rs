@@ -1,7 +1,11 @@
 //! What the simulated world promises, a file a promise.
 
 mod continuity;
+mod line_claims;
 mod line_journeys;
+mod line_same_seed;
+mod line_sensors;
+mod line_slides;
 mod oval;
 mod reports;
 mod same_seed;
