@@ -288,9 +288,12 @@ impl Driver {
         if speed <= target.speed {
             return Some(self.approach(target.speed - speed, response));
         }
-        // The command holds for a step, so that easing off looks one step ahead.
-        let after = speed + self.acceleration.min(0.0) * step.as_s();
-        let easing = libm::sqrt(2.0 * jerk * (after - target.speed).max(0.0)).max(LAST_BRAKING_M_PER_S2);
+        let easing = self.style.jerk.map_or(f64::INFINITY, |jerk| {
+            // The command holds for a step, so that easing off looks one step ahead.
+            let after = speed + self.acceleration.min(0.0) * step.as_s();
+            let gap = (after - target.speed).max(0.0);
+            libm::sqrt(2.0 * jerk.as_m_per_s3() * gap).max(LAST_BRAKING_M_PER_S2)
+        });
         Some(-needed(&target).min(easing))
     }
 

@@ -18,8 +18,8 @@ use super::tractive_effort::TractiveEffort;
 
 /// From a rail trolley to twice the heaviest train that ever ran (kg; 99 700 t in 2001).
 const MASSES_KG: [f64; 2] = [100.0, 2e8];
-/// Up to the longest train that ever ran (m; 7.35 km in 2001).
-const LENGTHS_M: [f64; 2] = [1.0, 8000.0];
+/// From a point, where nothing is known of the length, to the longest train that ever ran (m; 7.35 km in 2001).
+const LENGTHS_M: [f64; 2] = [0.0, 8000.0];
 /// From nothing to an unladen rack locomotive (Wende: up to 0.3 for locomotives).
 const ROTATING: [f64; 2] = [0.0, 0.5];
 /// More than any adhesion gives (m/s²).
