@@ -1,4 +1,4 @@
-//! `footplate convert`: any sensor log to Footplate's own form.
+//! `footplate convert`: a sensor log, a train or a line of any form to Footplate's own.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -6,33 +6,43 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use footplate_core::TrainId;
-use footplate_store::{LogContext, layout_named, write_sensor_log, write_whole};
+use footplate_store::{
+    Described, LogContext, layout_named, read_described, write_line, write_sensor_log, write_train,
+    write_whole,
+};
 use serde_json::json;
 
 use super::Outcome;
 use super::log_file::LogFile;
 use crate::counted::counted;
 
-/// Convert a sensor log of any form to Footplate's own.
+/// Convert a sensor log, a train or a line of any form to Footplate's own.
 ///
-/// Nothing is lost but what was odd, which is said on standard error: repeats, stale contacts and runs without a
-/// report are measurements like any other. docs/formats/sensor-log.md describes the forms.
+/// The end of the file's name tells what it is: a log ends in .csv, a full-size train or line in .json, .yaml or .toml.
+/// Of a log nothing is lost but what was odd, which is said on standard error: repeats, stale contacts and runs without
+/// a report are measurements like any other. docs/formats/sensor-log.md, docs/formats/train.md and
+/// docs/formats/line.md describe the forms.
 #[derive(Args)]
 #[command(
-    after_help = "Example: footplate convert testdata/sensor-logs/eadanila_2020_track_a.csv --out laps.csv"
+    after_help = "Examples: footplate convert testdata/sensor-logs/eadanila_2020_track_a.csv --out laps.csv
+          footplate convert testdata/trains/ttobench_CH_Stadler_FLIRT_TPF.json --out flirt.toml"
 )]
 pub(crate) struct Arguments {
-    /// The log.
-    log: PathBuf,
+    /// The log, train or line.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Whose sensors the log names: a built-in layout (track-a, track-b) or a layout file.
+    /// Whose sensors a log names: a built-in layout (track-a, track-b) or a layout file.
     #[arg(long, default_value = "track-a")]
     layout: String,
     /// The train of a log that names none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
+    /// Which of several trains or lines in a file.
+    #[arg(long, value_name = "ID")]
+    name: Option<String>,
     /// Report as JSON.
     #[arg(long)]
     json: bool,
@@ -40,12 +50,43 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let extension = self.file.extension().and_then(|end| end.to_str()).unwrap_or_default();
+        if ["json", "yaml", "yml", "toml"].contains(&extension.to_ascii_lowercase().as_str()) {
+            self.convert_described(output)
+        } else {
+            self.convert_log(output)
+        }
+    }
+
+    fn write(&self, text: &[u8]) -> anyhow::Result<()> {
+        write_whole(&self.out, text).with_context(|| format!("writing {}", self.out.display()))
+    }
+
+    fn convert_described(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let (form, kind, name, text) = match read_described(&self.file, self.name.as_deref())? {
+            Described::Train(file) => {
+                (file.form.name(), "train", file.train.name.clone(), write_train(&file.train, &file.about))
+            }
+            Described::Line(file) => {
+                (file.form.name(), "line", file.line.name().to_owned(), write_line(&file.line, &file.about))
+            }
+        };
+        self.write(text.as_bytes())?;
+        if self.json {
+            writeln!(output, "{}", json!({ "file": self.out, "form": form, kind: name }))?;
+        } else {
+            writeln!(output, "{}: {kind} {name}, from the form {form}", self.out.display())?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn convert_log(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let context = LogContext { sensors: &layout, train: self.train.map(TrainId) };
-        let recording = LogFile::read(&self.log, context)?.recording;
+        let recording = LogFile::read(&self.file, context)?.recording;
         let mut text = Vec::new();
         write_sensor_log(&recording, &layout, &mut text)?;
-        write_whole(&self.out, &text).with_context(|| format!("writing {}", self.out.display()))?;
+        self.write(&text)?;
         let events: usize = recording.runs.iter().map(|run| run.events.len()).sum();
         if self.json {
             let notes: Vec<String> = recording.notes.iter().map(ToString::to_string).collect();

@@ -127,6 +127,30 @@ fn a_damaged_store_says_so_and_is_salvaged() {
 }
 
 #[test]
+fn a_train_and_a_line_convert_to_the_own_form_and_that_to_itself() {
+    let folder = folder("convert-described");
+    let testdata = format!("{}/../../testdata", env!("CARGO_MANIFEST_DIR"));
+    for (file, says) in [
+        ("trains/trainruns_local.yaml", "train Regional Train, from the form railtoolkit-rolling-stock\n"),
+        ("lines/ttobench_CH_Fribourg_Bern.json", "line CH_Fribourg_Bern, from the form ttobench-track\n"),
+    ] {
+        let [own, again] =
+            ["own.toml", "again.toml"].map(|name| folder.join(name).to_str().unwrap().to_owned());
+        let run = footplate(&["convert", &format!("{testdata}/{file}"), "--out", &own]);
+        assert_eq!(run.status, 0, "{run:?}");
+        assert!(run.output.ends_with(&format!("own.toml: {says}")), "{run:?}");
+        let run = footplate(&["convert", &own, "--out", &again, "--json"]);
+        assert_eq!(run.status, 0, "{run:?}");
+        assert_eq!(fs::read(&own).unwrap(), fs::read(&again).unwrap());
+    }
+    let both = format!("{testdata}/lines/trainruns_const.yaml");
+    let out = folder.join("none.toml").to_str().unwrap().to_owned();
+    let failed = footplate(&["convert", &both, "--out", &out, "--name", "other"]);
+    assert!(failed.status == 2 && failed.errors.contains("there is no `other` in the file"), "{failed:?}");
+    assert!(!folder.join("none.toml").exists());
+}
+
+#[test]
 fn a_log_converts_to_the_own_form_and_that_to_itself() {
     let folder = folder("convert");
     let [own, again] = ["own.csv", "again.csv"].map(|name| folder.join(name).to_str().unwrap().to_owned());
