@@ -9,7 +9,7 @@
 #   bare-metal   core and wire link into a program that has no std
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
 #   examples     the numbered examples print what is committed in testdata/examples
-#   scenarios    the tables in docs/tables are what the program prints
+#   scenarios    the tables in docs/tables are what the program and its examples print
 #   browser      a report opens in a browser: every chart drawn, dark and light, on a phone, by keyboard
 #
 # And one that changes files, never part of "every step":
@@ -126,17 +126,22 @@ refresh_example() {
   mv "$TARGET/$1.txt" "$EXPECTED_EXAMPLES/$1.txt"
 }
 
-# Calls $1 with the name of each table and the arguments of the program that print it, which the tests built already.
+# Calls $1 with the name of each table and what prints it: arguments of the program, or an example and its name. The
+# tests built both already.
 each_table() {
-  cargo build --quiet --workspace --bins --profile test
+  cargo build --quiet --workspace --bins --examples --profile test
   "$1" prediction predict testdata/sensor-logs/*.csv --layout track-a --markdown
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
+  "$1" running-times example running_times
 }
 
 # What is odd in the logs is said in testdata/sensor-logs/README.md.
 print_table() {
   shift
-  "$TARGET/debug/footplate" "$@" 2>/dev/null
+  case $1 in
+    example) print_example "$2" ;;
+    *) "$TARGET/debug/footplate" "$@" 2>/dev/null ;;
+  esac
 }
 
 check_table() {
@@ -145,7 +150,7 @@ check_table() {
     echo "table $1 is no longer what is committed; if the new one is right: ./ci.sh expected"
     return 1
   fi
-  echo "table $1 is what the program prints"
+  echo "table $1 is what is printed"
 }
 
 step_scenarios() {

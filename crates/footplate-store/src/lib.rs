@@ -8,7 +8,10 @@ mod batch;
 mod calibration_file;
 mod content_hash;
 mod decimal;
+mod described;
+mod document;
 mod layout_file;
+mod line_file;
 pub mod odometry;
 mod published_table;
 mod recording;
@@ -18,6 +21,7 @@ mod sensor_names;
 mod store;
 mod table;
 mod tachometer;
+mod train_file;
 mod vehicle_file;
 mod whole_file;
 
@@ -28,11 +32,14 @@ pub use calibration_file::{
     TrainForm,
 };
 pub use content_hash::{ContentHash, HashingReader};
+pub use described::{Described, parse_described, read_described};
+pub use document::{DocumentError, DocumentProblem, LARGEST_DOCUMENT};
 pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
     LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
     layout_named, parse_layout, read_layout, write_layout,
 };
+pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
 pub use published_table::{
     CheckedFigure, CountedFrom, CrossCheck, NothingToCompare, PublishedFigure, PublishedQuantity,
     PublishedTableError, TeamSummary, read_published_table,
@@ -51,6 +58,7 @@ pub use tachometer::{
     RowPlace, TachometerBlock, TachometerColumns, TachometerError, TachometerNote, TachometerOddity,
     TachometerReader, TimeFaults, Truth,
 };
+pub use train_file::{TrainFile, TrainFileForm, parse_train, read_train, write_train};
 pub use vehicle_file::{
     DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,
     parse_vehicle, read_vehicle, write_vehicle,

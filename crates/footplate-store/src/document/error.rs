@@ -1,0 +1,156 @@
+//! Why a description of a train or a line could not be read: where, what stands there and what would be right.
+
+use std::io;
+
+use footplate_sim::line::{LineError, TrainError};
+
+use super::node::Place;
+use crate::layout_file::TextPlace;
+
+/// A value and what is wrong with it, before the file has its name.
+pub(crate) type Fault = (Place, DocumentProblem);
+
+/// A description of a train or a line that could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DocumentError {
+    /// The file could not be opened or read.
+    #[error("{file}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// More bytes than any train or line has.
+    #[error("{file}: the file is longer than {limit} bytes; is it a train or a line?")]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// The most that is read.
+        limit: usize,
+    },
+    /// Bytes that are no UTF-8.
+    #[error("{place}: no UTF-8 text; save the file as UTF-8")]
+    NotText {
+        /// Where.
+        place: TextPlace,
+    },
+    /// A name that does not tell how to read the file.
+    #[error("{file}: its name should end in .toml (Footplate's own form), .json or .yaml")]
+    Syntax {
+        /// The file.
+        file: String,
+    },
+    /// Something in the text is wrong.
+    #[error("{place}: {problem}")]
+    Wrong {
+        /// Where.
+        place: TextPlace,
+        /// What.
+        problem: DocumentProblem,
+    },
+}
+
+impl DocumentError {
+    /// The error of a fault in a file.
+    pub(crate) fn wrong(file: &str, (place, problem): Fault) -> Self {
+        let Place { line, column } = place;
+        Self::Wrong { place: TextPlace { file: file.to_owned(), line, column }, problem }
+    }
+}
+
+/// What is wrong with the text of a description.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DocumentProblem {
+    /// It is no TOML, JSON or YAML.
+    #[error("{0}")]
+    Syntax(String),
+    /// A part of YAML that no description needs.
+    #[error("{what} are not read; write the value itself")]
+    NotRead {
+        /// Which part.
+        what: &'static str,
+    },
+    /// Deeper than any description.
+    #[error("more than {limit} levels of nesting; a train or a line has a handful")]
+    TooDeep {
+        /// The most that is read.
+        limit: usize,
+    },
+    /// A key said twice.
+    #[error("`{key}` stands here a second time; which one holds?")]
+    KeyTwice {
+        /// The key.
+        key: String,
+    },
+    /// A key that means nothing here.
+    #[error("`{key}` is no key of {of}; its keys are {known}")]
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// What it is a part of.
+        of: String,
+        /// What would be right.
+        known: String,
+    },
+    /// A key that cannot be done without.
+    #[error("{of} lacks `{key}`")]
+    MissingKey {
+        /// The key.
+        key: String,
+        /// What lacks it.
+        of: String,
+    },
+    /// A value of another kind.
+    #[error("{what} is {found}; it should be {expected}")]
+    Kind {
+        /// What it is the value of.
+        what: String,
+        /// What stands there.
+        found: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// A number that no railway has.
+    #[error("{what} is {value}; it should lie between {lowest} and {highest}")]
+    Range {
+        /// What it is the value of.
+        what: String,
+        /// The value.
+        value: f64,
+        /// The least it can be.
+        lowest: f64,
+        /// The most it can be.
+        highest: f64,
+    },
+    /// Neither a train nor a line of any form that is read.
+    #[error("this is {found}; {expected}")]
+    Form {
+        /// What was found.
+        found: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A file with several trains or lines, of which none was named.
+    #[error("the file describes {found}; say which one")]
+    Which {
+        /// Their names.
+        found: String,
+    },
+    /// A file without the train or line that was named.
+    #[error("there is no `{wanted}` in the file, which describes {found}")]
+    NotThere {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        found: String,
+    },
+    /// It is no train.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    /// It is no line.
+    #[error(transparent)]
+    Line(#[from] LineError),
+}

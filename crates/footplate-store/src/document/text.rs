@@ -1,0 +1,59 @@
+//! The bytes of a document, and the syntax its name tells.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::error::DocumentError;
+use super::node::Node;
+use super::{toml_tree, yaml_tree};
+use crate::layout_file::TextPlace;
+
+/// The largest description that is read, in bytes: a hundred times the longest line at hand.
+pub const LARGEST_DOCUMENT: usize = 1024 * 1024;
+
+/// How a document is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Syntax {
+    Toml,
+    /// YAML, and JSON as a part of it.
+    Yaml,
+}
+
+impl Syntax {
+    /// The syntax that the end of a file's name tells.
+    fn of(file: &str) -> Option<Self> {
+        let extension = Path::new(file).extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "toml" => Some(Self::Toml),
+            "json" | "yaml" | "yml" => Some(Self::Yaml),
+            _ => None,
+        }
+    }
+}
+
+/// The bytes of the file at `path`, one more than are read at most.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, DocumentError> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|input| input.take(LARGEST_DOCUMENT as u64 + 1).read_to_end(&mut bytes))
+        .map_err(|source| DocumentError::Read { file: path.display().to_string(), source })?;
+    Ok(bytes)
+}
+
+/// The tree of a document, and its syntax, which the end of the file's name tells.
+pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<(Syntax, Node), DocumentError> {
+    let syntax = Syntax::of(file).ok_or_else(|| DocumentError::Syntax { file: file.to_owned() })?;
+    if bytes.len() > LARGEST_DOCUMENT {
+        return Err(DocumentError::TooLarge { file: file.to_owned(), limit: LARGEST_DOCUMENT });
+    }
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+        DocumentError::NotText { place: TextPlace::of_byte(file, &before, before.len()) }
+    })?;
+    let tree = match syntax {
+        Syntax::Toml => toml_tree::tree(text),
+        Syntax::Yaml => yaml_tree::tree(text),
+    };
+    tree.map(|node| (syntax, node)).map_err(|fault| DocumentError::wrong(file, fault))
+}

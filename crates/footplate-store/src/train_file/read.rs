@@ -1,0 +1,53 @@
+//! Reads a train of any form.
+
+use std::path::Path;
+
+use super::form::{TrainFile, TrainFileForm};
+use super::{osrd, own, trainruns, ttobench};
+use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
+
+/// Reads the train in the file at `path`; `which` names one of several.
+///
+/// # Errors
+/// What is wrong with it, with file, line and column.
+pub fn read_train(path: &Path, which: Option<&str>) -> Result<TrainFile, DocumentError> {
+    parse_train(&path.display().to_string(), &read_bytes(path)?, which)
+}
+
+/// Reads a train from the bytes of a file. `file` is what messages call it; its end tells the syntax.
+///
+/// # Errors
+/// As [`read_train`].
+pub fn parse_train(file: &str, bytes: &[u8], which: Option<&str>) -> Result<TrainFile, DocumentError> {
+    let (syntax, node) = parse(file, bytes)?;
+    let read = match form_of(syntax, &node) {
+        Some(TrainFileForm::Own) => own::read(&node),
+        Some(TrainFileForm::TtoBench) => ttobench::read(&node),
+        Some(TrainFileForm::TrainRuns) => trainruns::read(&node, which),
+        Some(TrainFileForm::Osrd) => osrd::read(&node),
+        None => Err((
+            node.place,
+            DocumentProblem::Form {
+                found: node.described(),
+                expected: "a train has `effort_curves` (OSRD), `max traction force` (TTOBench) or `vehicles` \
+                           (railtoolkit), or is in Footplate's own form, in TOML",
+            },
+        )),
+    };
+    read.map_err(|fault| DocumentError::wrong(file, fault))
+}
+
+/// The form of a train's document; `None` if it is no train.
+pub(crate) fn form_of(syntax: Syntax, node: &Node) -> Option<TrainFileForm> {
+    let table = Table::of(node, "a train").ok()?;
+    let forms = [
+        ("effort_curves", TrainFileForm::Osrd),
+        ("max traction force", TrainFileForm::TtoBench),
+        ("vehicles", TrainFileForm::TrainRuns),
+        ("trains", TrainFileForm::TrainRuns),
+    ];
+    match syntax {
+        Syntax::Toml => table.get("speed_limits_km_h").is_none().then_some(TrainFileForm::Own),
+        Syntax::Yaml => forms.into_iter().find(|(key, _)| table.get(key).is_some()).map(|(_, form)| form),
+    }
+}
