@@ -1,13 +1,15 @@
 //! What Footplate's own operations cost, and what public crates that do the same cost beside them.
 //!
 //! - [`Operation`] is one thing to time: a body that does it so many times, with input that varies.
-//! - [`profiles`] lists the operations on motion profiles, [`replays`] those on recordings. Another subject is another such list, a file in
+//! - [`profiles`] lists the operations on motion profiles, [`odometry`] those on tachometer counts, [`replays`] those
+//!   on recordings. Another subject is another such list, a file in
 //!   `benches/` that runs it, and a line in [`everything`].
 //! - [`contest`] runs the operations of one group in turns and prints what each takes, as a ratio to the first.
 //! - The program `once` does one operation so many times and nothing else, for an instruction counter:
 //!   `crates/footplate-bench/instructions.sh` prints instructions per operation.
 
 pub mod contest;
+pub mod odometry;
 pub mod operation;
 pub mod profiles;
 pub mod replays;
@@ -17,5 +19,5 @@ pub use operation::Operation;
 /// Every operation there is.
 #[must_use]
 pub fn everything() -> Vec<Operation> {
-    profiles::operations().into_iter().chain(replays::operations()).collect()
+    [profiles::operations(), odometry::operations(), replays::operations()].into_iter().flatten().collect()
 }
