@@ -16,7 +16,7 @@
 //! draws
 //! ```
 //!
-//! Full-size trains on full-size lines are a world of their own, in [`line`].
+//! Full-size trains on full-size lines are a world of their own, in [`mod@line`].
 
 mod circuit;
 mod contacts;

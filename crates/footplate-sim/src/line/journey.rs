@@ -11,6 +11,8 @@ use super::train::{Train, TrainError};
 
 /// A run that takes longer than two days is none (s).
 const LONGEST_S: f64 = 2.0 * 86_400.0;
+/// More moments than any use has for them (half a gigabyte).
+const MOST_MOMENTS: usize = 10_000_000;
 /// Steps between which a run can be computed (ms).
 const STEPS_MS: [i64; 2] = [1, 1000];
 
@@ -58,7 +60,7 @@ pub struct Work {
 /// A run from the first stop of a line to the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Journey {
-    /// One moment a step, and the last.
+    /// One moment a step while the train moves; of a stop the first and the last.
     pub moments: Vec<Moment>,
     /// The stops, from the first to the last.
     pub calls: Vec<Call>,
@@ -114,7 +116,13 @@ impl Journey {
                 train.acceleration(command.force_n, line_n, state.speed)
             };
             let State { front, speed } = state;
-            run.moments.push(Moment { time, front, speed, acceleration, phase: command.phase });
+            let moment = Moment { time, front, speed, acceleration, phase: command.phase };
+            match run.moments.as_mut_slice() {
+                [.., before, last] if stands && before.phase == Phase::Standing && before.front == front => {
+                    *last = moment;
+                }
+                _ => run.moments.push(moment),
+            }
             if driver.has_arrived() {
                 return Ok(run);
             }
@@ -124,6 +132,9 @@ impl Journey {
                     pulls_n: command.force_n,
                     needs_n: line_n + train.resistance.at(speed),
                 });
+            }
+            if run.moments.len() > MOST_MOMENTS {
+                return Err(JourneyError::TooManySteps { step_s: step.as_s(), at_m: front.as_m() });
             }
             if time.as_s() > LONGEST_S {
                 return Err(JourneyError::TooSlow { at_m: front.as_m() });
@@ -216,6 +227,16 @@ pub enum JourneyError {
         pulls_n: f64,
         /// What holds it.
         needs_n: f64,
+    },
+    /// A run of more steps than are kept.
+    #[error(
+        "after {MOST_MOMENTS} steps of {step_s} s the train is at {at_m:.0} m; take longer ones, up to 1 s"
+    )]
+    TooManySteps {
+        /// The step.
+        step_s: f64,
+        /// Where.
+        at_m: f64,
     },
     /// The train is still on its way after two days.
     #[error("after two days the train is at {at_m:.0} m; can it climb what lies there?")]

@@ -101,7 +101,7 @@ impl Stepped {
         starts.sort_by(f64::total_cmp);
         starts.dedup();
         let least = |start: f64| {
-            let first = self.starts.iter().skip(1).take_while(|end| **end + behind <= start).count();
+            let first = self.starts[1..].partition_point(|end| end + behind <= start);
             let last = self.index(start);
             self.values[first.min(last)..=last].iter().copied().fold(f64::INFINITY, f64::min)
         };

@@ -128,6 +128,43 @@ fn jerk_stays_within_what_the_driver_was_given() {
 }
 
 #[test]
+fn a_gentle_driver_uses_the_share_that_was_asked_for() {
+    let level = line(&[(0.0, 9.0)], &[], &[0.0, 1000.0]);
+    let frictionless = Train { resistance: Resistance::default(), ..train() };
+    let strongest = |train: &Train, style: Style| {
+        let run = Journey::run(train, &level, style, STEP).unwrap();
+        let accelerations = run.moments.iter().map(|moment| moment.acceleration.as_m_per_s2());
+        accelerations.fold([0.0_f64; 2], |[most, least], a| [most.max(a), least.min(a)])
+    };
+    // 100 kN and 0.8 m/s² of 110 t: half of the pull, three quarters of the brake.
+    let (traction, braking) = (Ratio::from_parts(0.5), Ratio::from_parts(0.75));
+    let [pulled, braked] = strongest(&frictionless, Style { traction, braking, ..Style::FASTEST });
+    assert!((pulled - 0.5 / 1.1).abs() < 1e-9, "{pulled}");
+    assert!((braked + 0.6).abs() < 0.01, "{braked}");
+    // The builder's limit holds however much there is to pull with.
+    let limited = Train { max_acceleration: Some(Acceleration::from_m_per_s2(0.3)), ..frictionless };
+    let [pulled, _] = strongest(&limited, Style::FASTEST);
+    assert!((pulled - 0.3).abs() < 1e-9, "{pulled}");
+}
+
+#[test]
+fn of_a_long_stop_the_first_and_the_last_moment_are_kept() {
+    let long = LineProfile::new(LineParts {
+        name: "night".to_owned(),
+        speed_limits: vec![(place(0.0), Speed::from_m_per_s(20.0))],
+        stops: vec![stop(0.0, 0.0), stop(500.0, 8.0 * 3600.0), stop(1000.0, 0.0)],
+        ..LineParts::default()
+    });
+    let run = Journey::run(&train(), &long.unwrap(), Style::FASTEST, STEP).unwrap();
+    let night =
+        run.moments.iter().filter(|moment| moment.phase == Phase::Standing && moment.front > place(400.0));
+    let times: Vec<_> = night.take(2).map(|moment| moment.time).collect();
+    let call = run.calls[1];
+    assert_eq!(times, [call.arrives, call.departs - STEP]);
+    assert_eq!((call.departs - call.arrives).as_s(), 8.0 * 3600.0);
+}
+
+#[test]
 fn who_coasts_takes_longer_and_uses_less() {
     let level = line(&[(0.0, 22.0)], &[], &[0.0, 3000.0]);
     let held = Journey::run(&train(), &level, Style::FASTEST, STEP).unwrap();
