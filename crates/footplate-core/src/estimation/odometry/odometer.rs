@@ -8,9 +8,10 @@ use super::command_watch::{Allowed, CommandWatch};
 use super::distance_bounds::{Counted, DistanceBounds};
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
 use super::settings::OdometrySettings;
+use super::recent::Recent;
 use super::speed_bounds::{Limits, SpeedBounds, WheelBounds};
 use super::train_filter::TrainFilter;
-use super::virtual_sensor::VirtualSensor;
+use super::virtual_sensor::{Envelope, VirtualSensor};
 use super::wheel_channel::WheelChannel;
 use crate::units::{Acceleration, Length, Speed};
 use crate::wheels::{
@@ -35,6 +36,8 @@ const BLIND_JERK: f64 = 0.1;
 const APART: (f64, f64) = (0.25, 0.004);
 /// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
 const CREEPING_SHARE: f64 = 0.05;
+/// How long a slide can set in gently before it is seen (s).
+const SET_IN_S: f64 = 0.8;
 /// Wheels silent for longer in a slide are locked (s).
 const LOCKED_S: f64 = 0.15;
 
@@ -59,6 +62,8 @@ pub struct Odometer {
     /// How far the counts put the train ahead of where the filter believes it (m).
     ahead: f64,
     blind: f64,
+    /// The largest speed lately, counted from a line that falls as in a slide (m/s).
+    lately: Recent,
 }
 
 impl Odometer {
@@ -170,6 +175,7 @@ impl Odometer {
             distance: 0.0,
             ahead: 0.0,
             blind: 0.0,
+            lately: Recent::new(f64::NEG_INFINITY, SET_IN_S),
         }
     }
 
@@ -216,6 +222,11 @@ impl Odometer {
             self.blind = 0.0;
         } else {
             way = self.stand_in(lost, before, t);
+        }
+        if self.stand_in.is_none() {
+            // Where it would be now had it fallen as in a slide since then.
+            let correction = self.vehicle.thresholds.correction.as_m_per_s2();
+            self.lately.push(self.train.v + correction * self.clock, t);
         }
         let kept = bounded.nearest(self.train.v);
         if kept != self.train.v {
@@ -371,15 +382,25 @@ impl Odometer {
         let thresholds = self.vehicle.thresholds;
         let limit = self.vehicle.max_traction.as_m_per_s2();
         let envelope = self.settings.envelope;
+        // A slide that sets in gently has pulled the estimate along before it is seen.
+        let begins_at = match (kind, envelope) {
+            (Loss::Slide, Envelope::Touches) => before.max(self.lately.largest() - thresholds.correction.as_m_per_s2() * self.clock),
+            _ => before,
+        };
         let sensor = self
             .stand_in
-            .get_or_insert_with(|| VirtualSensor::new(kind, before, limit, envelope, thresholds));
+            .get_or_insert_with(|| VirtualSensor::new(kind, begins_at, limit, envelope, thresholds));
         let [a, b] = &self.wheels;
         let none = match kind {
             Loss::Slide => f64::NEG_INFINITY,
             Loss::Spin => f64::INFINITY,
         };
-        let speeds = [a, b].map(|wheel| if wheel.is_read() { wheel.tracker.speed() } else { none });
+        let rate = sensor.rate();
+        let speeds = [a, b].map(|wheel| match (wheel.is_read(), kind, envelope) {
+            (false, ..) => none,
+            (true, Loss::Slide, Envelope::Touches) => wheel.steady_speed(rate),
+            (true, ..) => wheel.tracker.speed(),
+        });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
         let speed = sensor.next(speeds, locked, t);
         self.train.v = speed;

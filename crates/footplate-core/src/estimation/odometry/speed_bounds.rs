@@ -12,6 +12,7 @@
 //! slides are never alike.
 
 use super::command_watch::Allowed;
+use super::recent::Recent;
 use crate::wheels::{Axle, Loss, Range, Thresholds};
 
 /// How far back the bound goes for one that is still sound when a slide or slip is seen (s): longer than any
@@ -46,38 +47,6 @@ pub(super) struct WheelBounds {
 pub(super) struct Limits {
     pub(super) thresholds: Thresholds,
     pub(super) independent: bool,
-}
-
-/// The extreme of a number within the last moments, from two halves that take turns.
-#[derive(Debug, Clone, Copy)]
-struct Recent {
-    now: f64,
-    before: f64,
-    age: f64,
-    half: f64,
-}
-
-impl Recent {
-    const fn new(value: f64, half: f64) -> Self {
-        Self { now: value, before: value, age: 0.0, half }
-    }
-
-    const fn largest(&self) -> f64 {
-        self.now.max(self.before)
-    }
-
-    /// Takes in a value, larger ones count.
-    fn push(&mut self, value: f64, t: f64) -> f64 {
-        self.age += t;
-        if self.age > self.half {
-            self.before = self.now;
-            self.now = value;
-            self.age = 0.0;
-        } else {
-            self.now = self.now.max(value);
-        }
-        self.largest()
-    }
 }
 
 /// The bound on which every wheel asked agrees, so that one sensor that is wrong cannot break it.

@@ -185,6 +185,14 @@ impl WheelChannel {
         self.windows.speed(self.pitch_range, acceleration)
     }
 
+    /// How fast it turns by its last counts alone (m/s), moved to now with an acceleration (m/s²). The tracker is quicker,
+    /// but overshoots when a wheel that regains its grip stops accelerating.
+    pub(super) fn steady_speed(&self, acceleration: f64) -> f64 {
+        self.windows
+            .mean_speed(self.pitch)
+            .map_or(self.tracker.speed(), |(speed, age)| speed + acceleration * age)
+    }
+
     /// The train has turned round.
     pub(super) fn reverse(&mut self) {
         self.tracker.reverse();
