@@ -71,6 +71,12 @@ impl SensorWatch {
         self.doubted || self.excluded
     }
 
+    /// It agrees with the other sensor for so long that it is believed.
+    pub fn believe(&mut self) {
+        self.excluded = false;
+        self.doubted = false;
+    }
+
     /// Takes in one period of `t` seconds.
     pub fn look(&mut self, shown: &Shown, t: f64) {
         let same = shown.pulses == self.last;

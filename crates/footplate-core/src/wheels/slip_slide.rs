@@ -216,7 +216,9 @@ impl SlipSlide {
         let difference = first.speed - second.speed;
         let [first_own, second_own] = own;
         let nothing = [None, None];
-        if !(first.read && second.read) || difference.abs() <= apart {
+        // A wheel that regains its grip overshoots; beside it the other one only seems to slide.
+        let regaining = self.policy == BothAxles::OnlyIfUndetermined && self.lost != [None; 2];
+        if regaining || !(first.read && second.read) || difference.abs() <= apart {
             return nothing;
         }
         let loss = match (train.slide, train.slip, latched) {

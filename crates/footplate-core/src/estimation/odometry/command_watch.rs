@@ -10,6 +10,8 @@ const COASTING: f64 = 0.02;
 /// How long after the brake is let go a wheel may still slide (s): 1 s for the cylinder to empty, 1 s for the wheel to
 /// be turned up, by 10 m/s² and more on the poorest rail seen.
 const LET_GO_BRAKE_S: f64 = 2.0;
+/// The same for a wheel that does slide as the brake is let go (s): it has to be turned up from far below.
+const LET_GO_SLIDING_S: f64 = 5.0;
 /// How long after traction ends a wheel may still slip (s): as for the brake, motors let go faster.
 const LET_GO_TRACTION_S: f64 = 1.5;
 /// How long full traction or full brake takes to fade (s): by 0.5 m/s³, the comfort limit of passenger trains.
@@ -73,14 +75,23 @@ impl CommandWatch {
     }
 
     /// The command of the next `t` seconds; where it is not recorded, `seen` tells it: how all wheels accelerate.
-    pub(super) fn next(&mut self, effort: Option<f64>, seen: f64, t: f64, vehicle: &Vehicle) -> Allowed {
+    /// `held` if a wheel slides now.
+    pub(super) fn next(
+        &mut self,
+        effort: Option<f64>,
+        seen: f64,
+        held: bool,
+        t: f64,
+        vehicle: &Vehicle,
+    ) -> Allowed {
         let (braking, traction) = match effort {
             Some(effort) => (effort < -COASTING, effort > COASTING),
             None => (seen < -BY_ITSELF, seen > BY_ITSELF),
         };
         self.since_brake = if braking { 0.0 } else { self.since_brake + t };
         self.since_traction = if traction { 0.0 } else { self.since_traction + t };
-        let slide = self.since_brake < LET_GO_BRAKE_S;
+        let let_go = if held { LET_GO_SLIDING_S } else { LET_GO_BRAKE_S };
+        let slide = self.since_brake < let_go;
         let slip = self.since_traction < LET_GO_TRACTION_S;
         self.disproved &= slide;
 

@@ -9,6 +9,7 @@ mod covariance;
 mod current_statistical;
 mod distance_bounds;
 mod federated_filter;
+mod ground_touch;
 pub mod inertial;
 mod local_filter;
 mod manoeuvre;

@@ -7,11 +7,11 @@
 use super::command_watch::{Allowed, CommandWatch};
 use super::distance_bounds::{Counted, DistanceBounds};
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
-use super::settings::OdometrySettings;
 use super::recent::Recent;
+use super::settings::OdometrySettings;
 use super::speed_bounds::{Limits, SpeedBounds, WheelBounds};
 use super::train_filter::TrainFilter;
-use super::virtual_sensor::{Envelope, VirtualSensor};
+use super::virtual_sensor::{Envelope, LostWheel, VirtualSensor};
 use super::wheel_channel::WheelChannel;
 use crate::units::{Acceleration, Length, Speed};
 use crate::wheels::{
@@ -36,6 +36,11 @@ const BLIND_JERK: f64 = 0.1;
 const APART: (f64, f64) = (0.25, 0.004);
 /// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
 const CREEPING_SHARE: f64 = 0.05;
+/// How closely two wheels have to turn alike to be believed against everything else (m/s, part of the speed) ...
+const ALIKE: (f64, f64) = (0.2, 0.006);
+/// ... and for how long (s), with nothing holding them back or driving them, and otherwise.
+const ALIKE_FREE_S: f64 = 1.0;
+const ALIKE_HELD_S: f64 = 2.5;
 /// How long a slide can set in gently before it is seen (s).
 const SET_IN_S: f64 = 0.8;
 /// Wheels silent for longer in a slide are locked (s).
@@ -62,6 +67,8 @@ pub struct Odometer {
     /// How far the counts put the train ahead of where the filter believes it (m).
     ahead: f64,
     blind: f64,
+    /// How long both wheels have turned alike (s).
+    alike_for: f64,
     /// The largest speed lately, counted from a line that falls as in a slide (m/s).
     lately: Recent,
 }
@@ -175,6 +182,7 @@ impl Odometer {
             distance: 0.0,
             ahead: 0.0,
             blind: 0.0,
+            alike_for: 0.0,
             lately: Recent::new(f64::NEG_INFINITY, SET_IN_S),
         }
     }
@@ -187,7 +195,8 @@ impl Odometer {
             let (a, b) = (first.smooth_acceleration, second.smooth_acceleration);
             if a.min(b) < -a.max(b) { a.min(b) } else { a.max(b) }
         };
-        let allowed = self.command.next(effort, seen, t, &self.vehicle);
+        let held = self.slips.lost().contains(&Some(Loss::Slide));
+        let allowed = self.command.next(effort, seen, held, t, &self.vehicle);
         // One forward and the other backward: then neither says that the train has turned round.
         let disputed = {
             let [first, second] = &mut self.wheels;
@@ -208,7 +217,14 @@ impl Odometer {
         let before = self.train.v;
         let jerk = if self.stand_in.is_some() { BLIND_JERK } else { self.settings.jerk_density };
         let mut way = self.train.run(t, jerk);
-        let lost = self.judge(&turns, possible, &allowed, t);
+        let mut lost = self.judge(&turns, possible, &allowed, t);
+        if self.agreed(&allowed, t) {
+            self.slips.clear();
+            for wheel in &mut self.wheels {
+                wheel.watch.believe();
+            }
+            lost = [None; 2];
+        }
         if lost == [Some(Loss::Slide); 2] {
             self.command.disprove();
         }
@@ -293,6 +309,22 @@ impl Odometer {
             wheel.watch.look(&shown, t);
         }
         lost
+    }
+
+    /// Whether both wheels have turned alike and smoothly for so long that they roll, whatever was thought of them.
+    fn agreed(&mut self, allowed: &Allowed, t: f64) -> bool {
+        let [first, second] = &self.wheels;
+        let counted = first.is_counted() && second.is_counted();
+        let apart = (first.tracker.speed() - second.tracker.speed()).abs();
+        let (noise, part) = ALIKE;
+        let alike = apart < noise + part * first.tracker.speed().abs();
+        let harder = self.vehicle.max_brake.as_m_per_s2().max(self.vehicle.max_traction.as_m_per_s2());
+        let smooth = [first, second].iter().all(|wheel| wheel.smooth_acceleration.abs() < harder);
+        let turning = first.pulses != 0.0 && second.pulses != 0.0;
+        self.alike_for = if counted && alike && smooth && turning { self.alike_for + t } else { 0.0 };
+        let held_back = allowed.slide || allowed.slip;
+        self.alike_for > if held_back { ALIKE_HELD_S } else { ALIKE_FREE_S }
+            && (self.vehicle.independent || !held_back)
     }
 
     fn narrow(
@@ -384,25 +416,26 @@ impl Odometer {
         let envelope = self.settings.envelope;
         // A slide that sets in gently has pulled the estimate along before it is seen.
         let begins_at = match (kind, envelope) {
-            (Loss::Slide, Envelope::Touches) => before.max(self.lately.largest() - thresholds.correction.as_m_per_s2() * self.clock),
+            (Loss::Slide, Envelope::Touches) => {
+                before.max(self.lately.largest() - thresholds.correction.as_m_per_s2() * self.clock)
+            }
             _ => before,
         };
         let sensor = self
             .stand_in
             .get_or_insert_with(|| VirtualSensor::new(kind, begins_at, limit, envelope, thresholds));
         let [a, b] = &self.wheels;
-        let none = match kind {
-            Loss::Slide => f64::NEG_INFINITY,
-            Loss::Spin => f64::INFINITY,
-        };
         let rate = sensor.rate();
-        let speeds = [a, b].map(|wheel| match (wheel.is_read(), kind, envelope) {
-            (false, ..) => none,
-            (true, Loss::Slide, Envelope::Touches) => wheel.steady_speed(rate),
-            (true, ..) => wheel.tracker.speed(),
+        let wheels = [a, b].map(|wheel| LostWheel {
+            speed: match envelope {
+                Envelope::Fixed => wheel.tracker.speed(),
+                Envelope::Touches => wheel.steady_speed(rate),
+            },
+            acceleration: wheel.tracker.acceleration(),
+            read: wheel.is_read(),
         });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
-        let speed = sensor.next(speeds, locked, t);
+        let speed = sensor.next(wheels, locked, t);
         self.train.v = speed;
         self.train.a = sensor.rate();
         0.5 * (before + speed) * t

@@ -29,7 +29,16 @@ pub(super) struct TouchLine {
 impl TouchLine {
     /// A line that begins at time 0 with this speed (m/s) and probably falls like this (m/s²).
     pub(super) fn from(speed: f64, prior: f64) -> Self {
-        Self { prior, at: 0.0, w: BEGINNING, wt: 0.0, wv: BEGINNING * speed, wtt: 0.0, wtv: 0.0, slope: prior }
+        Self {
+            prior,
+            at: 0.0,
+            w: BEGINNING,
+            wt: 0.0,
+            wv: BEGINNING * speed,
+            wtt: 0.0,
+            wtv: 0.0,
+            slope: prior,
+        }
     }
 
     /// How fast the speed changes (m/s²).

@@ -2,12 +2,14 @@
 //!
 //! Letters: `v` corrected speed, `a` how fast it is made to fall (or rise), `u` speeds of the wheels. In a slide
 //! `v ← max(v + aT, u₁, u₂)`: a lower envelope that the wheels push up whenever they touch the speed of the train as
-//! the anti-slide lets them go; in a spin the mirror image.
+//! the anti-slide lets them go; in a spin the mirror image, which is the same with all speeds negated.
 //!
 //! The paper takes one `a` for good. But every touch is a measurement of the speed, and the line through the touches is
-//! how fast the train really slows down (`Touches`). The envelope follows that line a little too steeply, so that the
-//! next touch can correct it; one that is too shallow is never touched again. If none comes for long, it gets steeper.
+//! how fast the train really slows down ([`Envelope::Touches`]). The envelope follows that line a little too steeply, so
+//! that the next touch can correct it. A wheel that was turned up hard and then goes on level *has* reached the train,
+//! whether above the envelope or below it: nothing else stops it there.
 
+use super::ground_touch::GroundTouch;
 use super::touch_line::TouchLine;
 use crate::wheels::{Loss, Thresholds};
 
@@ -22,25 +24,43 @@ pub enum Envelope {
 
 /// By how much steeper than the line through the touches the envelope falls (m/s²).
 const STEEPER: f64 = 0.06;
-/// Slides are touched every 3 to 4 s where wheels are let go to find the ground speed; after so long without a touch (s)
-/// the envelope may be too shallow ...
-const TOUCH_DUE_S: f64 = 5.0;
+/// Slides are touched every 3 to 4 s where wheels are let go to find the ground speed; after so long without another
+/// touch (s) the envelope may be too shallow ...
+const TOUCH_DUE_S: f64 = 6.0;
 /// ... and gets steeper by so much in a second (m/s³).
-const STEEPENING: f64 = 0.1;
+const STEEPENING: f64 = 0.05;
 /// No train slides more gently (m/s²): the lowest adhesion measured, and level track.
 const GENTLEST: f64 = 0.1;
 /// A wheel touches only if it is above the envelope by more (m/s): the noise of its speed.
 const ABOVE: f64 = 0.05;
+/// How much of its difference to the envelope a level wheel takes away.
+const LEVEL_GAIN: f64 = 0.5;
+/// Of its limit, the acceleration at which a train starts whose wheels spin: more adhesion would not let them.
+const SPINNING_START: f64 = 0.5;
+
+/// What one wheel shows while it slips or slides.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LostWheel {
+    /// Its speed by its last counts (m/s), moved to now as if it went with the train.
+    pub(super) speed: f64,
+    /// Its acceleration (m/s²).
+    pub(super) acceleration: f64,
+    /// Its sensor is read and believed.
+    pub(super) read: bool,
+}
 
 /// Follows one slide or spin.
 #[derive(Debug, Clone)]
 pub(super) struct VirtualSensor {
     kind: Loss,
     envelope: Envelope,
+    /// Of a train that slides; of one that spins, everything is negated.
     speed: f64,
     rate: f64,
     touches: TouchLine,
+    wheels: [GroundTouch; 2],
     rising: bool,
+    touched: bool,
     since_touch: f64,
     elapsed: f64,
     thresholds: Thresholds,
@@ -48,13 +68,32 @@ pub(super) struct VirtualSensor {
 
 impl VirtualSensor {
     /// A slide or spin that begins at `speed` (m/s in the direction of travel); a spin rises by at most `limit` (m/s²).
-    pub(super) fn new(kind: Loss, speed: f64, limit: f64, envelope: Envelope, thresholds: Thresholds) -> Self {
-        let rate = match kind {
-            Loss::Slide => -thresholds.correction.as_m_per_s2(),
-            Loss::Spin => limit,
+    pub(super) fn new(
+        kind: Loss,
+        speed: f64,
+        limit: f64,
+        envelope: Envelope,
+        thresholds: Thresholds,
+    ) -> Self {
+        let rate = match (kind, envelope) {
+            (Loss::Slide, _) => -thresholds.correction.as_m_per_s2(),
+            (Loss::Spin, Envelope::Fixed) => -limit,
+            (Loss::Spin, Envelope::Touches) => -SPINNING_START * limit,
         };
-        let touches = TouchLine::from(speed, rate);
-        Self { kind, envelope, speed, rate, touches, rising: false, since_touch: 0.0, elapsed: 0.0, thresholds }
+        let speed = sign(kind) * speed;
+        Self {
+            kind,
+            envelope,
+            speed,
+            rate,
+            touches: TouchLine::from(speed, rate),
+            wheels: [GroundTouch::new(); 2],
+            rising: false,
+            touched: false,
+            since_touch: 0.0,
+            elapsed: 0.0,
+            thresholds,
+        }
     }
 
     /// How long nothing else has told the speed (s).
@@ -62,49 +101,79 @@ impl VirtualSensor {
         self.elapsed
     }
 
-    /// The rate of the envelope (m/s²).
+    /// How the corrected speed changes (m/s²).
     pub(super) fn rate(&self) -> f64 {
-        self.rate
+        sign(self.kind) * self.rate
     }
 
-    /// Goes on for `t` seconds in which the wheels turn so fast; `locked` if neither turns at all.
-    pub(super) fn next(&mut self, wheels: [f64; 2], locked: bool, t: f64) -> f64 {
+    /// Goes on for `t` seconds in which the wheels turn so; `locked` if neither turns at all.
+    pub(super) fn next(&mut self, wheels: [LostWheel; 2], locked: bool, t: f64) -> f64 {
         self.elapsed += t;
         self.since_touch += t;
-        let [first, second] = wheels;
-        match self.kind {
-            Loss::Slide => self.slide(first.max(second), locked, t),
-            Loss::Spin => self.speed = (self.speed + self.rate * t).min(first).min(second).max(0.0),
+        if self.envelope == Envelope::Touches {
+            self.rate = self.learnt(locked);
+        } else if self.kind == Loss::Slide {
+            let Thresholds { correction, lock_correction, .. } = self.thresholds;
+            self.rate = -if locked { lock_correction } else { correction }.as_m_per_s2();
         }
-        self.speed
-    }
-
-    fn slide(&mut self, fastest: f64, locked: bool, t: f64) {
-        self.rate = match (self.envelope, locked) {
-            (Envelope::Fixed, false) => -self.thresholds.correction.as_m_per_s2(),
-            (Envelope::Fixed, true) => -self.thresholds.lock_correction.as_m_per_s2(),
-            (Envelope::Touches, _) => self.learnt(locked),
-        };
+        let toward = sign(self.kind);
         let fallen = self.speed + self.rate * t;
-        self.speed = fallen.max(fastest).max(0.0);
+        let mut fastest = f64::NEG_INFINITY;
+        let mut level = None;
+        for (wheel, ground) in wheels.iter().zip(&mut self.wheels) {
+            if !wheel.read {
+                continue;
+            }
+            let speed = toward * wheel.speed;
+            fastest = fastest.max(speed);
+            if ground.reached(toward * wheel.acceleration - self.rate, t) {
+                level = Some(level.map_or(speed, |other: f64| other.max(speed)));
+            }
+        }
+        self.speed = fallen.max(fastest);
         if fastest > fallen + ABOVE {
             self.rising = true;
             self.since_touch = 0.0;
         } else if self.rising {
             // A wheel has just left the envelope.
             self.rising = false;
-            self.touches.touched(self.elapsed, self.speed);
+            self.touch(self.speed);
         }
+        if let (Some(level), Envelope::Touches) = (level, self.envelope) {
+            self.speed += LEVEL_GAIN * (level - self.speed);
+            self.touch(level);
+        }
+        let corrected = (toward * self.speed).max(0.0);
+        self.speed = toward * corrected;
+        corrected
+    }
+
+    fn touch(&mut self, speed: f64) {
+        self.touches.touched(self.elapsed, speed);
+        self.since_touch = 0.0;
+        self.touched = true;
     }
 
     fn learnt(&self, locked: bool) -> f64 {
-        let steepest = -self.thresholds.slide_deceleration.as_m_per_s2();
-        if locked {
+        if locked && self.kind == Loss::Slide {
             // Nothing can touch any more: the best guess, not one that asks to be corrected.
             let lock = -self.thresholds.lock_correction.as_m_per_s2();
             return self.touches.slope().max(lock).min(-GENTLEST);
         }
-        let overdue = (self.since_touch - TOUCH_DUE_S).max(0.0);
-        (self.touches.slope() - STEEPER - STEEPENING * overdue).clamp(steepest, -GENTLEST)
+        let steepest = match self.kind {
+            Loss::Slide => self.thresholds.slide_deceleration,
+            Loss::Spin => self.thresholds.slip_acceleration,
+        };
+        let overdue = if self.touched { (self.since_touch - TOUCH_DUE_S).max(0.0) } else { 0.0 };
+        let rate = self.touches.slope() - STEEPER - STEEPENING * overdue;
+        rate.clamp(-steepest.as_m_per_s2(), -GENTLEST)
+    }
+}
+
+/// A spin is a slide seen in the mirror.
+fn sign(kind: Loss) -> f64 {
+    match kind {
+        Loss::Slide => 1.0,
+        Loss::Spin => -1.0,
     }
 }

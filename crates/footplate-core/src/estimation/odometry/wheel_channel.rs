@@ -200,8 +200,13 @@ impl WheelChannel {
         self.smooth_acceleration = -self.smooth_acceleration;
     }
 
+    /// Its sample was read, whether or not its sensor is believed.
+    pub(super) fn is_counted(&self) -> bool {
+        !matches!(self.quality, Quality::Missing | Quality::Excluded)
+    }
+
     /// Its sample was read and its sensor is believed.
     pub(super) fn is_read(&self) -> bool {
-        !matches!(self.quality, Quality::Missing | Quality::Excluded) && !self.watch.excluded()
+        self.is_counted() && !self.watch.excluded()
     }
 }
