@@ -87,8 +87,9 @@ fn the_deviation_in_a_slide_is_true() {
     let mut beyond_two = 0.0;
     for seed in 0..runs {
         let mut train = Train::new(seed, 0.1);
-        train.bias = 0.05 * train.draw.normal();
-        train.bias_walk = 0.05 / 900.0_f64.sqrt();
+        train.noise = 0.1;
+        train.bias = 0.2 * train.draw.normal();
+        train.bias_walk = 0.005 / 60.0_f64.sqrt();
         let mut filter = InertialFilter::new(noise);
         for after in 0..4200 {
             let time = f64::from(after) * PERIOD_S;
@@ -109,7 +110,8 @@ fn the_deviation_in_a_slide_is_true() {
     }
     // After 10, 30 and 60 s of sliding.
     assert!(squared.iter().all(|squared| (0.3..1.5).contains(squared)), "{squared:.2?}");
-    assert!(beyond_two < 0.07, "{beyond_two}");
+    // 4.6 % if errors were normal.
+    assert!(beyond_two < 0.09, "{beyond_two}");
 }
 
 #[test]
@@ -201,7 +203,7 @@ proptest! {
     #[test]
     fn the_bounds_hold(
         seed in 0..1_000_000_u64,
-        bias in -0.1..0.1_f64,
+        bias in -0.5..0.5_f64,
         gravity in 0.0..0.04_f64,
         wheels_off in 0.0..0.5_f64,
     ) {
@@ -220,9 +222,9 @@ proptest! {
             let [least, most] = bounds.bias().map(Acceleration::as_m_per_s2);
             prop_assert!(least <= bias && bias <= most, "{least} to {most}, is {bias}");
         }
-        // A minute with at most 0.22 m/s² either way.
+        // A minute with at most 0.62 m/s² either way, where 2.6 m/s² are what the train can do.
         let [low, high] = bounds.speed().unwrap();
-        prop_assert!((high - low).as_m_per_s() < 2.0 * (0.22 * 60.0 + 0.3 + 0.5));
+        prop_assert!((high - low).as_m_per_s() < 2.0 * (0.62 * 60.0 + 0.9 + 0.5));
     }
 
     /// Whatever is read, however long, the filter stays a filter.
@@ -256,7 +258,7 @@ fn bounds_that_contradict_say_so_and_begin_anew() {
     }
     assert!(!bounds.hold(m_per_s(12.0), m_per_s(12.5)), "5 s cannot explain 8 m/s");
     let [low, high] = bounds.speed().unwrap().map(Speed::as_m_per_s);
-    assert!(low < 12.0 && 12.5 < high && high - low < 1.2, "{low} to {high}");
+    assert!(low < 12.0 && 12.5 < high && high - low < 2.4, "{low} to {high}");
 }
 
 /// What is read in a car that shakes, and whether it stood at the end of each block.

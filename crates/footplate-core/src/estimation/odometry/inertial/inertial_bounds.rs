@@ -8,17 +8,20 @@
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Speed};
 
-/// How long readings are summed before they are held against the wheels (s). Chosen: long enough that the bounds of the
-/// wheels (some 0.3 m/s at both ends) say something beside a gradient of 10 mm/m.
-const STRETCH_S: f64 = 10.0;
+/// Readings of a shorter stretch are not held against the wheels (s): the bounds of the wheels, some 0.3 m/s at both ends, say
+/// nothing beside a gradient of 10 mm/m.
+const SHORTEST_STRETCH_S: f64 = 5.0;
+/// After so long a new stretch begins (s). Chosen: what the bias may have wandered since is then half a gradient.
+const LONGEST_STRETCH_S: f64 = 120.0;
+const MINUTE_S: f64 = 60.0;
 
 /// What is assumed of an accelerometer and of the line. Bounds, not standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertialLimits {
-    /// The bias is never larger, either way.
+    /// The bias is never larger, either way, gravity on a sensor that is not level included.
     pub bias: Acceleration,
-    /// The bias changes by its bound in no less than this time.
-    pub bias_wanders_in: TimeSpan,
+    /// The bias changes by no more than this in a minute, and by its part in less.
+    pub bias_in_a_minute: Acceleration,
     /// Gravity on the steepest gradient of the line, either way: 0.1 m/s² for each 10 mm/m.
     pub gradient: Acceleration,
     /// What vibration and noise add up to over any stretch, either way.
@@ -26,14 +29,15 @@ pub struct InertialLimits {
 }
 
 impl Default for InertialLimits {
-    /// A bias of 0.1 m/s² that wanders in 900 s, gradients of 12 mm/m as on a high-speed line, and 0.3 m/s for vibration:
-    /// five times what white noise of 0.05 m/s² at 20 readings a second adds up to in 30 s.
+    /// A bias of 0.5 m/s² (three degrees of misalignment alone) that changes by 0.03 m/s² a minute; gradients of 12 mm/m as on a
+    /// high-speed line; and 0.9 m/s for vibration: five times what white noise of 0.1 m/s² at 20 readings a second adds up
+    /// to in a minute.
     fn default() -> Self {
         Self {
-            bias: Acceleration::from_m_per_s2(0.1),
-            bias_wanders_in: TimeSpan::from_s(900.0),
+            bias: Acceleration::from_m_per_s2(0.5),
+            bias_in_a_minute: Acceleration::from_m_per_s2(0.03),
             gradient: Acceleration::from_m_per_s2(0.12),
-            vibration: Speed::from_m_per_s(0.3),
+            vibration: Speed::from_m_per_s(0.9),
         }
     }
 }
@@ -71,7 +75,7 @@ impl InertialBounds {
             return;
         }
         let widest = self.limits.bias.as_m_per_s2();
-        let wandered = widest * t / self.limits.bias_wanders_in.as_s();
+        let wandered = self.limits.bias_in_a_minute.as_m_per_s2() * t / MINUTE_S;
         let [low, high] = self.bias;
         self.bias = [(low - wandered).max(-widest), (high + wandered).min(widest)];
         let Some(z) = reading.map(Acceleration::as_m_per_s2).filter(|z| z.is_finite()) else {
@@ -90,11 +94,12 @@ impl InertialBounds {
         }
     }
 
-    /// Takes in bounds of the speed that hold for certain, by wheels that roll or because the train stands. `false` when they
-    /// contradict these: then one of the assumptions is wrong, and the wheels are believed.
+    /// Takes in bounds of the speed that hold for certain, by wheels that roll or because the train stands; one of them may
+    /// be infinite, as a sliding wheel bounds the speed from below only. `false` when they contradict these: then one of the
+    /// assumptions is wrong, and the wheels are believed.
     pub fn hold(&mut self, low: Speed, high: Speed) -> bool {
         let [low, high] = [low, high].map(Speed::as_m_per_s);
-        if !(low <= high && low.is_finite() && high.is_finite()) {
+        if !(low <= high && low < f64::INFINITY && high > f64::NEG_INFINITY) {
             return true;
         }
         let agrees = self.learn([low, high]);
@@ -127,21 +132,20 @@ impl InertialBounds {
         self.speed.map(|[slowest, fastest]| [slowest - vibration, fastest + vibration])
     }
 
-    /// Learns the bias once a stretch is long enough. `false` when no bias explains it.
+    /// Learns the bias from the stretch so far. `false` when no bias explains it.
     fn learn(&mut self, [low, high]: [f64; 2]) -> bool {
-        let fresh = Stretch { start: [low, high], read: 0.0, lasted: 0.0 };
-        let Some(Stretch { start: [start_low, start_high], read, lasted }) = self.stretch else {
-            self.stretch = Some(fresh);
-            return true;
-        };
-        if lasted < STRETCH_S {
+        let stretch = self.stretch;
+        if stretch.is_none_or(|stretch| stretch.lasted > LONGEST_STRETCH_S) && (high - low).is_finite() {
+            self.stretch = Some(Stretch { start: [low, high], read: 0.0, lasted: 0.0 });
+        }
+        let Some(Stretch { start: [start_low, start_high], read, lasted }) = stretch else { return true };
+        if lasted < SHORTEST_STRETCH_S {
             return true;
         }
-        self.stretch = Some(fresh);
         let vibration = self.limits.vibration.as_m_per_s();
         // The mean of the bias over the stretch; it may have wandered since.
         let beside = self.limits.gradient.as_m_per_s2()
-            + self.limits.bias.as_m_per_s2() * lasted / self.limits.bias_wanders_in.as_s();
+            + self.limits.bias_in_a_minute.as_m_per_s2() * lasted / MINUTE_S;
         let least = (read - vibration - (high - start_low)) / lasted - beside;
         let most = (read + vibration - (low - start_high)) / lasted + beside;
         let [bias_low, bias_high] = self.bias;
