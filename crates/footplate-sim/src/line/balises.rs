@@ -39,10 +39,11 @@ pub(crate) enum Passed {
 }
 
 impl Balises {
-    pub(crate) fn draw(draws: &mut Draws) -> Self {
+    /// Balises ahead of a place (m).
+    pub(crate) fn draw(place: f64, draws: &mut Draws) -> Self {
         let mut draws = draws.split();
         Self {
-            next: draws.uniform(FIRST_M.0..FIRST_M.1),
+            next: place + draws.uniform(FIRST_M.0..FIRST_M.1),
             antenna: draws.normal_within(0.0, ANTENNA_M, 3.0),
             draws,
         }
@@ -70,7 +71,7 @@ mod tests {
 
     #[test]
     fn balises_come_every_one_and_a_half_kilometres_and_are_where_the_map_has_them_to_a_metre() {
-        let mut balises = Balises::draw(&mut Draws::new(3, Purpose::Line));
+        let mut balises = Balises::draw(0.0, &mut Draws::new(3, Purpose::Line));
         let (mut read, mut missed) = (0, 0);
         for step in 0..4_000_000_u32 {
             // 0.5 m every 10 ms.

@@ -2,115 +2,68 @@
 
 use core::ops::Range;
 
+use footplate_core::Speed;
+
+use super::resistance::{GRAVITY, Resistance};
+use super::tractive_effort::TractiveEffort;
+use super::train::Train;
 use crate::draws::Draws;
 
-/// Standard gravity (m/s²).
-pub(crate) const GRAVITY: f64 = 9.806_65;
 /// The wheelsets that are not followed one by one are gathered in so many groups along the train.
-pub(crate) const GROUPS: usize = 6;
+const GROUPS: usize = 6;
+/// What all measured wheels are believed to measure (m): the usual size of multiple units, half worn.
+pub(crate) const DIAMETER_M: f64 = 0.86;
 /// A wheelset without and with a motor and its gear (kg m²): drawn from these.
 const TRAILING_KG_M2: Range<f64> = 75.0..115.0;
 const POWERED_KG_M2: Range<f64> = 160.0..260.0;
 /// Between the wheelsets of a bogie (m).
 const WHEELBASE_M: f64 = 2.5;
-/// How far masses go from the design, part of it: empty to full.
+/// How far masses go from the design, part of it: empty to full. Drive and brake are weighed to the load.
 const LOADING: Range<f64> = 0.9..1.1;
 /// How far brake and drive go from the design, part of it. The claims of a vehicle leave more room than this.
 const STRENGTH: Range<f64> = 0.93..1.07;
+/// What a wheelset of a train carries of which only the mass is known (N), ...
+const USUAL_LOAD_N: f64 = 150e3;
+/// ... and how much of that its motors put on the rail at most: what dry and damp rails carry at low speed.
+const USUAL_ADHESION: f64 = 0.2;
+/// How fast the effort of such a train comes and goes (m/s³).
+const USUAL_JERK: f64 = 0.7;
 
-/// The kind of train.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// Eight cars, half the wheelsets driven.
-    HighSpeed,
-    /// Four cars for stopping services.
-    Suburban,
-    /// Four light cars with strong brakes.
-    Metro,
-}
-
-/// What the builder of a kind of train says.
-#[derive(Debug, Clone, Copy)]
+/// What the builder says of a train.
+#[derive(Debug, Clone)]
 pub(crate) struct Design {
-    /// How many wheelsets it has; half of them are driven.
+    pub(crate) train: Train,
+    /// How many wheelsets it has, and how many of them are driven.
     pub(crate) wheelsets: u32,
-    /// What each carries (N).
-    load: f64,
-    /// From the first wheelset to the last (m).
-    length: f64,
-    /// Acceleration on level track when it starts (m/s²).
-    pub(crate) start: f64,
-    /// Power by mass (W/kg).
-    power: f64,
-    /// Deceleration by its full brake (m/s²).
-    pub(crate) full_brake: f64,
+    pub(crate) driven: u32,
     /// How fast effort comes and goes (m/s³).
     pub(crate) jerk: f64,
-    /// Resistance in N per kN of weight: constant, by km/h, by (km/h)².
-    resistance: [f64; 3],
-    /// It never runs faster (m/s).
-    pub(crate) max_speed: f64,
-    /// What its wheels are believed to measure (m).
-    pub(crate) diameter: f64,
-}
-
-impl Kind {
-    /// What its builder says. Resistance of the multiple units for 300 km/h is that of the CRH3 class; of the others,
-    /// Sauthoff's form for coaches.
-    pub(crate) const fn design(self) -> Design {
-        match self {
-            Self::HighSpeed => Design {
-                wheelsets: 32,
-                load: 140e3,
-                length: 190.0,
-                start: 0.55,
-                power: 21.0,
-                full_brake: 1.0,
-                jerk: 0.6,
-                resistance: [0.79, 0.0064, 0.000_115],
-                max_speed: 95.0,
-                diameter: 0.86,
-            },
-            Self::Suburban => Design {
-                wheelsets: 16,
-                load: 150e3,
-                length: 92.0,
-                start: 0.8,
-                power: 13.0,
-                full_brake: 1.0,
-                jerk: 0.8,
-                resistance: [2.0, 0.007_15, 0.000_364],
-                max_speed: 45.0,
-                diameter: 0.86,
-            },
-            Self::Metro => Design {
-                wheelsets: 16,
-                load: 115e3,
-                length: 80.0,
-                start: 1.0,
-                power: 12.0,
-                full_brake: 1.1,
-                jerk: 0.8,
-                resistance: [2.0, 0.007_15, 0.000_364],
-                max_speed: 26.0,
-                diameter: 0.86,
-            },
-        }
-    }
 }
 
 impl Design {
-    /// The largest resistance to motion as a deceleration (m/s²): at full speed.
-    pub(crate) fn strongest_resistance(&self) -> f64 {
-        per_weight(self.resistance, self.max_speed) * GRAVITY
+    /// A train of which wheelsets and motors are not told: as many as carry it, and as many driven as need be.
+    pub(crate) fn of(train: Train) -> Self {
+        let bogies = (train.mass_kg * GRAVITY / (2.0 * USUAL_LOAD_N)).ceil().clamp(2.0, 1e6);
+        let load = train.mass_kg * GRAVITY / (2.0 * bogies);
+        let driven = (train.tractive_effort.largest() / (2.0 * USUAL_ADHESION * load)).ceil();
+        let driven = driven.clamp(1.0, bogies);
+        Self { train, wheelsets: 2 * bogies as u32, driven: 2 * driven as u32, jerk: USUAL_JERK }
     }
-}
 
-/// Resistance as part of the weight at a speed (m/s).
-fn per_weight(resistance: [f64; 3], speed: f64) -> f64 {
-    let v = 3.6 * speed.abs();
-    let [constant, linear, square] = resistance;
-    1e-3 * (constant + linear * v + square * v * v)
+    /// Acceleration on level track when it starts (m/s²), less resistance.
+    pub(crate) fn start(&self) -> f64 {
+        self.train.tractive_effort.largest() / self.train.inertia_kg()
+    }
+
+    /// Deceleration by its full brake (m/s²).
+    pub(crate) fn full_brake(&self) -> f64 {
+        self.train.brake.full_n / self.train.inertia_kg()
+    }
+
+    /// The largest resistance to motion as a deceleration (m/s²): empty, at full speed.
+    pub(crate) fn strongest_resistance(&self) -> f64 {
+        self.train.resistance.at(self.train.max_speed) / (self.train.mass_kg * LOADING.start)
+    }
 }
 
 /// Where the measured wheelsets are.
@@ -141,12 +94,14 @@ pub(crate) struct Consist {
     pub(crate) places: [(f64, u32); 2],
     /// The others.
     pub(crate) groups: [Group; GROUPS],
-    /// From the first wheelset to the last (m).
+    /// Of the whole train (m).
     pub(crate) length: f64,
-    start: f64,
-    power: f64,
+    tractive_effort: TractiveEffort,
+    /// What the design gives, and this train gives of it.
+    strength: f64,
+    /// Deceleration by its full brake (m/s²).
     full_brake: f64,
-    resistance: [f64; 3],
+    resistance: Resistance,
     driven: f64,
     braked: f64,
 }
@@ -165,53 +120,52 @@ pub(crate) struct Group {
 }
 
 impl Consist {
-    /// A train of a kind with its two measured wheelsets.
+    /// A train of a design with its two measured wheelsets.
     pub(crate) fn draw(design: &Design, powered: [bool; 2], placement: Placement, draws: &mut Draws) -> Self {
-        let load = design.load * draws.uniform(LOADING);
-        let radius = 0.5 * design.diameter;
+        let loading = draws.uniform(LOADING);
+        let train = &design.train;
+        let all = f64::from(design.wheelsets);
+        let mass = train.mass_kg * loading;
+        let radius = 0.5 * DIAMETER_M;
         let trailing = draws.uniform(TRAILING_KG_M2);
         let with_motor = draws.uniform(POWERED_KG_M2);
         let rotating = powered.map(|powered| if powered { with_motor } else { trailing });
-        let all = f64::from(design.wheelsets);
-        let driven = 0.5 * all;
-        let mass = all * load / GRAVITY;
-        let of_all = 0.5 * all * (trailing + with_motor) / (radius * radius);
-        let of_measured = (rotating[0] + rotating[1]) / (radius * radius);
+        let inertia = train.inertia_kg() * loading;
+        let length = train.length.as_m();
         let places = match placement {
             Placement::OneBogie => [(0.0, 0), (WHEELBASE_M, 1)],
-            Placement::TwoCars => [(0.0, 0), (design.length * 4.0 / all, 4)],
+            Placement::TwoCars => [(0.0, 0), (length * 4.0 / all, 4)],
         };
-        let measured_driven = powered.iter().filter(|powered| **powered).count() as f64;
+        let others = f64::from(design.driven) - powered.iter().filter(|powered| **powered).count() as f64;
         let each = (all - 2.0) / GROUPS as f64;
         let groups = core::array::from_fn(|at| Group {
-            behind: design.length * (at as f64 + 0.5) / GROUPS as f64,
+            behind: length * (at as f64 + 0.5) / GROUPS as f64,
             before: 2 + (each * at as f64) as u32,
             wheelsets: each,
-            driven: (driven - measured_driven) / GROUPS as f64,
+            driven: others.max(0.0) / GROUPS as f64,
         });
         Self {
-            load,
+            load: mass * GRAVITY / all,
             mass,
-            inertia: mass + of_all,
+            inertia,
             rotating,
-            followed_inertia: mass + of_all - of_measured,
+            followed_inertia: inertia - (rotating[0] + rotating[1]) / (radius * radius),
             powered,
             places,
             groups,
-            length: design.length,
-            start: design.start * draws.uniform(STRENGTH),
-            power: design.power * draws.uniform(STRENGTH),
-            full_brake: design.full_brake * draws.uniform(STRENGTH),
-            resistance: design.resistance,
-            driven,
+            length,
+            tractive_effort: train.tractive_effort.clone(),
+            strength: loading * draws.uniform(STRENGTH),
+            full_brake: design.full_brake() * draws.uniform(STRENGTH),
+            resistance: train.resistance,
+            driven: f64::from(design.driven),
             braked: all,
         }
     }
 
     /// What each driven wheelset gives at its rim (N) at an effort from 0 to 1.
     pub(crate) fn traction(&self, effort: f64, speed: f64) -> f64 {
-        let force = (self.start * self.inertia).min(self.power * self.mass / speed.abs().max(1.0));
-        effort * force / self.driven
+        effort * self.strength * self.tractive_effort.at(Speed::from_m_per_s(speed)) / self.driven
     }
 
     /// What each wheelset's brake gives at its rim (N) at a pressure from 0 to 1.
@@ -226,7 +180,7 @@ impl Consist {
 
     /// Resistance to motion (N), against it.
     pub(crate) fn resistance(&self, speed: f64) -> f64 {
-        per_weight(self.resistance, speed) * self.mass * GRAVITY
+        self.resistance.at(Speed::from_m_per_s(speed))
     }
 }
 
@@ -234,6 +188,8 @@ impl Consist {
 mod tests {
     use super::*;
     use crate::draws::Purpose;
+    use crate::line::kinds::Kind;
+    use crate::line::train::tests::unit;
 
     #[test]
     fn all_wheelsets_are_there_once() {
@@ -250,21 +206,13 @@ mod tests {
     }
 
     #[test]
-    fn rotation_adds_what_is_usual_for_multiple_units() {
-        for seed in 0..50 {
-            let mut draws = Draws::new(seed, Purpose::Train);
-            let design = Kind::HighSpeed.design();
-            let consist = Consist::draw(&design, [true, false], Placement::TwoCars, &mut draws);
-            let part = consist.inertia / consist.mass - 1.0;
-            // Coaches 0.06, locomotives 0.09 and more.
-            assert!((0.035..0.10).contains(&part), "{part}");
-        }
-    }
-
-    #[test]
-    fn resistance_at_300_km_h_is_that_of_its_class() {
-        // 0.79 + 0.0064 * 300 + 0.000115 * 300² = 13.06 N/kN.
-        let part = per_weight(Kind::HighSpeed.design().resistance, 300.0 / 3.6);
-        assert!((part - 13.06e-3).abs() < 1e-9, "{part}");
+    fn a_train_of_which_only_the_mass_is_known_has_wheelsets_that_carry_it() {
+        // 100 t on wheelsets of 15 t at most: eight with 123 kN each; 100 kN of traction on 0.2 of that: more than four.
+        let design = Design::of(unit());
+        assert_eq!((design.wheelsets, design.driven), (8, 6));
+        // A wagon that is pulled by a giant still has four wheels.
+        let light = Train { mass_kg: 5e3, ..unit() };
+        let design = Design::of(light);
+        assert_eq!((design.wheelsets, design.driven), (4, 4));
     }
 }

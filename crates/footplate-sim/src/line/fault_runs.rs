@@ -1,8 +1,8 @@
 //! The journey on which sensors fail: from a stop up to line speed, to another stop, and on.
 
-use super::consist::Kind;
 use super::faults::Fault;
 use super::gradients::Gradients;
+use super::kinds::Kind;
 use super::plan::Handle::{At, Keep};
 use super::plan::{Stage, Until};
 use super::setup::Setup;

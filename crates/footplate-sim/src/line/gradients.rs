@@ -1,5 +1,8 @@
 //! The rise and fall of a line: gradients that change in vertical curves.
 
+use footplate_core::Length;
+
+use super::stepped::Stepped;
 use crate::draws::Draws;
 
 /// How long a gradient and the vertical curve to the next are (m): drawn from these.
@@ -51,6 +54,18 @@ impl Gradients {
         Self { points, at: 0 }
     }
 
+    /// What acts on the middle of a train of a length (m) on a line that changes in steps (per mille): each of them
+    /// comes under the train bit by bit.
+    pub(crate) fn under(steps: &Stepped, length: f64) -> Self {
+        let of_train = Length::from_m(length);
+        let starts: Vec<f64> = steps.steps().map(|(start, _)| start.as_m()).collect();
+        let mut fronts: Vec<f64> = starts.iter().flat_map(|start| [*start, start + length]).collect();
+        fronts.sort_by(f64::total_cmp);
+        fronts.dedup();
+        let mean = |front: f64| 1e-3 * steps.mean_behind(Length::from_m(front), of_train);
+        Self { points: fronts.into_iter().map(|front| (front - 0.5 * length, mean(front))).collect(), at: 0 }
+    }
+
     /// The gradient at a place (m/m).
     pub(crate) fn at(&mut self, place: f64) -> f64 {
         let points = &self.points;
@@ -87,6 +102,19 @@ mod tests {
             last = gradient;
         }
         assert_eq!(line.at(300.0), line.clone().at(300.0), "the way there does not matter");
+    }
+
+    #[test]
+    fn a_step_comes_under_a_train_bit_by_bit() {
+        let steps = [(Length::from_m(0.0), 5.0), (Length::from_m(1000.0), 25.0)];
+        let steps = Stepped::new("gradient", &steps, [-100.0, 100.0]).unwrap();
+        let mut line = Gradients::under(&steps, 200.0);
+        // The middle of the train: front at 1000, 1100 and 1200 m.
+        for (middle, gradient) in
+            [(500.0, 0.005), (900.0, 0.005), (1000.0, 0.015), (1100.0, 0.025), (3000.0, 0.025)]
+        {
+            assert!((line.at(middle) - gradient).abs() < 1e-12, "{middle}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! An inertial sensor along the track, with all that it confuses with acceleration.
 
-use super::consist::GRAVITY;
+use super::resistance::GRAVITY;
 use crate::draws::Draws;
 
 /// White noise at 50 readings a second (m/s²): drawn from these.

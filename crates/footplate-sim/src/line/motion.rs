@@ -11,11 +11,12 @@
 
 use super::bogie::Bogie;
 use super::brake_cylinder::{BrakeCylinder, Valve};
-use super::consist::{Consist, GRAVITY};
+use super::consist::Consist;
 use super::creep_force::Film;
 use super::gradients::Gradients;
 use super::rail::Rail;
 use super::recording::LineEnergy;
+use super::resistance::GRAVITY;
 use super::rotation::{Rotation, Step, Torques};
 use super::slide_protection::SlideProtection;
 use super::slip_control::SlipControl;
@@ -66,11 +67,11 @@ pub(crate) struct Command {
 }
 
 impl Motion {
-    /// A train that has run evenly at a speed (m/s) for long, its first wheelset at place 0.
+    /// A train that has run evenly at a speed (m/s) for long, its first wheelset at a place (m).
     pub(crate) fn new(
         consist: Consist,
         radii: [f64; 2],
-        speed: f64,
+        [place, speed]: [f64; 2],
         jerk: [f64; 2],
         protection: SlideProtection,
     ) -> Self {
@@ -87,7 +88,7 @@ impl Motion {
         Self {
             wheels: [wheel(0), wheel(1)],
             consist,
-            place: 0.0,
+            place,
             speed,
             acceleration: 0.0,
             forces: [0.0; 2],
@@ -121,7 +122,7 @@ impl Motion {
         command: Command,
         bogie: &mut Bogie,
         rail: &Rail,
-        gradients: &mut Gradients,
+        [gradients, curves]: &mut [Gradients; 2],
     ) {
         self.follow(command.effort, dt);
         let direction = if command.backwards { -1.0 } else { 1.0 };
@@ -133,14 +134,15 @@ impl Motion {
         for (film, (behind, before)) in self.films.iter_mut().zip(self.consist.places) {
             *film = rail.at(self.place - behind, before);
         }
-        let gradient = gradients.at(self.place - 0.5 * self.consist.length);
+        let middle = self.place - 0.5 * self.consist.length;
+        let weight = self.consist.mass * GRAVITY;
         let others_pressure = self.others.step(dt, pressure, Valve::Apply);
         let (pull_of_groups, brake_of_groups) = self.groups(rail, pull, others_pressure);
         let outer = Outer {
             pull: pull_of_groups,
-            climb: self.consist.mass * GRAVITY * gradient,
+            climb: weight * gradients.at(middle),
             brake: brake_of_groups,
-            resistance: self.consist.resistance(self.speed),
+            resistance: self.consist.resistance(self.speed) + weight * curves.at(middle),
         };
         bogie.step(dt, self.consist.deceleration(pressure), speeds);
 

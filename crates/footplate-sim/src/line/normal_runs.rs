@@ -1,8 +1,8 @@
 //! Runs in which every wheel rolls: what an odometer meets nearly all of its life.
 
-use super::consist::Kind;
 use super::creep_force::Film;
 use super::gradients::Gradients;
+use super::kinds::Kind;
 use super::plan::Handle::{At, Keep};
 use super::plan::{Stage, Until};
 use super::setup::Setup;

@@ -56,21 +56,23 @@ const LARGEST_TRIM: f64 = 0.6;
 pub(crate) struct Plan {
     stages: Vec<Stage>,
     at: usize,
-    begun: f64,
+    /// When the stage began (s); before its first step, not yet.
+    begun: Option<f64>,
     trim: f64,
 }
 
 impl Plan {
-    /// A plan that begins at a time (s).
-    pub(crate) fn new(stages: Vec<Stage>, time: f64) -> Self {
-        Self { stages, at: 0, begun: time, trim: 0.0 }
+    /// A plan whose first stage begins with its first step.
+    pub(crate) fn new(stages: Vec<Stage>) -> Self {
+        Self { stages, at: 0, begun: None, trim: 0.0 }
     }
 
     /// The effort asked for after `dt` more seconds, and whether traction drives backwards.
     pub(crate) fn step(&mut self, dt: f64, time: f64, speed: f64) -> (f64, bool) {
+        self.begun.get_or_insert(time);
         while self.at + 1 < self.stages.len() && self.is_over(time, speed.abs()) {
             self.at += 1;
-            self.begun = time;
+            self.begun = Some(time);
             self.trim = 0.0;
         }
         let Some(stage) = self.stages.get(self.at) else { return (0.0, false) };
@@ -92,7 +94,7 @@ impl Plan {
     fn is_over(&self, time: f64, speed: f64) -> bool {
         match self.stages[self.at].until {
             Until::Time(until) => time >= until,
-            Until::For(span) => time - self.begun >= span,
+            Until::For(span) => self.begun.is_some_and(|begun| time - begun >= span),
             Until::Faster(until) => speed >= until,
             Until::Slower(until) => speed <= until,
         }
@@ -110,7 +112,7 @@ mod tests {
             Stage::new(Handle::At(0.0), Until::For(5.0)),
             Stage::new(Handle::At(-0.5), Until::Slower(0.0)).backwards(),
         ];
-        let mut plan = Plan::new(stages, 0.0);
+        let mut plan = Plan::new(stages);
         assert_eq!(plan.step(0.1, 1.0, 4.0), (1.0, false));
         assert_eq!(plan.step(0.1, 8.0, 10.1), (0.0, false));
         assert_eq!(plan.step(0.1, 12.9, 10.0), (0.0, false));
@@ -121,7 +123,7 @@ mod tests {
     #[test]
     fn a_speed_is_kept_against_a_steady_pull() {
         // 1 m/s² at full effort, 0.1 m/s² lost.
-        let mut plan = Plan::new(vec![Stage::new(Handle::Keep(20.0), Until::Time(1e9))], 0.0);
+        let mut plan = Plan::new(vec![Stage::new(Handle::Keep(20.0), Until::Time(1e9))]);
         let mut speed = 18.0;
         for step in 0..20_000 {
             let (effort, _) = plan.step(0.01, 0.01 * f64::from(step), speed);

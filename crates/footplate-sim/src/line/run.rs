@@ -4,16 +4,16 @@ use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 
 use super::balises::{Balises, Passed};
 use super::bogie::{Bogie, Conduct};
-use super::consist::Consist;
+use super::consist::{Consist, DIAMETER_M};
 use super::faults::{Channels, Fault};
 use super::gradients::Gradients;
 use super::inertial_sensor::InertialSensor;
 use super::motion::{Command, Motion};
-use super::plan::Plan;
 use super::rail::{Patch, Rail};
 use super::recording::{LineEvent, LineEventKind, LineRun, LineSample, LineTruth, WheelTruth};
 use super::setup::{Lay, Setup};
 use super::slide_protection::SlideProtection;
+use super::steering::Steering;
 use super::tachometer::Tachometer;
 use super::vehicle::{LineVehicle, LineWheelset};
 use crate::draws::{Draws, Purpose};
@@ -23,6 +23,8 @@ const STEP_S: f64 = 0.005;
 /// The wheels of a train are off in common by so much of their tolerance, and each for itself by so much more.
 const OFF_IN_COMMON: f64 = 0.7;
 const OFF_EACH: f64 = 0.25;
+/// How long a train is watched that has arrived (s).
+const WATCHED_S: f64 = 10.0;
 /// How far the clock of a faulty recorder drifts (part of the time).
 const CLOCK_DRIFT: f64 = 1e-4;
 /// How often it loses a row, and how often it reads one late.
@@ -53,9 +55,9 @@ impl Default for LineConditions {
 struct World {
     motion: Motion,
     bogie: Bogie,
-    plan: Plan,
+    steering: Steering,
     rail: Rail,
-    gradients: Gradients,
+    line: [Gradients; 2],
     films: std::vec::IntoIter<Lay>,
     next_film: Option<Lay>,
     tachometers: [Tachometer; 2],
@@ -86,9 +88,8 @@ impl World {
             self.next_film = self.films.next();
         }
         let before = self.motion.place;
-        let (effort, backwards) = self.plan.step(dt, now, self.motion.speed);
-        self.command = Command { effort, backwards };
-        self.motion.step(dt, self.command, &mut self.bogie, &self.rail, &mut self.gradients);
+        self.command = self.steering.step(dt, now, before, self.motion.speed);
+        self.motion.step(dt, self.command, &mut self.bogie, &self.rail, &mut self.line);
         for (tachometer, wheel) in self.tachometers.iter_mut().zip(&self.motion.wheels) {
             tachometer.follow(wheel.angle, now, now + dt);
         }
@@ -122,16 +123,16 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
     let mut of_line = Draws::new(seed, Purpose::Line);
     let mut of_faults = Draws::new(seed, Purpose::Faults);
 
-    let design = setup.kind.design();
+    let design = setup.design;
     let consist = Consist::draw(&design, setup.powered, setup.placement, &mut of_train);
     let common = of_train.uniform(-OFF_IN_COMMON..OFF_IN_COMMON);
     let radii = [0, 1].map(|_| {
         let off = setup.diameter_tolerance * (common + of_train.uniform(-OFF_EACH..OFF_EACH));
-        0.5 * design.diameter * (1.0 + if exact_diameters { 0.0 } else { off })
+        0.5 * DIAMETER_M * (1.0 + if exact_diameters { 0.0 } else { off })
     });
     let wheelset = |at: usize| LineWheelset {
         teeth,
-        diameter: Length::from_m(design.diameter),
+        diameter: Length::from_m(DIAMETER_M),
         diameter_tolerance: setup.diameter_tolerance,
         is_powered: setup.powered[at],
     };
@@ -146,19 +147,19 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         tachometers = [first.without_a_tooth(), second];
     }
     let protection = SlideProtection::draw(setup.protected, setup.speed, &mut of_motion);
-    let jerk = [design.jerk / design.start, design.jerk / design.full_brake];
+    let jerk = [design.jerk / design.start(), design.jerk / design.full_brake()];
     let mut films = setup.films.into_iter();
     let mut inertial = inertial_sensor.then(|| InertialSensor::draw(&mut of_line));
     let mut world = World {
-        motion: Motion::new(consist, radii, setup.speed, jerk, protection),
+        motion: Motion::new(consist, radii, [setup.place, setup.speed], jerk, protection),
         bogie: Bogie::new(setup.bogie, -span),
-        plan: Plan::new(setup.stages, -span),
+        steering: setup.steering,
         rail: Rail::draw(setup.base, &mut of_track),
-        gradients: setup.gradients,
+        line: setup.line,
         next_film: films.next(),
         films,
         tachometers,
-        balises: setup.has_balises.then(|| Balises::draw(&mut of_line)),
+        balises: setup.has_balises.then(|| Balises::draw(setup.place, &mut of_line)),
         passed: Vec::new(),
         command: Command { effort: 0.0, backwards: false },
         time: -span,
@@ -169,7 +170,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
     let mut samples = Vec::with_capacity(rows);
     let mut truth: Vec<LineTruth> = Vec::with_capacity(rows);
     let mut diary = Diary::new(&channels);
-    let mut zero = None;
+    let (mut zero, mut arrived) = (None, None);
     for row in 0..rows {
         let stamp = Timestamp::from_ns(period.as_ns() * row as i64);
         let faulty_clock = channels.fault() == Fault::Clock && row > 0;
@@ -184,7 +185,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         let waited = world.time - before;
         let edges = [0, 1].map(|at| world.tachometers[at].read(waited, world.time));
         let wheels = channels.report(world.time, edges);
-        let gradient = world.gradients.at(world.motion.place - 0.5 * world.motion.consist.length);
+        let gradient = world.line[0].at(world.motion.place - 0.5 * world.motion.consist.length);
         let gained = (world.motion.speed - speed_before) / waited;
         let speed = world.motion.speed;
         let acceleration = inertial.as_mut().map(|sensor| sensor.read(waited, gained, speed, gradient));
@@ -207,6 +208,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         if lost {
             continue;
         }
+        arrived = arrived.or_else(|| world.steering.has_arrived().then_some(now));
         samples.push(LineSample {
             time: stamp,
             wheels,
@@ -215,6 +217,9 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
             balise,
         });
         truth.push(real);
+        if arrived.is_some_and(|arrived| now - arrived >= WATCHED_S) {
+            break;
+        }
     }
     let mut energy = world.motion.energy;
     energy.gained_j = world.motion.moving() - begins_with;

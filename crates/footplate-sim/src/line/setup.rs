@@ -1,30 +1,34 @@
 //! What a scenario sets up before the world runs by itself.
 
 use super::bogie::Conduct;
-use super::consist::{Kind, Placement};
+use super::consist::{Design, Placement};
 use super::creep_force::Film;
 use super::faults::Fault;
 use super::gradients::Gradients;
-use super::plan::Stage;
+use super::kinds::Kind;
+use super::plan::{Plan, Stage};
+use super::steering::Steering;
 use super::vehicle::BRAKE_TOLERANCE;
 
 /// A train on a line with a driver's plan, and what is in store for it. Times are since the first sample (s).
 #[derive(Debug, Clone)]
 pub(crate) struct Setup {
-    pub(crate) kind: Kind,
+    pub(crate) design: Design,
     /// Which measured wheelsets are driven.
     pub(crate) powered: [bool; 2],
     pub(crate) placement: Placement,
     /// How well diameters are known.
     pub(crate) diameter_tolerance: f64,
-    /// Speed at the beginning (m/s).
+    /// Where it begins (m), and how fast (m/s).
+    pub(crate) place: f64,
     pub(crate) speed: f64,
     /// What the rail is like where nothing else is said.
     pub(crate) base: Film,
-    pub(crate) gradients: Gradients,
-    /// No gradient is steeper (m/m).
+    /// Gradients, and what curves take as part of the weight.
+    pub(crate) line: [Gradients; 2],
+    /// No gradient is steeper, curves included (m/m).
     pub(crate) steepest: f64,
-    pub(crate) stages: Vec<Stage>,
+    pub(crate) steering: Steering,
     /// What comes onto the rail, in order of time.
     pub(crate) films: Vec<Lay>,
     /// What the bogie of the measured wheelsets does on its own, in order of time.
@@ -34,7 +38,7 @@ pub(crate) struct Setup {
     pub(crate) fault: Fault,
     pub(crate) has_balises: bool,
     pub(crate) brake_tolerance: f64,
-    /// When it ends (s).
+    /// When it ends (s), unless the driver has arrived before.
     pub(crate) lasts: f64,
 }
 
@@ -60,16 +64,22 @@ const DIAMETER_TOLERANCE: f64 = 0.002;
 impl Setup {
     /// A sound train at a speed on a dry, level line: the first measured wheelset driven, the other not.
     pub(crate) fn new(kind: Kind, speed: f64, stages: Vec<Stage>, lasts: f64) -> Self {
+        Self { speed, ..Self::of(kind.design(), Steering::Plan(Plan::new(stages)), lasts) }
+    }
+
+    /// A sound train of any design that stands on a dry, level line.
+    pub(crate) fn of(design: Design, steering: Steering, lasts: f64) -> Self {
         Self {
-            kind,
+            design,
             powered: [true, false],
             placement: Placement::TwoCars,
             diameter_tolerance: DIAMETER_TOLERANCE,
-            speed,
+            place: 0.0,
+            speed: 0.0,
             base: Film::DRY,
-            gradients: Gradients::level(),
+            line: [Gradients::level(), Gradients::level()],
             steepest: 0.0,
-            stages,
+            steering,
             films: Vec::new(),
             bogie: Vec::new(),
             protected: [true; 2],
@@ -82,6 +92,6 @@ impl Setup {
 
     /// The same on a line with gradients up to the steepest (m/m).
     pub(crate) fn with_gradients(self, gradients: Gradients, steepest: f64) -> Self {
-        Self { gradients, steepest, ..self }
+        Self { line: [gradients, Gradients::level()], steepest, ..self }
     }
 }

@@ -1,8 +1,9 @@
 //! Runs in which wheels slip, slide and lock.
 
 use super::bogie::Conduct;
-use super::consist::{Kind, Placement};
+use super::consist::Placement;
 use super::creep_force::Film;
+use super::kinds::Kind;
 use super::plan::Handle::{At, Keep};
 use super::plan::{Stage, Until};
 use super::setup::{Lay, Setup};
@@ -108,11 +109,11 @@ pub(crate) fn common_creep(draws: &mut Draws) -> Setup {
     let speed = draws.uniform(8.0..12.0);
     let mut stages = vec![
         Stage::new(Keep(speed), Until::Time(10.0)),
-        Stage::new(At(draws.uniform(0.6..0.75)), Until::Time(60.0)),
+        Stage::new(At(draws.uniform(0.58..0.7)), Until::Time(60.0)),
         Stage::new(Keep(30.0), Until::Time(75.0)),
     ];
     stages.extend(stop(-0.5));
-    let worse = Film::WET.with_friction(draws.uniform(0.105..0.12));
+    let worse = Film::WET.with_friction(draws.uniform(0.115..0.125));
     let lay = Lay { ahead: 50.0, onset: draws.uniform(500.0..700.0), ..film(10.0, FAR_M, worse, LASTING) };
     Setup {
         powered: [true; 2],

@@ -2,7 +2,8 @@
 
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 
-use super::consist::{Design, GRAVITY};
+use super::consist::Design;
+use super::resistance::GRAVITY;
 
 /// A simulated train as its operator knows it. Every claim is true in the simulated world, as loosely as an operator
 /// would state it.
@@ -58,6 +59,8 @@ pub(crate) const BRAKE_TOLERANCE: f64 = 0.1;
 pub(crate) const LOOSE_BRAKE_TOLERANCE: f64 = 0.15;
 /// What is left out of the sums behind a claim: steps of rounding, rotation, creepage (m/s²).
 const ROOM_M_PER_S2: f64 = 0.05;
+/// How much faster than it may a train can be while its driver corrects that (part of its speed).
+const OVERSPEED: f64 = 0.03;
 /// Filling times of a brake cylinder that come on top of the ramp of the command (s).
 const BUILD_UP_S: f64 = 1.6;
 /// Sixteen bits.
@@ -79,15 +82,15 @@ impl LineVehicle {
         Self {
             name: name.to_owned(),
             period,
-            max_speed: Speed::from_m_per_s(design.max_speed),
-            max_traction: hundredths(design.start * (1.0 + BRAKE_TOLERANCE) + slope),
-            max_brake: hundredths(design.full_brake * (1.0 + BRAKE_TOLERANCE) + gradient),
+            max_speed: design.train.max_speed * (1.0 + OVERSPEED),
+            max_traction: hundredths(design.start() * (1.0 + BRAKE_TOLERANCE) + slope),
+            max_brake: hundredths(design.full_brake() * (1.0 + BRAKE_TOLERANCE) + gradient),
             wheelsets,
             brake_command: LineBrake {
-                full: Acceleration::from_m_per_s2(design.full_brake),
+                full: Acceleration::from_m_per_s2(design.full_brake()),
                 tolerance: brake_tolerance,
                 gradient: hundredths(gradient),
-                build_up: TimeSpan::from_s(design.full_brake / design.jerk + BUILD_UP_S),
+                build_up: TimeSpan::from_s(design.full_brake() / design.jerk + BUILD_UP_S),
             },
             counter_modulus: COUNTER_MODULUS,
         }

@@ -5,6 +5,7 @@ mod line_claims;
 mod line_journeys;
 mod line_same_seed;
 mod line_sensors;
+mod line_services;
 mod line_slides;
 mod oval;
 mod reports;
