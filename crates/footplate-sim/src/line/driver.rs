@@ -6,6 +6,8 @@
 //! Braking to a place is steered by the deceleration that is still needed, `(v² - v_target²) / 2d`: it is begun when
 //! that reaches the planned one, and what was braked too little is made up on the way.
 
+use core::fmt;
+
 use footplate_core::{Acceleration, Jerk, Length, Ratio, Speed, TimeSpan};
 
 use super::profile::LineProfile;
@@ -23,6 +25,10 @@ const GIVEN_UP: f64 = 0.8;
 const MAKING_UP: f64 = 1.5;
 /// Within this share of the limit a train counts as running at it.
 const AT_LIMIT: f64 = 0.995;
+/// From the gentlest start to what nobody on board would stand (m/s³); 0.3 to 0.8 is usual.
+const JERKS_M_PER_S3: [f64; 2] = [0.01, 100.0];
+/// Slower than any driver or brake (s).
+const LONGEST_DELAY_S: f64 = 60.0;
 /// The least deceleration with which a stop is eased off (m/s²), so that it ends.
 const LAST_BRAKING_M_PER_S2: f64 = 0.05;
 
@@ -53,7 +59,46 @@ impl Style {
         anticipation: TimeSpan::ZERO,
         response: TimeSpan::from_ms(1000),
     };
+
+    /// Whether every value is one that a driver can keep to.
+    ///
+    /// # Errors
+    /// The first value that is out of range.
+    pub fn check(&self) -> Result<(), StyleError> {
+        let within = |what, value: f64, [lowest, highest]: [f64; 2]| {
+            let fits = lowest <= value && value <= highest;
+            if fits { Ok(()) } else { Err(StyleError { what, value, lowest, highest }) }
+        };
+        within("share of traction", self.traction.as_parts(), [0.01, 1.0])?;
+        within("share of braking", self.braking.as_parts(), [0.01, 1.0])?;
+        within("share to coast to", self.coast_to.map_or(0.5, Ratio::as_parts), [0.1, AT_LIMIT])?;
+        within("jerk", self.jerk.map_or(1.0, Jerk::as_m_per_s3), JERKS_M_PER_S3)?;
+        within("anticipation", self.anticipation.as_s(), [0.0, LONGEST_DELAY_S])?;
+        within("response", self.response.as_s(), [0.0, LONGEST_DELAY_S])
+    }
 }
+
+/// A value that no driver can keep to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StyleError {
+    /// What it is the value of, in SI units.
+    pub what: &'static str,
+    /// The value.
+    pub value: f64,
+    /// The least it can be.
+    pub lowest: f64,
+    /// The most it can be.
+    pub highest: f64,
+}
+
+impl fmt::Display for StyleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, value, lowest, highest } = self;
+        write!(f, "the driver's {what} is {value}; it should lie between {lowest} and {highest}")
+    }
+}
+
+impl core::error::Error for StyleError {}
 
 /// What a train does at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,7 +164,8 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// A driver who stands at the first stop of the line.
+    /// A driver who stands at the first stop of the line. Of a train or a style that
+    /// [`Train::check`] or [`Style::check`] refuses, nothing is promised.
     #[must_use]
     pub fn new(train: Train, line: LineProfile, style: Style) -> Self {
         let max_speed = train.max_speed.as_m_per_s();
@@ -216,8 +262,9 @@ impl Driver {
             let from = if self.coasting { share.as_parts() } else { AT_LIMIT };
             speed >= from * limit
         });
+        let freely = -against_n / inertia;
         let (mut wanted, mut phase) = if self.coasting {
-            (hold.min(-against_n / inertia), Phase::Coasting)
+            (hold.min(freely), Phase::Coasting)
         } else if hold < fullest && speed >= AT_LIMIT * limit {
             (hold, Phase::Cruising)
         } else {
@@ -230,13 +277,11 @@ impl Driver {
         }
         if let Some(jerk) = self.style.jerk {
             let change = jerk.as_m_per_s3() * step.as_s();
-            wanted = wanted.clamp(self.acceleration - change, self.acceleration + change);
+            wanted = wanted.min(self.acceleration + change).max(self.acceleration - change);
         }
-        let mut force_n = wanted * inertia + against_n;
-        if phase == Phase::Coasting && hold >= 0.0 {
-            force_n = force_n.min(0.0);
-        }
-        let force_n = force_n.clamp(-self.train.brake.full_n, pull_n.max(0.0));
+        // Rolling freely is no force at all, and not a rounding of one.
+        let force_n = if wanted == freely { 0.0 } else { wanted * inertia + against_n };
+        let force_n = force_n.min(pull_n).max(-self.train.brake.full_n);
         self.acceleration = (force_n - against_n) / inertia;
         Command { effort: self.train.effort(force_n, state.speed), force_n, phase }
     }
@@ -265,36 +310,37 @@ impl Driver {
             // No way left asks for the most there is.
             if faster <= 0.0 { 0.0 } else { (faster / (2.0 * way)).min(MAKING_UP * planned) }
         };
+        // The command holds for a step, so that easing off looks one step ahead.
+        let after = speed + self.acceleration.min(0.0) * step.as_s();
+        let asked = |target: &Target| {
+            let easing = self.style.jerk.map_or(f64::INFINITY, |jerk| {
+                let gap = (after - target.speed).max(0.0);
+                libm::sqrt(2.0 * jerk.as_m_per_s3() * gap).max(LAST_BRAKING_M_PER_S2)
+            });
+            if speed > target.speed { needed(target).min(easing) } else { 0.0 }
+        };
         let first = self.drops.partition_point(|drop| drop.at <= state.front.as_m());
         let horizon = front + meets * meets / (2.0 * planned) + eased(planned, meets, jerk);
-        let most = self.drops[first..]
-            .iter()
-            .take_while(|drop| drop.at <= horizon)
-            .chain([&stop])
-            .map(|target| (needed(target), *target))
-            .filter(|(needed, _)| *needed >= planned)
-            .max_by(|(one, _), (other, _)| one.total_cmp(other))
-            .map(|(_, target)| target);
+        let due = self.drops[first..].iter().take_while(|drop| drop.at <= horizon).chain([&stop]);
+        let most = due
+            .filter(|target| needed(target) >= planned)
+            .max_by(|one, other| asked(one).total_cmp(&asked(other)))
+            .copied();
         let held = self.braking_to.filter(|target| {
             let before = target.speed == 0.0 || state.front.as_m() < target.at;
             before && (speed <= target.speed || needed(target) >= GIVEN_UP * planned)
         });
-        // What is braked to already stays, unless something else asks for more.
+        // What is braked to already stays, unless something else asks for more now: who eases off to a limit may have
+        // to brake again for the stop behind it.
         self.braking_to = match (held, most) {
-            (Some(held), Some(most)) if needed(&held) >= needed(&most) => Some(held),
+            (Some(held), Some(most)) if asked(&held) >= asked(&most) => Some(held),
             (held, most) => most.or(held),
         };
         let target = self.braking_to?;
         if speed <= target.speed {
             return Some(self.approach(target.speed - speed, response));
         }
-        let easing = self.style.jerk.map_or(f64::INFINITY, |jerk| {
-            // The command holds for a step, so that easing off looks one step ahead.
-            let after = speed + self.acceleration.min(0.0) * step.as_s();
-            let gap = (after - target.speed).max(0.0);
-            libm::sqrt(2.0 * jerk.as_m_per_s3() * gap).max(LAST_BRAKING_M_PER_S2)
-        });
-        Some(-needed(&target).min(easing))
+        Some(-asked(&target))
     }
 
     /// Where the front is and how fast the train runs (m, m/s) when what the driver does now has come to bear: after

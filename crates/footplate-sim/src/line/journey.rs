@@ -5,7 +5,7 @@
 
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 
-use super::driver::{Driver, Phase, State, Style};
+use super::driver::{Driver, Phase, State, Style, StyleError};
 use super::profile::LineProfile;
 use super::train::{Train, TrainError};
 
@@ -72,7 +72,7 @@ impl Journey {
     /// Runs a train along a line, one `step` after the other (1 ms to 1 s; 50 ms is as good as exact).
     ///
     /// # Errors
-    /// A value that no train has, a step out of range, or a train that does not get there.
+    /// A value that no train or driver has, a step out of range, or a train that does not get there.
     pub fn run(
         train: &Train,
         line: &LineProfile,
@@ -80,6 +80,7 @@ impl Journey {
         step: TimeSpan,
     ) -> Result<Self, JourneyError> {
         train.check()?;
+        style.check()?;
         let [shortest, longest] = STEPS_MS.map(TimeSpan::from_ms);
         if step < shortest || longest < step {
             return Err(JourneyError::Step { step_s: step.as_s() });
@@ -212,6 +213,9 @@ pub enum JourneyError {
     /// The train is none.
     #[error(transparent)]
     Train(#[from] TrainError),
+    /// The driver is none.
+    #[error(transparent)]
+    Style(#[from] StyleError),
     /// A step that is no use.
     #[error("a step of {step_s} s is out of range; it should lie between 0.001 and 1 s")]
     Step {

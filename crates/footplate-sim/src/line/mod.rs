@@ -58,7 +58,7 @@ mod tractive_effort;
 mod train;
 mod vehicle;
 
-pub use driver::{Command, Driver, Phase, State, Style};
+pub use driver::{Command, Driver, Phase, State, Style, StyleError};
 pub use journey::{Call, Journey, JourneyError, Moment, Work};
 pub use profile::{
     LineError, LineParts, LineProblem, LineProfile, STEEPEST_PER_MILLE, Stop, TIGHTEST_PER_MILLE,

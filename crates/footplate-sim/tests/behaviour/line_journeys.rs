@@ -110,21 +110,23 @@ fn a_finer_step_changes_a_running_time_by_less_than_two_steps() {
 fn jerk_stays_within_what_the_driver_was_given() {
     let limits = [(0.0, 20.0), (800.0, 10.0), (1500.0, 20.0)];
     let level = line(&limits, &[], &[0.0, 2500.0]);
-    let style = Style { jerk: Some(Jerk::from_m_per_s3(0.5)), ..Style::FASTEST };
-    let run = Journey::run(&train(), &level, style, STEP).unwrap();
-    let moving: Vec<_> = run.moments.iter().filter(|moment| moment.phase != Phase::Standing).collect();
-    for pair in moving.windows(2) {
-        let change = (pair[1].acceleration - pair[0].acceleration).as_m_per_s2().abs();
-        assert!(change <= 0.5 * STEP.as_s() + 0.01, "{change} at {:?}", pair[0]);
+    for coast_to in [None, Some(Ratio::from_percent(80.0))] {
+        let style = Style { jerk: Some(Jerk::from_m_per_s3(0.5)), coast_to, ..Style::FASTEST };
+        let run = Journey::run(&train(), &level, style, STEP).unwrap();
+        let moving: Vec<_> = run.moments.iter().filter(|moment| moment.phase != Phase::Standing).collect();
+        for pair in moving.windows(2) {
+            let change = (pair[1].acceleration - pair[0].acceleration).as_m_per_s2().abs();
+            assert!(change <= 0.5 * STEP.as_s() + 0.01, "{change} at {:?}", pair[0]);
+        }
+        // It stands without a jolt, where it should.
+        let last = moving.last().unwrap();
+        assert!(
+            last.acceleration.abs() < Acceleration::from_m_per_s2(0.15),
+            "{:?}",
+            &moving[moving.len() - 20..]
+        );
+        assert!(run.calls[1].beyond.abs() < Length::from_m(0.3), "{:?}", run.calls[1]);
     }
-    // It stands without a jolt, where it should.
-    let last = moving.last().unwrap();
-    assert!(
-        last.acceleration.abs() < Acceleration::from_m_per_s2(0.15),
-        "{:?}",
-        &moving[moving.len() - 20..]
-    );
-    assert!(run.calls[1].beyond.abs() < Length::from_m(0.3), "{:?}", run.calls[1]);
 }
 
 #[test]
@@ -162,6 +164,40 @@ fn of_a_long_stop_the_first_and_the_last_moment_are_kept() {
     let call = run.calls[1];
     assert_eq!(times, [call.arrives, call.departs - STEP]);
     assert_eq!((call.departs - call.arrives).as_s(), 8.0 * 3600.0);
+}
+
+#[test]
+fn who_eases_off_to_a_limit_brakes_again_for_the_stop_behind_it() {
+    // Found at random: 20 m behind the begin of a limit of 6 m/s lies a stop, as far off as the brake needs from there.
+    let limits = [(0.0, 5.0), (100.0, 27.5), (1300.0, 6.26), (2000.0, 5.0)];
+    let level = line(&limits, &[], &[0.0, 1320.7, 2500.0]);
+    for jerk in [0.3, 0.5, 0.8] {
+        let style = Style { jerk: Some(Jerk::from_m_per_s3(jerk)), ..Style::FASTEST };
+        let run = Journey::run(&train(), &level, style, TimeSpan::from_ms(5)).unwrap();
+        assert!(run.calls[1].beyond.abs() < Length::from_m(0.3), "{jerk}: {:?}", run.calls[1]);
+    }
+}
+
+#[test]
+fn what_no_driver_can_keep_to_is_named() {
+    let level = line(&[(0.0, 9.0)], &[], &[0.0, 1000.0]);
+    let fault = |style| Journey::run(&train(), &level, style, STEP).unwrap_err().to_string();
+    assert_eq!(
+        fault(Style { jerk: Some(Jerk::from_m_per_s3(-1.0)), ..Style::FASTEST }),
+        "the driver's jerk is -1; it should lie between 0.01 and 100"
+    );
+    assert!(
+        fault(Style { braking: Ratio::from_parts(0.0), ..Style::FASTEST }).contains("share of braking is 0;")
+    );
+    assert!(fault(Style { traction: Ratio::from_parts(f64::NAN), ..Style::FASTEST }).contains("is NaN;"));
+    // One that is driven nevertheless does not panic, whatever comes in.
+    let style = Style { jerk: Some(Jerk::from_m_per_s3(f64::NAN)), ..Style::FASTEST };
+    let mut driver = Driver::new(train(), level, style);
+    for speed in [0.0, 5.0, f64::NAN, -3.0, f64::INFINITY] {
+        let state = State { front: place(10.0), speed: Speed::from_m_per_s(speed) };
+        assert!(driver.command(state, STEP).effort.abs() <= 1.0);
+        driver = Driver::new(driver.train().clone(), driver.line().clone(), Style::FASTEST);
+    }
 }
 
 #[test]
