@@ -118,7 +118,11 @@ impl Channels {
 
     fn channel(&mut self, at: usize, time: f64, mut seen: Edges, noise: i64) -> WheelSample {
         let lasting = self.lasts.0 <= time && time < self.lasts.1 && at == 1;
-        let mut pulses = Some(0);
+        let mut is_lost = false;
+        if self.fault == Fault::DeadWhenSlow {
+            // One coil knows no direction.
+            (seen.forward, seen.backward) = (seen.forward + seen.backward, 0);
+        }
         match self.fault {
             Fault::DeadWhenSlow if seen.rate.abs() < self.slowest => {
                 seen = Edges { rate: seen.rate, ..Edges::default() }
@@ -139,9 +143,11 @@ impl Channels {
                     seen.forward += self.burst();
                 }
                 if self.draws.chance(DROPOUT_RATE) {
-                    // Half of them say nothing, half of them zero.
-                    pulses = self.draws.chance(0.5).then_some(0);
-                    seen = Edges { rate: seen.rate, ..Edges::default() };
+                    // Half of the time the report is lost and the counter goes on, half of the time the pulses are.
+                    is_lost = self.draws.chance(0.5);
+                    if !is_lost {
+                        seen = Edges { rate: seen.rate, ..Edges::default() };
+                    }
                 }
             }
             _ => {}
@@ -155,13 +161,15 @@ impl Channels {
         if net != 0 {
             self.turned[at] = Some(if net > 0 { Turned::Forward } else { Turned::Backward });
         }
-        let last_edge = seen.last.filter(|_| seen.forward + seen.backward > 0);
-        let counts = pulses.map(|zero| zero + seen.forward + seen.backward);
+        if is_lost {
+            return WheelSample { pulses: None, counter: None, turned: None, last_edge: None };
+        }
+        let pulses = seen.forward + seen.backward;
         WheelSample {
-            pulses: counts.filter(|_| self.fault != Fault::CountersOnly),
-            counter: pulses.map(|_| self.counters[at]),
+            pulses: (self.fault != Fault::CountersOnly).then_some(pulses),
+            counter: Some(self.counters[at]),
             turned: self.turned[at].filter(|_| self.fault != Fault::DeadWhenSlow),
-            last_edge: last_edge.map(to_microsecond),
+            last_edge: seen.last.filter(|_| pulses > 0).map(to_microsecond),
         }
     }
 }

@@ -41,10 +41,10 @@ pub struct LineSample {
 pub struct WheelSample {
     /// Pulses within the period, both ways together; absent if there was no report.
     pub pulses: Option<i64>,
-    /// The running counter: forward less backward pulses, modulo
+    /// The running counter, which goes on where a report is lost: forward less backward pulses, modulo
     /// [`counter_modulus`](super::LineVehicle::counter_modulus).
     pub counter: Option<i64>,
-    /// Which way the phases of the sensor say that it turned last; absent as long as it has not turned.
+    /// Which way the phases of the sensor say that it turned last; absent if it has not turned yet or cannot tell.
     pub turned: Option<Turned>,
     /// When the last pulse of the period came, to a microsecond.
     pub last_edge: Option<Timestamp>,

@@ -55,8 +55,8 @@ pub struct LineBrake {
 
 /// How much more than a train's design is claimed: its strength is drawn within 7 %.
 pub(crate) const BRAKE_TOLERANCE: f64 = 0.1;
-/// The same where one wheelset of 16, or two of 32, do not brake with the train.
-pub(crate) const LOOSE_BRAKE_TOLERANCE: f64 = 0.15;
+/// The same where one wheelset of 16, or two of 32, do not brake with the train, or catch up with it on a dry rail.
+pub(crate) const LOOSE_BRAKE_TOLERANCE: f64 = 0.17;
 /// What is left out of the sums behind a claim: steps of rounding, rotation, creepage (m/s²).
 const ROOM_M_PER_S2: f64 = 0.05;
 /// How much faster than it may a train can be while its driver corrects that (part of its speed).

@@ -59,7 +59,7 @@ const PINNED: [u64; 25] = [
     0x7a31_eff8_e753_2c3f,
     0x9980_a57c_7e31_124d,
     0xccb7_501c_7708_4596,
-    0xcf53_4b4f_3c40_a909,
+    0xd18c_e34f_229c_80fd,
 ];
 
 #[test]
