@@ -1,6 +1,7 @@
 //! Speeds, laws of speed change, stops, lengths and wheel diameters: numbers with uncertainty, from reports.
 
 mod balise_accuracy;
+mod balise_passage;
 mod calibrate;
 mod drift_test;
 mod fitted_change;

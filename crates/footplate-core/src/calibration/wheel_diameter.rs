@@ -10,6 +10,7 @@ use core::fmt;
 use libm::{log, sqrt};
 
 use super::balise_accuracy::BaliseAccuracy;
+use super::balise_passage::{PairedWay, Passage, ways};
 use super::scale_filter::ScaleFilter;
 use super::scale_interval::ScaleInterval;
 use crate::estimate::Estimate;
@@ -27,9 +28,6 @@ const COMPARED_DEVIATION: f64 = 3e-4;
 /// Mean creepage of a rolling wheel over a pair of balises (one standard deviation). Chosen: the lower end of what normal
 /// traction and braking make (0.1 to 1 %), because most of a way is neither.
 const CREEPAGE_DEVIATION: f64 = 3e-4;
-/// No wheel that was never found slipping or sliding creeps more than this in the mean over a pair, its cone in curves
-/// included. Chosen: 0.1 % for curves and 0.2 % for creepage.
-const CREEPAGE_BOUND: f64 = 3e-3;
 /// The scale changes by no more than this part in a kilometre: thirty times the fastest wear (0.3 mm in 10 000 km).
 const CHANGES_PER_KM: f64 = 1e-6;
 /// From one step to the next in which a way makes the scales less certain (m). Chosen: so rare that it costs nothing.
@@ -69,15 +67,6 @@ pub enum PairVerdict {
     },
 }
 
-/// Where a balise was passed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Passage {
-    place: Length,
-    counted: [Length; 2],
-    /// Which wheelsets were counted and rolled ever since.
-    rolled: [bool; 2],
-}
-
 /// Learns the scales of two wheelsets. Fixed memory.
 #[derive(Debug, Clone)]
 pub struct WheelDiameters {
@@ -91,11 +80,14 @@ pub struct WheelDiameters {
     trusted: Option<Passage>,
     /// A later one that did not. It is the right one if the next agrees with it.
     doubted: Option<Passage>,
+    /// For each wheelset the first balise of those that agreed since which it has rolled.
+    origins: [Option<Passage>; 2],
     /// Where both began to roll with little effort.
     comparing_from: Option<[Length; 2]>,
     /// Whether the axles were compared since the latest pair; the pair then says nothing new about their ratio.
     compared: bool,
     counted: [Length; 2],
+    counted_before: [Length; 2],
     grown_at: [Length; 2],
 }
 
@@ -114,9 +106,11 @@ impl WheelDiameters {
             dates: [Timestamp::ZERO; 2],
             trusted: None,
             doubted: None,
+            origins: [None; 2],
             comparing_from: None,
             compared: false,
             counted: [Length::ZERO; 2],
+            counted_before: [Length::ZERO; 2],
             grown_at: [Length::ZERO; 2],
         }
     }
@@ -155,7 +149,8 @@ impl WheelDiameters {
     /// nearly so.
     pub fn roll(&mut self, time: Timestamp, counted: [Length; 2], rolling: [bool; 2], little_effort: bool) {
         self.grow(counted);
-        for passage in [&mut self.trusted, &mut self.doubted].into_iter().flatten() {
+        let Self { trusted, doubted, origins: [first, second], .. } = self;
+        for passage in [trusted, doubted, first, second].into_iter().flatten() {
             for (rolled, rolling) in passage.rolled.iter_mut().zip(rolling) {
                 *rolled &= rolling;
             }
@@ -180,7 +175,15 @@ impl WheelDiameters {
         if !place.is_finite() {
             return PairVerdict::Refused { said: place, low: Length::ZERO, high: Length::ZERO };
         }
-        let here = Passage { place, counted: self.counted, rolled: [true; 2] };
+        let [first, second] = ways(self.counted_before, self.counted).map(|way| way * 0.5);
+        let [first_before, second_before] = self.counted_before;
+        let [first_now, second_now] = self.counted;
+        let here = Passage {
+            place,
+            counted: [(first_before + first_now) * 0.5, (second_before + second_now) * 0.5],
+            within: [first, second],
+            rolled: [true; 2],
+        };
         let mut refusal = None;
         for before in [self.trusted, self.doubted].into_iter().flatten() {
             match self.pair(time, &before, &here) {
@@ -241,6 +244,7 @@ impl WheelDiameters {
 
     /// What a way makes less certain, in steps that every period can afford.
     fn grow(&mut self, counted: [Length; 2]) {
+        self.counted_before = self.counted;
         self.counted = counted;
         let [first, second] = ways(self.grown_at, counted);
         let way = first.max(second).as_m();
@@ -270,54 +274,68 @@ impl WheelDiameters {
     }
 
     fn pair(&mut self, time: Timestamp, from: &Passage, to: &Passage) -> PairVerdict {
-        let counted = ways(from.counted, to.counted);
-        let said = (to.place - from.place) * direction(from.counted, to.counted);
         if from.rolled == [false; 2] {
             return PairVerdict::Disturbed;
         }
-        let rolled = || from.rolled.iter().zip(counted).filter(|(rolled, _)| **rolled).map(|(_, way)| way);
-        if rolled().all(|way| way.as_m() < NEAREST_PAIR_M) && said.abs().as_m() < NEAREST_PAIR_M {
+        let ways = from.ways_to(to);
+        let near = |way: &PairedWay| way.counted.max(way.said.abs()).as_m() < NEAREST_PAIR_M;
+        if ways.iter().filter(|way| way.rolled).all(near) {
             return PairVerdict::TooNear;
         }
-
         let off = 2.0 * self.balise.bound;
         let mut met = self.intervals;
-        for (((interval, wheelset), way), rolled) in
-            met.iter_mut().zip(&self.wheelsets).zip(counted).zip(from.rolled)
-        {
-            if !rolled {
-                continue;
-            }
+        for ((interval, wheelset), way) in met.iter_mut().zip(&self.wheelsets).zip(&ways) {
             let pulse = wheelset.pulse_pitch();
-            let counts = [way - pulse, way + pulse];
-            let truths = [(said - off) * (1.0 - CREEPAGE_BOUND), (said + off) * (1.0 + CREEPAGE_BOUND)];
-            match ScaleInterval::of_way(truths, counts).and_then(|pair| interval.meet(pair)) {
+            match way.allows(off, pulse).and_then(|pair| interval.meet(pair)) {
+                _ if !way.rolled => {}
                 Some(both) => *interval = both,
                 None => {
-                    let low = (way - pulse).max(Length::ZERO) * (interval.low / (1.0 + CREEPAGE_BOUND)) - off;
-                    let high = (way + pulse) * (interval.high / (1.0 - CREEPAGE_BOUND)) + off;
-                    return PairVerdict::Refused { said, low: low.max(Length::ZERO), high };
+                    let [low, high] = way.possible(*interval, off, pulse);
+                    return PairVerdict::Refused { said: way.said, low, high };
                 }
             }
         }
         self.intervals = met;
+        self.lengthen(from, to);
         // In advance, for the way until the next step.
         self.widen(GROWS_EVERY_M);
-        self.learn(said, counted, from.rolled);
+        self.learn(&ways);
         self.settle(time, from.rolled);
         PairVerdict::Accepted
     }
 
+    /// Pairs a balise with the first since which each wheelset has rolled: the longer the way, the less the balises leave open.
+    fn lengthen(&mut self, from: &Passage, to: &Passage) {
+        let off = 2.0 * self.balise.bound;
+        let each = self.origins.iter_mut().zip(&mut self.intervals).zip(&self.wheelsets);
+        for (wheel, ((origin, interval), wheelset)) in each.enumerate() {
+            let has_rolled = |passage: &Passage| passage.rolled.get(wheel) == Some(&true);
+            if !origin.as_ref().is_some_and(has_rolled) {
+                *origin = Some(*from).filter(has_rolled);
+            }
+            let Some(way) = origin.and_then(|origin| origin.ways_to(to).into_iter().nth(wheel)) else {
+                continue;
+            };
+            // The scale has changed on the way.
+            let changed = CHANGES_PER_KM * way.counted.as_m() / 1000.0;
+            let allowed = way.allows(off, wheelset.pulse_pitch()).map(|allowed| allowed.widened(changed));
+            // Where nothing is left, the balises agree in pairs and not over all: one bound was broken by little. Pairs win.
+            *interval = allowed.and_then(|allowed| interval.meet(allowed)).unwrap_or(*interval);
+        }
+    }
+
     /// Gives a pair to the filter. The error of the balises is the same for both wheelsets and is not counted twice.
-    fn learn(&mut self, said: Length, [first, second]: [Length; 2], rolled: [bool; 2]) {
+    fn learn(&mut self, [one, other]: &[PairedWay; 2]) {
         let [first_pulse, second_pulse] = self.wheelsets.map(|wheelset| wheelset.pulse_pitch());
-        // Each end of the pair has its own error.
-        let balises = 2.0 * (self.balise.deviation / said) * (self.balise.deviation / said);
+        let (said, first, second) = (one.said, one.counted, other.counted);
+        // Each end of the pair has its own error, and is at any time of its period: even over the way of the period.
+        let (balise, periods) = (self.balise.deviation / said, one.within / said);
+        let balises = 2.0 * balise * balise + periods * periods / 3.0;
         let own = |pulse: Length, way: Length| {
             CREEPAGE_DEVIATION * CREEPAGE_DEVIATION + pulse_variance(pulse / way)
         };
         let (of_first, of_second) = (own(first_pulse, first), own(second_pulse, second));
-        match rolled {
+        match [one.rolled, other.rolled] {
             [true, true] => {
                 let mean = 0.5 * (log(said / first) + log(said / second));
                 self.filter.measure([0.5, 0.5], mean, balises + 0.25 * (of_first + of_second));
@@ -341,15 +359,6 @@ impl WheelDiameters {
             }
         }
     }
-}
-
-fn ways([first_from, second_from]: [Length; 2], [first, second]: [Length; 2]) -> [Length; 2] {
-    [(first - first_from).abs(), (second - second_from).abs()]
-}
-
-/// 1 when the wheels turned forward, −1 when backward.
-fn direction([first_from, second_from]: [Length; 2], [first, second]: [Length; 2]) -> f64 {
-    if first + second < first_from + second_from { -1.0 } else { 1.0 }
 }
 
 /// What the pulses at both ends of a way leave open of its logarithm.

@@ -15,3 +15,4 @@ mod simulate;
 mod simulated;
 mod store;
 mod usage;
+mod wheel_scales;

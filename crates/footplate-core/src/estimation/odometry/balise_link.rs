@@ -7,10 +7,11 @@
 //! Linking (SUBSET-026-3, 3.4.4) says where the next balise lies, so that one that is not there is noticed too: it is due
 //! within a window, and missed when the train is past it for certain.
 
-use libm::sqrt;
-
 use crate::calibration::BaliseAccuracy;
 use crate::units::Length;
+
+/// The square of a width over the variance of what is even over it.
+const EVEN: f64 = 12.0;
 
 /// A distance and between which bounds it lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,24 +87,31 @@ impl BaliseLink {
         Some(MissedBalise { place, low: now.low })
     }
 
-    /// Judges a balise that was passed just now and says what is known of the distance after it.
-    pub fn pass(&mut self, place: Length, now: &DistanceInterval) -> BaliseVerdict {
+    /// Judges a balise that was passed within the period that has just ended, in which the train ran at most so far, and says
+    /// what is known of the distance at its end.
+    pub fn pass(&mut self, place: Length, ran: Length, now: &DistanceInterval) -> BaliseVerdict {
         let bound = self.accuracy.bound;
-        let low = now.low.max(place - bound);
-        let high = now.high.min(place + bound);
-        if place.is_finite() && low <= high {
+        // Forward or backward, it lies somewhere on the way of the period.
+        let [least, most] = [place - bound + ran.min(Length::ZERO), place + bound + ran.max(Length::ZERO)];
+        let (low, high) = (now.low.max(least), now.high.min(most));
+        if place.is_finite() && ran.is_finite() && low <= high {
             self.heard(place);
-            return BaliseVerdict::Accepted(self.between(place, now, low, high));
+            let middle = place + ran * 0.5;
+            return BaliseVerdict::Accepted(self.between(middle, ran, now, [low, high]));
         }
         match self.unexpected {
-            Some((before, then)) if agree(place - before, bound, &then, now) => {
+            Some((before, then)) if agree(place - before, bound + ran.abs(), &then, now) => {
                 self.heard(place);
-                let [low, high] = [place - bound, place + bound];
-                BaliseVerdict::Contradicts(DistanceInterval { estimate: place, low, high })
+                BaliseVerdict::Contradicts(DistanceInterval {
+                    estimate: place + ran * 0.5,
+                    low: least,
+                    high: most,
+                })
             }
             _ => {
                 self.unexpected = Some((place, *now));
-                BaliseVerdict::Unexpected { place, low: now.low - bound, high: now.high + bound }
+                let (low, high) = (now.low - (most - place), now.high + (place - least));
+                BaliseVerdict::Unexpected { place, low, high }
             }
         }
     }
@@ -115,11 +123,18 @@ impl BaliseLink {
 
     /// Weighs the place against the estimate. Of that no more is known here than its bounds, between which every distance
     /// is as likely.
-    fn between(&self, place: Length, now: &DistanceInterval, low: Length, high: Length) -> DistanceInterval {
-        let odometer = ((now.high - now.low) / sqrt(12.0)).as_m();
-        let balise = self.accuracy.deviation.as_m();
-        let both = odometer * odometer + balise * balise;
-        let gain = if both > 0.0 { odometer * odometer / both } else { 0.0 };
+    fn between(
+        &self,
+        place: Length,
+        ran: Length,
+        now: &DistanceInterval,
+        [low, high]: [Length; 2],
+    ) -> DistanceInterval {
+        let square = |length: Length| length.as_m() * length.as_m();
+        let odometer = square(now.high - now.low) / EVEN;
+        let balise = square(self.accuracy.deviation) + square(ran) / EVEN;
+        let both = odometer + balise;
+        let gain = if both > 0.0 { odometer / both } else { 0.0 };
         let estimate = (now.estimate + (place - now.estimate) * gain).max(low).min(high);
         DistanceInterval { estimate, low, high }
     }
@@ -148,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_balise_narrows_the_bounds_to_what_both_allow() {
-        let verdict = link().pass(Length::from_m(1512.0), &interval(1500.0, 1485.0, 1513.0));
+        let verdict = link().pass(Length::from_m(1512.0), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
         let BaliseVerdict::Accepted(now) = verdict else { panic!("{verdict:?}") };
         assert_eq!((now.low.as_m(), now.high.as_m()), (1510.0, 1513.0));
         // Even over 28 m is a deviation of 8.1 m, 16 times that of the balise: 12 m shrink to 5 cm.
@@ -157,7 +172,7 @@ mod tests {
 
     #[test]
     fn an_odometer_that_knows_better_keeps_its_estimate() {
-        let verdict = link().pass(Length::from_m(100.4), &interval(100.0, 99.9, 100.1));
+        let verdict = link().pass(Length::from_m(100.4), Length::ZERO, &interval(100.0, 99.9, 100.1));
         assert!(
             matches!(verdict, BaliseVerdict::Accepted(now) if now.estimate.as_m() < 100.01),
             "{verdict:?}"
@@ -167,11 +182,11 @@ mod tests {
     #[test]
     fn an_impossible_balise_is_refused_with_its_numbers() {
         for place in [700.0, 1483.0 - 0.1, 1515.0 + 0.1] {
-            let verdict = link().pass(Length::from_m(place), &interval(1500.0, 1485.0, 1513.0));
+            let verdict = link().pass(Length::from_m(place), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
             let [place, low, high] = [place, 1483.0, 1515.0].map(Length::from_m);
             assert_eq!(verdict, BaliseVerdict::Unexpected { place, low, high });
         }
-        let nothing = link().pass(Length::from_m(f64::NAN), &interval(1500.0, 1485.0, 1513.0));
+        let nothing = link().pass(Length::from_m(f64::NAN), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
         assert!(matches!(nothing, BaliseVerdict::Unexpected { .. }));
     }
 
@@ -180,12 +195,12 @@ mod tests {
         let mut link = link();
         let then = interval(1500.0, 1485.0, 1515.0);
         let now = interval(2500.0, 2475.0, 2525.0);
-        link.pass(Length::from_m(1800.0), &then);
-        let verdict = link.pass(Length::from_m(2803.0), &now);
+        link.pass(Length::from_m(1800.0), Length::ZERO, &then);
+        let verdict = link.pass(Length::from_m(2803.0), Length::ZERO, &now);
         assert_eq!(verdict, BaliseVerdict::Contradicts(interval(2803.0, 2801.0, 2805.0)));
 
-        link.pass(Length::from_m(1800.0), &then);
-        let apart = link.pass(Length::from_m(9000.0), &now);
+        link.pass(Length::from_m(1800.0), Length::ZERO, &then);
+        let apart = link.pass(Length::from_m(9000.0), Length::ZERO, &now);
         assert!(matches!(apart, BaliseVerdict::Unexpected { .. }), "they are too far apart");
     }
 
@@ -207,28 +222,32 @@ mod tests {
         let mut link = link();
         link.link(Length::from_m(2000.0));
         // Another one before it is not the one that is due.
-        link.pass(Length::from_m(1990.0), &interval(1992.0, 1980.0, 2005.0));
+        link.pass(Length::from_m(1990.0), Length::ZERO, &interval(1992.0, 1980.0, 2005.0));
         assert!(link.due(&interval(1990.0, 1988.0, 1992.0)).is_some());
-        link.pass(Length::from_m(2001.0), &interval(2000.0, 1990.0, 2010.0));
+        link.pass(Length::from_m(2001.0), Length::ZERO, &interval(2000.0, 1990.0, 2010.0));
         assert_eq!(link.missed(&interval(3000.0, 2990.0, 3010.0)), None);
     }
 
     proptest! {
-        /// Bounds that held the truth hold it after every balise within its bound, and are no wider.
+        /// Bounds that held the truth hold it after every balise within its bound, wherever in its period it was passed, and are
+        /// no wider.
         #[test]
         fn bounds_go_on_holding_the_truth(
             passages in prop::collection::vec(
-                (0.0..2000.0_f64, 0.0..0.05_f64, 0.0..0.05_f64, 0.0..=1.0_f64, -2.0..2.0_f64), 1..30),
+                (0.0..2000.0_f64, 0.0..0.05_f64, 0.0..0.05_f64, 0.0..=1.0_f64, -2.0..2.0_f64, -4.0..4.0_f64, 0.0..=1.0_f64),
+                1..30,
+            ),
         ) {
             let mut link = link();
             let mut now = interval(0.0, 0.0, 0.0);
             let mut truth = 0.0;
-            for (way, below, above, place, error) in passages {
+            for (way, below, above, place, error, ran, part) in passages {
                 now.low += Length::from_m(way * (1.0 - below));
                 now.high += Length::from_m(way * (1.0 + above));
                 now.estimate += Length::from_m(way);
                 truth += way * (1.0 - below + (below + above) * place);
-                let verdict = link.pass(Length::from_m(truth + error), &now);
+                let said = Length::from_m(truth - ran * part + error);
+                let verdict = link.pass(said, Length::from_m(ran), &now);
                 let BaliseVerdict::Accepted(after) = verdict else {
                     return Err(TestCaseError::fail(std::format!("{verdict:?}")));
                 };
