@@ -14,6 +14,7 @@ mod layout_file;
 mod line_file;
 pub mod odometry;
 mod published_table;
+mod railtoolkit;
 mod recording;
 pub mod score;
 mod sensor_log;
@@ -22,6 +23,7 @@ mod store;
 mod table;
 mod tachometer;
 mod train_file;
+mod ttobench;
 mod vehicle_file;
 mod whole_file;
 

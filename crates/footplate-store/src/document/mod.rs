@@ -14,6 +14,6 @@ pub use error::{DocumentError, DocumentProblem};
 pub use text::LARGEST_DOCUMENT;
 
 pub(crate) use error::Fault;
-pub(crate) use node::{Node, Place, Value};
+pub(crate) use node::{Node, Place};
 pub(crate) use table::{Range, Table, pairs};
 pub(crate) use text::{Syntax, parse, read_bytes};

@@ -32,8 +32,12 @@ impl<'a> Table<'a> {
 
     /// The value of a key.
     pub(crate) fn needs(&self, key: &str) -> Result<&'a Node, Fault> {
-        let missing =
-            || (self.place, DocumentProblem::MissingKey { key: key.to_owned(), of: self.of.to_owned() });
+        let missing = || {
+            (
+                self.place,
+                DocumentProblem::MissingKey { key: key.escape_debug().to_string(), of: self.of.to_owned() },
+            )
+        };
         self.get(key).ok_or_else(missing)
     }
 
@@ -84,6 +88,15 @@ impl<'a> Table<'a> {
     /// Where the value of a key stands, or the table if it has none.
     pub(crate) fn place_of(&self, key: &str) -> Place {
         self.get(key).map_or(self.place, |node| node.place)
+    }
+
+    /// Where an entry of a key's list stands, or the list if it has no such entry.
+    pub(crate) fn place_of_entry(&self, key: &str, index: usize) -> Place {
+        let item = match self.get(key).map(|node| &node.value) {
+            Some(Value::List(items)) => items.get(index),
+            _ => None,
+        };
+        item.map_or(self.place_of(key), |item| item.place)
     }
 
     /// Refuses every key but these.

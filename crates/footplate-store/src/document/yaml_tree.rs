@@ -89,6 +89,7 @@ impl Tree {
                         _ => return Err(node.not("a key", "text")),
                     };
                     if entries.iter().any(|(before, _)| *before == key) {
+                        let key = key.escape_debug().to_string();
                         return Err((node.place, DocumentProblem::KeyTwice { key }));
                     }
                     *waiting = Some(key);

@@ -4,7 +4,7 @@ use footplate_core::{Length, TimeSpan};
 use footplate_sim::line::{LineParts, Stop};
 
 use super::form::{LineFile, LineFileForm, at_places, built, limits};
-use crate::document::{DocumentProblem, Fault, Node, Place, Table, Value, pairs};
+use crate::document::{DocumentProblem, Fault, Node, Table, pairs};
 
 /// The version of the form.
 pub(super) const FORMAT: i64 = 1;
@@ -49,20 +49,10 @@ pub(super) fn read(node: &Node) -> Result<LineFile, Fault> {
             "stop" => "stops",
             _ => "speed_limits_km_h",
         };
-        entry(&table, key, error.index)
+        table.place_of_entry(key, error.index)
     })?;
     let about = table.optional_text("about")?.unwrap_or_default().trim().to_owned();
     Ok(LineFile { form: LineFileForm::Own, about, line })
-}
-
-/// Where an entry of a list stands, or the list if it has no such entry.
-pub(super) fn entry(table: &Table<'_>, key: &str, index: usize) -> Place {
-    let list = table.get(key).map(|node| &node.value);
-    let item = match list {
-        Some(Value::List(items)) => items.get(index),
-        _ => None,
-    };
-    item.map_or(table.place_of(key), |item| item.place)
 }
 
 fn stop(node: &Node) -> Result<Stop, Fault> {

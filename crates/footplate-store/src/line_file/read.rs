@@ -5,6 +5,7 @@ use std::path::Path;
 use super::form::{LineFile, LineFileForm};
 use super::{own, trainruns, ttobench};
 use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
+use crate::railtoolkit::listed;
 
 /// Reads the line in the file at `path`; `which` names one of several.
 ///
@@ -33,6 +34,17 @@ pub fn parse_line(file: &str, bytes: &[u8], which: Option<&str>) -> Result<LineF
             },
         )),
     };
+    let read = read.and_then(|file| {
+        // The forms with several in a file know them by their ids, and have chosen; the others have one, by its name.
+        let name = file.line.name();
+        match which.filter(|which| file.form != LineFileForm::TrainRuns && *which != name) {
+            Some(wanted) => {
+                let (wanted, found) = (wanted.to_owned(), listed(&[name]));
+                Err((node.place, DocumentProblem::NotThere { wanted, found }))
+            }
+            None => Ok(file),
+        }
+    });
     read.map_err(|fault| DocumentError::wrong(file, fault))
 }
 

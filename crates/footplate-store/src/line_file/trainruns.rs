@@ -7,18 +7,16 @@ use footplate_core::{Length, TimeSpan};
 use footplate_sim::line::{LineParts, Stop};
 
 use super::form::{LineFile, LineFileForm, at_places, built, limits};
-use super::own::entry;
 use crate::document::{Fault, Node, Table};
-use crate::train_file::{railtoolkit_chosen, railtoolkit_schema};
+use crate::railtoolkit::{VERSION, after_schema, chosen};
 
-/// The schema and the version that are read.
+/// The schema that is read.
 const SCHEMA: &str = "https://railtoolkit.org/schema/running-path.json";
-const VERSION: &str = "2022.05";
 
 pub(super) fn read(node: &Node, which: Option<&str>) -> Result<LineFile, Fault> {
     let table = Table::of(node, "a file of running paths")?;
-    railtoolkit_schema(&table, SCHEMA, VERSION)?;
-    let path = railtoolkit_chosen(&table, "paths", which)?;
+    after_schema(&table, SCHEMA)?;
+    let path = chosen(&table, "paths", which)?;
     let (mut speed_limits, mut gradients) = (Vec::new(), Vec::new());
     for section in path.list("characteristic_sections")? {
         const ITEMS: [&str; 3] = ["place in m", "limit in km/h", "resistance in per mille"];
@@ -39,7 +37,7 @@ pub(super) fn read(node: &Node, which: Option<&str>) -> Result<LineFile, Fault> 
         speed_limits: limits(&speed_limits),
         stops: stops.collect(),
     };
-    let line = built(parts, |error| entry(&path, "characteristic_sections", error.index))?;
+    let line = built(parts, |error| path.place_of_entry("characteristic_sections", error.index))?;
     let about = format!("From {SCHEMA}, {VERSION}: {}", path.text("id")?);
     Ok(LineFile { form: LineFileForm::TrainRuns, about, line })
 }

@@ -4,9 +4,8 @@ use footplate_core::{Length, TimeSpan};
 use footplate_sim::line::{LineParts, Stop};
 
 use super::form::{LineFile, LineFileForm, at_places, built, limits};
-use super::own::entry;
 use crate::document::{Fault, Node, Table, pairs};
-use crate::train_file::ttobench_about;
+use crate::ttobench::about;
 
 pub(super) fn read(node: &Node) -> Result<LineFile, Fault> {
     let table = Table::of(node, "a track")?;
@@ -49,9 +48,9 @@ pub(super) fn read(node: &Node) -> Result<LineFile, Fault> {
             "stop" => &stops,
             _ => &speeds,
         };
-        entry(of, "values", error.index)
+        of.place_of_entry("values", error.index)
     })?;
-    let about = ttobench_about(&metadata)?;
+    let about = about(&metadata)?;
     Ok(LineFile { form: LineFileForm::TtoBench, about, line })
 }
 

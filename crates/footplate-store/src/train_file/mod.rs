@@ -15,5 +15,3 @@ pub use read::{parse_train, read_train};
 pub use write::write_train;
 
 pub(crate) use read::form_of;
-pub(crate) use trainruns::{chosen as railtoolkit_chosen, schema as railtoolkit_schema};
-pub(crate) use ttobench::about as ttobench_about;

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::form::{TrainFile, TrainFileForm};
 use super::{osrd, own, trainruns, ttobench};
 use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
+use crate::railtoolkit::listed;
 
 /// Reads the train in the file at `path`; `which` names one of several.
 ///
@@ -34,6 +35,17 @@ pub fn parse_train(file: &str, bytes: &[u8], which: Option<&str>) -> Result<Trai
             },
         )),
     };
+    let read = read.and_then(|file| {
+        // The forms with several in a file know them by their ids, and have chosen; the others have one, by its name.
+        let name = file.train.name.as_str();
+        match which.filter(|which| file.form != TrainFileForm::TrainRuns && *which != name) {
+            Some(wanted) => {
+                let (wanted, found) = (wanted.to_owned(), listed(&[name]));
+                Err((node.place, DocumentProblem::NotThere { wanted, found }))
+            }
+            None => Ok(file),
+        }
+    });
     read.map_err(|fault| DocumentError::wrong(file, fault))
 }
 

@@ -10,10 +10,10 @@ use footplate_sim::line::{Brake, PerMille, Resistance, TractiveEffort, Train};
 
 use super::form::{TrainFile, TrainFileForm, checked, full_brake_n};
 use crate::document::{DocumentProblem, Fault, Node, Range, Table, pairs};
+use crate::railtoolkit::{VERSION, after_schema, chosen, listed};
 
-/// The schema and the version that are read.
+/// The schema that is read.
 const SCHEMA: &str = "https://railtoolkit.org/schema/rolling-stock.json";
-const VERSION: &str = "2022.05";
 /// Longer formations than any train has.
 const LONGEST_FORMATION: usize = 1000;
 
@@ -45,7 +45,7 @@ struct Vehicle<'a> {
 
 pub(super) fn read(node: &Node, which: Option<&str>) -> Result<TrainFile, Fault> {
     let table = Table::of(node, "a file of rolling stock")?;
-    schema(&table, SCHEMA, VERSION)?;
+    after_schema(&table, SCHEMA)?;
     let train = chosen(&table, "trains", which)?;
     let formation = train.list("formation")?;
     if formation.is_empty() || formation.len() > LONGEST_FORMATION {
@@ -108,34 +108,6 @@ pub(super) fn read(node: &Node, which: Option<&str>) -> Result<TrainFile, Fault>
     Ok(TrainFile { form: TrainFileForm::TrainRuns, about, train: built })
 }
 
-/// Whether a document is after a schema of railtoolkit in a version that is known.
-pub(crate) fn schema(table: &Table<'_>, schema: &str, version: &str) -> Result<(), Fault> {
-    for (key, expected) in [("schema", schema), ("schema_version", version)] {
-        if table.text(key)? != expected {
-            return Err(table.needs(key)?.not(&format!("`{key}`"), &format!("\"{expected}\"")));
-        }
-    }
-    Ok(())
-}
-
-/// The one thing below a key, or the one of several that was named by its id.
-pub(crate) fn chosen<'a>(table: &Table<'a>, key: &str, which: Option<&str>) -> Result<Table<'a>, Fault> {
-    let all: Vec<Table<'a>> =
-        table.list(key)?.iter().map(|node| Table::of(node, "an entry")).collect::<Result<_, _>>()?;
-    let ids: Vec<&str> = all.iter().map(|entry| entry.text("id")).collect::<Result<_, _>>()?;
-    let found = if ids.is_empty() { "nothing".to_owned() } else { ids.join(", ") };
-    let place = table.place_of(key);
-    match (which, all.as_slice()) {
-        (None, [one]) => Ok(*one),
-        (None, _) => Err((place, DocumentProblem::Which { found })),
-        (Some(wanted), _) => {
-            let at = ids.iter().position(|id| *id == wanted);
-            let entry = at.and_then(|at| all.get(at).copied());
-            entry.ok_or((place, DocumentProblem::NotThere { wanted: wanted.to_owned(), found }))
-        }
-    }
-}
-
 fn vehicle<'a>(id: &Node, known: &'a [Node]) -> Result<Vehicle<'a>, Fault> {
     let wanted = id.text("a vehicle of `formation`")?;
     for node in known {
@@ -165,8 +137,8 @@ fn vehicle<'a>(id: &Node, known: &'a [Node]) -> Result<Vehicle<'a>, Fault> {
         });
     }
     let ids = known.iter().filter_map(|node| Table::of(node, "a vehicle").ok()?.text("id").ok());
-    let found = ids.collect::<Vec<_>>().join(", ");
-    Err((id.place, DocumentProblem::NotThere { wanted: wanted.to_owned(), found }))
+    let found = listed(&ids.collect::<Vec<_>>());
+    Err((id.place, DocumentProblem::NotThere { wanted: wanted.escape_debug().to_string(), found }))
 }
 
 /// The resistance of a traction unit (Wende, page 151).

@@ -7,6 +7,7 @@ use footplate_sim::line::{Brake, Resistance, TractiveEffort, Train};
 
 use super::form::{TrainFile, TrainFileForm, checked, full_brake_n};
 use crate::document::{DocumentProblem, Fault, Node, Table};
+use crate::ttobench::about;
 
 /// The units of a kind of quantity, and each one's worth in SI units.
 type Units = &'static [(&'static str, f64)];
@@ -89,15 +90,4 @@ fn quantity(node: &Node, key: &str, units: Units) -> Result<f64, Fault> {
         ));
     };
     Ok(table.number("value")? * worth)
-}
-
-/// Where a file of the benchmark says it comes from.
-pub(crate) fn about(metadata: &Table<'_>) -> Result<String, Fault> {
-    let mut about = "From TTOBench".to_owned();
-    for (says, key) in [("version", "library version"), ("by", "created by"), ("licence", "license")] {
-        if let Some(text) = metadata.optional_text(key)? {
-            about += &format!("; {says} {text}");
-        }
-    }
-    Ok(about)
 }

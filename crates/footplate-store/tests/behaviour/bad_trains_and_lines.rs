@@ -127,6 +127,17 @@ fn one_of_several_is_asked_for_by_name() {
 }
 
 #[test]
+fn the_only_one_is_not_given_out_for_another() {
+    let fault = |which| parse_line("line.toml", LINE.as_bytes(), which).map_err(|error| error.to_string());
+    assert!(fault(Some("line")).is_ok());
+    assert_eq!(
+        fault(Some("branch")).unwrap_err(),
+        "line.toml, line 1, column 1: there is no `branch` in the file, which describes line"
+    );
+    assert!(parse_train("stock.json", OSRD.as_bytes(), Some("another")).is_err());
+}
+
+#[test]
 fn what_is_neither_train_nor_line_is_told_so() {
     let fault = |file: &str, bytes: &[u8]| parse_described(file, bytes, None).unwrap_err().to_string();
     assert!(
