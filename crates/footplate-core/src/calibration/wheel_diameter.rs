@@ -149,10 +149,12 @@ impl WheelDiameters {
     /// nearly so.
     pub fn roll(&mut self, time: Timestamp, counted: [Length; 2], rolling: [bool; 2], little_effort: bool) {
         self.grow(counted);
-        let Self { trusted, doubted, origins: [first, second], .. } = self;
-        for passage in [trusted, doubted, first, second].into_iter().flatten() {
-            for (rolled, rolling) in passage.rolled.iter_mut().zip(rolling) {
-                *rolled &= rolling;
+        if rolling != [true; 2] {
+            let Self { trusted, doubted, origins: [first, second], .. } = self;
+            for passage in [trusted, doubted, first, second].into_iter().flatten() {
+                for (rolled, rolling) in passage.rolled.iter_mut().zip(rolling) {
+                    *rolled &= rolling;
+                }
             }
         }
         if rolling != [true; 2] || !little_effort {

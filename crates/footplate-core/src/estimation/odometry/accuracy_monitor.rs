@@ -43,6 +43,12 @@ pub struct AccuracyMonitor {
     places: [ReadingAmounts; PLACES],
     oldest: usize,
     remembered: usize,
+    /// The oldest of them, from which the window begins ...
+    start: ReadingAmounts,
+    /// ... the place at which the next becomes the oldest ...
+    start_moves_at: Length,
+    /// ... and the place at which one more is remembered.
+    remembers_at: Length,
     accuracy: OdometerAccuracy,
     /// Where the stretch began that has to be run within tolerance before accuracy is no longer impaired.
     recovering_from: ReadingAmounts,
@@ -55,6 +61,9 @@ impl Default for AccuracyMonitor {
             places: [start; PLACES],
             oldest: 0,
             remembered: 1,
+            start,
+            start_moves_at: Length::from_m(f64::INFINITY),
+            remembers_at: Length::from_m(SPACING_M),
             accuracy: OdometerAccuracy::Sound,
             recovering_from: start,
         }
@@ -64,8 +73,10 @@ impl Default for AccuracyMonitor {
 impl AccuracyMonitor {
     /// Takes in the sums at the end of a period and judges.
     pub fn take(&mut self, now: ReadingAmounts) -> OdometerAccuracy {
-        self.forget_before(now.travelled - Length::from_m(WINDOW_M));
-        let in_window = now.since(&self.place(0));
+        if now.travelled >= self.start_moves_at {
+            self.forget_before(now.travelled - Length::from_m(WINDOW_M));
+        }
+        let in_window = now.since(&self.start);
         let worst = in_window.over.max(in_window.under);
         let recovered = self.recovered(now);
         self.accuracy = match self.accuracy {
@@ -75,7 +86,9 @@ impl AccuracyMonitor {
             OdometerAccuracy::Impaired if !recovered => OdometerAccuracy::Impaired,
             _ => OdometerAccuracy::Sound,
         };
-        self.remember(now);
+        if now.travelled >= self.remembers_at {
+            self.remember(now);
+        }
         self.accuracy
     }
 
@@ -95,23 +108,31 @@ impl AccuracyMonitor {
         within && stretch.travelled.as_m() >= WINDOW_M
     }
 
-    /// Leaves the newest place at or before `start` as the oldest.
+    /// Leaves the newest place at or before the start of the window as the oldest.
     fn forget_before(&mut self, start: Length) {
         while self.remembered > 1 && self.place(1).travelled <= start {
             self.oldest = (self.oldest + 1) % PLACES;
             self.remembered -= 1;
         }
+        self.look_ahead();
     }
 
     fn remember(&mut self, now: ReadingAmounts) {
-        let latest = self.place(self.remembered - 1);
-        if (now.travelled - latest.travelled).as_m() < SPACING_M {
-            return;
-        }
         if let Some(place) = self.places.get_mut((self.oldest + self.remembered) % PLACES) {
             *place = now;
             self.remembered = (self.remembered + 1).min(PLACES);
         }
+        self.remembers_at = now.travelled + Length::from_m(SPACING_M);
+        self.look_ahead();
+    }
+
+    fn look_ahead(&mut self) {
+        self.start = self.place(0);
+        self.start_moves_at = if self.remembered > 1 {
+            self.place(1).travelled + Length::from_m(WINDOW_M)
+        } else {
+            Length::from_m(f64::INFINITY)
+        };
     }
 
     /// The `n`th remembered place from the oldest.
