@@ -86,11 +86,6 @@ impl Channels {
         }
     }
 
-    /// The fault.
-    pub(crate) fn fault(&self) -> Fault {
-        self.fault
-    }
-
     /// When a fault begins and ends that lasts (s).
     pub(crate) fn lasts(&self) -> Option<(f64, f64)> {
         matches!(self.fault, Fault::Stuck | Fault::DeadSensor).then_some(self.lasts)

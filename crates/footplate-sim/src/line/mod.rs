@@ -17,9 +17,11 @@
 //!
 //! ```text
 //! scenario  normal_runs  slide_runs  fault_runs     named runs, drawn from a seed
-//! setup  run  recording  vehicle                    the world steps, the recorder reads; what is claimed of the train
+//! service  kinds                                    any train on any line; the trains of scenarios
+//! setup  run  recording  diary  vehicle             the recorder reads; what comes out, what is claimed of the train
 //! tachometer  faults  balises  inertial_sensor      what is read
-//! plan  motion  consist  bogie  gradients           a driver's plan, and a train of many wheelsets
+//! world  steering  plan                             what happens between two samples, and who drives
+//! motion  consist  bogie  gradients                 a train of many wheelsets
 //! slide_protection  slip_control  brake_cylinder    what keeps wheels turning as they should
 //! rotation  creep_force  rail                       one wheelset on what lies on the rail
 //! ```
@@ -29,6 +31,7 @@ mod bogie;
 mod brake_cylinder;
 mod consist;
 mod creep_force;
+mod diary;
 mod driver;
 mod fault_runs;
 mod faults;
@@ -57,6 +60,7 @@ mod tachometer;
 mod tractive_effort;
 mod train;
 mod vehicle;
+mod world;
 
 pub use driver::{Command, Driver, Phase, State, Style, StyleError};
 pub use journey::{Call, Journey, JourneyError, Moment, Work};
