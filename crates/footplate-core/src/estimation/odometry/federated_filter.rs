@@ -118,15 +118,17 @@ impl FederatedFilter {
         [b1, b2, b3]: [f64; 3],
     ) -> [Innovation; 3] {
         let mut sum = Sum::about(step.state(self.master.state));
-        let [first, second, third] = &mut self.locals;
+        // Worked on as values and stored once: what is read back while half of it is on its way to memory waits.
+        let [mut first, mut second, mut third] = self.locals;
         let mut one = |local: &mut LocalFilter, measured, share| {
             local.predict(step);
             let innovation = local.update(measured);
             sum.add(local, share);
             innovation
         };
-        let innovations = [one(first, z1, b1), one(second, z2, b2), one(third, z3, b3)];
+        let innovations = [one(&mut first, z1, b1), one(&mut second, z2, b2), one(&mut third, z3, b3)];
         self.master = sum.fused();
+        self.locals = [first, second, third];
         // A filter that has nothing of its own, or that nobody believes, follows the train: it is ready to begin
         // where the train is, and does not bring a slide back when its wheelset is believed again.
         for ((local, innovation), share) in self.locals.iter_mut().zip(&innovations).zip([b1, b2, b3]) {
