@@ -51,6 +51,8 @@ pub(super) struct Allowed {
     pub(super) at_most_by_command: f64,
     /// How much of full traction may act, 0 to 1.
     pub(super) traction_effort: f64,
+    /// By how much the train decelerates by its command where the rail carries it (m/s²); infinite if there is none.
+    pub(super) commanded: f64,
     /// How much of the full brake may act, 0 to 1.
     pub(super) brake_effort: f64,
 }
@@ -127,6 +129,7 @@ impl CommandWatch {
             acceleration,
             at_most_by_command,
             traction_effort: self.traction,
+            commanded: if effort.is_some() { self.brake * full } else { f64::INFINITY },
             brake_effort: if effort.is_some() { self.brake } else { 1.0 },
         }
     }

@@ -16,6 +16,7 @@ mod manoeuvre;
 mod motion_estimate;
 mod motion_step;
 mod odometer;
+mod past;
 mod reading_amounts;
 mod recent;
 mod settings;

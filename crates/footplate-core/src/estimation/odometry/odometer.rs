@@ -7,11 +7,11 @@
 use super::command_watch::{Allowed, CommandWatch};
 use super::distance_bounds::{Counted, DistanceBounds};
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
-use super::recent::Recent;
+use super::past::Past;
 use super::settings::OdometrySettings;
 use super::speed_bounds::{Limits, SpeedBounds, WheelBounds};
 use super::train_filter::TrainFilter;
-use super::virtual_sensor::{Envelope, LostWheel, VirtualSensor};
+use super::virtual_sensor::{Beginning, Envelope, LostWheel, VirtualSensor};
 use super::wheel_channel::WheelChannel;
 use crate::units::{Acceleration, Length, Speed};
 use crate::wheels::{
@@ -40,9 +40,7 @@ const CREEPING_SHARE: f64 = 0.05;
 const ALIKE: (f64, f64) = (0.2, 0.006);
 /// ... and for how long (s), with nothing holding them back or driving them, and otherwise.
 const ALIKE_FREE_S: f64 = 1.0;
-const ALIKE_HELD_S: f64 = 2.5;
-/// How long a slide can set in gently before it is seen (s).
-const SET_IN_S: f64 = 0.8;
+const ALIKE_HELD_S: f64 = 5.0;
 /// Wheels silent for longer in a slide are locked (s).
 const LOCKED_S: f64 = 0.15;
 
@@ -69,8 +67,8 @@ pub struct Odometer {
     blind: f64,
     /// How long both wheels have turned alike (s).
     alike_for: f64,
-    /// The largest speed lately, counted from a line that falls as in a slide (m/s).
-    lately: Recent,
+    /// What the train did before anything slipped or slid.
+    past: Past,
 }
 
 impl Odometer {
@@ -183,7 +181,7 @@ impl Odometer {
             ahead: 0.0,
             blind: 0.0,
             alike_for: 0.0,
-            lately: Recent::new(f64::NEG_INFINITY, SET_IN_S),
+            past: Past::new(),
         }
     }
 
@@ -237,12 +235,10 @@ impl Odometer {
             way += self.correct(counted, way, shares);
             self.blind = 0.0;
         } else {
-            way = self.stand_in(lost, before, t);
+            way = self.stand_in(lost, &allowed, before, t);
         }
         if self.stand_in.is_none() {
-            // Where it would be now had it fallen as in a slide since then.
-            let correction = self.vehicle.thresholds.correction.as_m_per_s2();
-            self.lately.push(self.train.v + correction * self.clock, t);
+            self.past.remember(self.train.v, self.train.a, self.clock);
         }
         let kept = bounded.nearest(self.train.v);
         if kept != self.train.v {
@@ -403,7 +399,7 @@ impl Odometer {
     }
 
     /// The virtual sensor takes over; how far the train went (m).
-    fn stand_in(&mut self, lost: [Option<Loss>; 2], before: f64, t: f64) -> f64 {
+    fn stand_in(&mut self, lost: [Option<Loss>; 2], allowed: &Allowed, before: f64, t: f64) -> f64 {
         let [first, second] = lost;
         let Some(kind) = first.or(second) else {
             // No wheel is read at all: the train goes on as it did.
@@ -414,16 +410,15 @@ impl Odometer {
         let thresholds = self.vehicle.thresholds;
         let limit = self.vehicle.max_traction.as_m_per_s2();
         let envelope = self.settings.envelope;
-        // A slide that sets in gently has pulled the estimate along before it is seen.
-        let begins_at = match (kind, envelope) {
-            (Loss::Slide, Envelope::Touches) => {
-                before.max(self.lately.largest() - thresholds.correction.as_m_per_s2() * self.clock)
-            }
-            _ => before,
+        let speed = match envelope {
+            Envelope::Fixed => before,
+            Envelope::Touches => self.past.speed_without(kind, before, self.clock),
         };
+        let commanded = allowed.commanded;
+        let begins = Beginning { speed, commanded };
         let sensor = self
             .stand_in
-            .get_or_insert_with(|| VirtualSensor::new(kind, begins_at, limit, envelope, thresholds));
+            .get_or_insert_with(|| VirtualSensor::new(kind, begins, limit, envelope, thresholds));
         let [a, b] = &self.wheels;
         let rate = sensor.rate();
         let wheels = [a, b].map(|wheel| LostWheel {
@@ -435,7 +430,7 @@ impl Odometer {
             read: wheel.is_read(),
         });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
-        let speed = sensor.next(wheels, locked, t);
+        let speed = sensor.next(wheels, commanded, locked, t);
         self.train.v = speed;
         self.train.a = sensor.rate();
         0.5 * (before + speed) * t

@@ -35,8 +35,25 @@ const GENTLEST: f64 = 0.1;
 const ABOVE: f64 = 0.05;
 /// How much of its difference to the envelope a level wheel takes away.
 const LEVEL_GAIN: f64 = 0.5;
+/// A level wheel is taken for one that turns with the train only if it is no further off (m/s) than the envelope can be:
+/// so much at once ...
+const OFF_AT_ONCE: f64 = 0.7;
+/// ... and so much more for every second since the last touch (m/s²), up to so many.
+const OFF_PER_S: f64 = 0.3;
+const OFF_FOR_S: f64 = 15.0;
+/// Of the deceleration while wheels slide and turn, what is left of it when they lock: their treads heat and smear.
+const LOCKED: f64 = 0.85;
 /// Of its limit, the acceleration at which a train starts whose wheels spin: more adhesion would not let them.
 const SPINNING_START: f64 = 0.5;
+
+/// How a slide or spin begins, in the direction of travel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Beginning {
+    /// Speed of the train (m/s).
+    pub(super) speed: f64,
+    /// By how much it would decelerate by its command (m/s²); infinite if there is none.
+    pub(super) commanded: f64,
+}
 
 /// What one wheel shows while it slips or slides.
 #[derive(Debug, Clone, Copy)]
@@ -67,20 +84,23 @@ pub(super) struct VirtualSensor {
 }
 
 impl VirtualSensor {
-    /// A slide or spin that begins at `speed` (m/s in the direction of travel); a spin rises by at most `limit` (m/s²).
+    /// A slide or spin that begins as told; a spin rises by at most `limit` (m/s²).
     pub(super) fn new(
         kind: Loss,
-        speed: f64,
+        begins: Beginning,
         limit: f64,
         envelope: Envelope,
         thresholds: Thresholds,
     ) -> Self {
+        let correction = thresholds.correction.as_m_per_s2();
         let rate = match (kind, envelope) {
-            (Loss::Slide, _) => -thresholds.correction.as_m_per_s2(),
+            (Loss::Slide, Envelope::Fixed) => -correction,
+            // Sliding wheels brake less than is asked of them.
+            (Loss::Slide, Envelope::Touches) => -correction.min(begins.commanded),
             (Loss::Spin, Envelope::Fixed) => -limit,
             (Loss::Spin, Envelope::Touches) => -SPINNING_START * limit,
         };
-        let speed = sign(kind) * speed;
+        let speed = sign(kind) * begins.speed;
         Self {
             kind,
             envelope,
@@ -106,12 +126,13 @@ impl VirtualSensor {
         sign(self.kind) * self.rate
     }
 
-    /// Goes on for `t` seconds in which the wheels turn so; `locked` if neither turns at all.
-    pub(super) fn next(&mut self, wheels: [LostWheel; 2], locked: bool, t: f64) -> f64 {
+    /// Goes on for `t` seconds in which the wheels turn so, while the command would decelerate the train by so much
+    /// (m/s²); `locked` if neither turns at all.
+    pub(super) fn next(&mut self, wheels: [LostWheel; 2], commanded: f64, locked: bool, t: f64) -> f64 {
         self.elapsed += t;
         self.since_touch += t;
         if self.envelope == Envelope::Touches {
-            self.rate = self.learnt(locked);
+            self.rate = self.learnt(commanded, locked);
         } else if self.kind == Loss::Slide {
             let Thresholds { correction, lock_correction, .. } = self.thresholds;
             self.rate = -if locked { lock_correction } else { correction }.as_m_per_s2();
@@ -139,6 +160,8 @@ impl VirtualSensor {
             self.rising = false;
             self.touch(self.speed);
         }
+        let furthest = OFF_AT_ONCE + OFF_PER_S * self.since_touch.min(OFF_FOR_S);
+        let level = level.filter(|level| (level - self.speed).abs() < furthest);
         if let (Some(level), Envelope::Touches) = (level, self.envelope) {
             self.speed += LEVEL_GAIN * (level - self.speed);
             self.touch(level);
@@ -154,19 +177,18 @@ impl VirtualSensor {
         self.touched = true;
     }
 
-    fn learnt(&self, locked: bool) -> f64 {
+    fn learnt(&self, commanded: f64, locked: bool) -> f64 {
         if locked && self.kind == Loss::Slide {
             // Nothing can touch any more: the best guess, not one that asks to be corrected.
-            let lock = -self.thresholds.lock_correction.as_m_per_s2();
-            return self.touches.slope().max(lock).min(-GENTLEST);
+            return (LOCKED * self.touches.slope()).max(-commanded).min(-GENTLEST);
         }
         let steepest = match self.kind {
-            Loss::Slide => self.thresholds.slide_deceleration,
-            Loss::Spin => self.thresholds.slip_acceleration,
+            Loss::Slide => self.thresholds.slide_deceleration.as_m_per_s2().min(commanded + STEEPER),
+            Loss::Spin => self.thresholds.slip_acceleration.as_m_per_s2(),
         };
         let overdue = if self.touched { (self.since_touch - TOUCH_DUE_S).max(0.0) } else { 0.0 };
         let rate = self.touches.slope() - STEEPER - STEEPENING * overdue;
-        rate.clamp(-steepest.as_m_per_s2(), -GENTLEST)
+        rate.max(-steepest).min(-GENTLEST)
     }
 }
 
