@@ -40,7 +40,7 @@ const CREEPING_SHARE: f64 = 0.05;
 const ALIKE: (f64, f64) = (0.2, 0.006);
 /// ... and for how long (s), with nothing holding them back or driving them, and otherwise.
 const ALIKE_FREE_S: f64 = 1.0;
-const ALIKE_HELD_S: f64 = 5.0;
+const ALIKE_HELD_S: f64 = 8.0;
 /// Wheels silent for longer in a slide are locked (s).
 const LOCKED_S: f64 = 0.15;
 
@@ -196,11 +196,17 @@ impl Odometer {
         let held = self.slips.lost().contains(&Some(Loss::Slide));
         let allowed = self.command.next(effort, seen, held, t, &self.vehicle);
         // One forward and the other backward: then neither says that the train has turned round.
+        for (wheel, reading) in self.wheels.iter_mut().zip(&period.wheels) {
+            wheel.hear(reading, self.way, t);
+        }
         let disputed = {
-            let [first, second] = &mut self.wheels;
-            let [first_reading, second_reading] = &period.wheels;
-            first.says(first_reading, t) * second.says(second_reading, t) < 0.0
+            let [first, second] = &self.wheels;
+            first.told.way() * second.told.way() < 0.0
         };
+        if disputed && self.way < 0.0 {
+            // One of the two is wired the wrong way round; trains that run backward are rarer.
+            self.turn();
+        }
         let heading = Heading { way: self.way, certain: self.train.v.abs() > CERTAIN_HEADING, disputed };
         let [first_lost, second_lost] = self.slips.lost();
         let at = (self.clock, t, self.vehicle.period.as_s());
@@ -282,29 +288,47 @@ impl Odometer {
             axle: wheel.wheelset.axle,
         };
         let lost = self.slips.judge(&[signs(first, first_turns), signs(second, second_turns)], &train, t);
+        self.watch_sensors(turns, possible, allowed, t);
+        lost
+    }
+
+    /// Which sensors are believed.
+    fn watch_sensors(&mut self, turns: &[Range; 2], possible: Range, allowed: &Allowed, t: f64) {
+        let [first, second] = &self.wheels;
         let speeds = [first, second].map(|wheel| wheel.is_read().then(|| wheel.tracker.speed()));
         let [first_speed, second_speed] = speeds;
-        let train_speed = self.train.v;
-        for ((wheel, range), other) in self.wheels.iter_mut().zip(turns).zip([second_speed, first_speed]) {
+        let beyond = |wheel: &WheelChannel, range: &Range| {
+            let (slides, slips) = wheel.may_differ(allowed);
+            (range.high < possible.low && !slides) || (range.low > possible.high && !slips)
+        };
+        let [first_turns, second_turns] = turns;
+        let [first_beyond, second_beyond] = [beyond(first, first_turns), beyond(second, second_turns)];
+        let [first_sudden, second_sudden] = [first, second].map(|wheel| wheel.quality == Quality::Excluded);
+        // What both say at once is no fault of either: the row was read late, or the train is not what it was taken for.
+        let both = (first_beyond || first_sudden) && (second_beyond || second_sudden);
+        let train = self.train.v;
+        for (((wheel, other), impossible), too_sudden) in self
+            .wheels
+            .iter_mut()
+            .zip([second_speed, first_speed])
+            .zip([first_beyond, second_beyond])
+            .zip([first_sudden, second_sudden])
+        {
             if wheel.quality == Quality::Missing {
                 continue;
             }
-            let axle = wheel.wheelset.axle;
-            let slides = allowed.slide && axle.may_slide();
-            let slips = allowed.slip && axle.may_slip();
-            let impossible = (range.high < possible.low && !slides) || (range.low > possible.high && !slips);
+            let (slides, slips) = wheel.may_differ(allowed);
             let shown = Shown {
                 pulses: wheel.pulses,
                 speed: wheel.tracker.speed(),
                 other,
-                train: train_speed,
+                train,
                 may_differ: slides || slips,
-                impossible,
-                too_sudden: wheel.quality == Quality::Excluded,
+                impossible: impossible && !both,
+                too_sudden: too_sudden && !both,
             };
             wheel.watch.look(&shown, t);
         }
-        lost
     }
 
     /// Whether both wheels have turned alike and smoothly for so long that they roll, whatever was thought of them.
@@ -318,7 +342,9 @@ impl Odometer {
         let smooth = [first, second].iter().all(|wheel| wheel.smooth_acceleration.abs() < harder);
         let turning = first.pulses != 0.0 && second.pulses != 0.0;
         self.alike_for = if counted && alike && smooth && turning { self.alike_for + t } else { 0.0 };
-        let held_back = allowed.slide || allowed.slip;
+        // Two sensors that are both thought to be wrong are not likely to be.
+        let excluded = first.watch.excluded() && second.watch.excluded();
+        let held_back = (allowed.slide || allowed.slip) && !excluded;
         self.alike_for > if held_back { ALIKE_HELD_S } else { ALIKE_FREE_S }
             && (self.vehicle.independent || !held_back)
     }
@@ -421,13 +447,13 @@ impl Odometer {
             .get_or_insert_with(|| VirtualSensor::new(kind, begins, limit, envelope, thresholds));
         let [a, b] = &self.wheels;
         let rate = sensor.rate();
-        let wheels = [a, b].map(|wheel| LostWheel {
-            speed: match envelope {
-                Envelope::Fixed => wheel.tracker.speed(),
+        let wheels = [a, b].map(|wheel| {
+            let speed = match envelope {
+                Envelope::Fixed => Some(wheel.tracker.speed()),
                 Envelope::Touches => wheel.steady_speed(rate),
-            },
-            acceleration: wheel.tracker.acceleration(),
-            read: wheel.is_read(),
+            };
+            let acceleration = wheel.tracker.acceleration();
+            speed.filter(|_| wheel.is_read()).map(|speed| LostWheel { speed, acceleration })
         });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
         let speed = sensor.next(wheels, commanded, locked, t);
@@ -504,9 +530,15 @@ impl Odometer {
 
     /// Looks the other way once the train has turned round.
     fn turn_round(&mut self) {
-        if self.train.v > -TURNED_ROUND {
+        let says = |wheel: &WheelChannel| wheel.told.way() * self.way;
+        let back = self.wheels.iter().any(|wheel| says(wheel) < 0.0 && wheel.told.convincing());
+        if self.train.v > -TURNED_ROUND || !back || self.wheels.iter().any(|wheel| says(wheel) > 0.0) {
             return;
         }
+        self.turn();
+    }
+
+    fn turn(&mut self) {
         self.way = -self.way;
         self.train.reverse();
         self.bounds.reverse();

@@ -5,6 +5,9 @@ use crate::wheels::Loss;
 /// How far back is far enough (s): a slide can set in gently for a second before it is seen. At most twice that.
 const FAR_ENOUGH_S: f64 = 0.8;
 
+/// Too far (s): something else has happened since.
+const TOO_FAR_S: f64 = 2.0;
+
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     speed: f64,
@@ -37,6 +40,9 @@ impl Past {
         let Some(Moment { speed: then, acceleration, clock: since }) = self.sound else {
             return speed;
         };
+        if clock - since > TOO_FAR_S {
+            return speed;
+        }
         let gone_on = then + acceleration * (clock - since);
         // A slide can only have pulled it down, a spin up.
         match kind {

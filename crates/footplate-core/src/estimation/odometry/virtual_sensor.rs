@@ -37,7 +37,7 @@ const ABOVE: f64 = 0.05;
 const LEVEL_GAIN: f64 = 0.5;
 /// A level wheel is taken for one that turns with the train only if it is no further off (m/s) than the envelope can be:
 /// so much at once ...
-const OFF_AT_ONCE: f64 = 0.7;
+const OFF_AT_ONCE: f64 = 1.0;
 /// ... and so much more for every second since the last touch (m/s²), up to so many.
 const OFF_PER_S: f64 = 0.3;
 const OFF_FOR_S: f64 = 15.0;
@@ -62,8 +62,6 @@ pub(super) struct LostWheel {
     pub(super) speed: f64,
     /// Its acceleration (m/s²).
     pub(super) acceleration: f64,
-    /// Its sensor is read and believed.
-    pub(super) read: bool,
 }
 
 /// Follows one slide or spin.
@@ -126,9 +124,15 @@ impl VirtualSensor {
         sign(self.kind) * self.rate
     }
 
-    /// Goes on for `t` seconds in which the wheels turn so, while the command would decelerate the train by so much
+    /// Goes on for `t` seconds in which the wheels that are read turn so, while the command would decelerate the train by so much
     /// (m/s²); `locked` if neither turns at all.
-    pub(super) fn next(&mut self, wheels: [LostWheel; 2], commanded: f64, locked: bool, t: f64) -> f64 {
+    pub(super) fn next(
+        &mut self,
+        wheels: [Option<LostWheel>; 2],
+        commanded: f64,
+        locked: bool,
+        t: f64,
+    ) -> f64 {
         self.elapsed += t;
         self.since_touch += t;
         if self.envelope == Envelope::Touches {
@@ -142,9 +146,7 @@ impl VirtualSensor {
         let mut fastest = f64::NEG_INFINITY;
         let mut level = None;
         for (wheel, ground) in wheels.iter().zip(&mut self.wheels) {
-            if !wheel.read {
-                continue;
-            }
+            let Some(wheel) = wheel else { continue };
             let speed = toward * wheel.speed;
             fastest = fastest.max(speed);
             if ground.reached(toward * wheel.acceleration - self.rate, t) {

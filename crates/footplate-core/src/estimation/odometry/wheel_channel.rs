@@ -2,8 +2,8 @@
 
 use super::command_watch::Allowed;
 use crate::wheels::{
-    Count, CountWindows, Direction, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer,
-    Vehicle, WheelReading, WheelTracker, Wheelset,
+    CountWindows, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer, ToldWay, Vehicle,
+    WheelReading, WheelTracker, Wheelset,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
@@ -18,8 +18,6 @@ const EVER: f64 = 40.0;
 const ROLLING: f64 = 2.5;
 const LOSING: f64 = 20.0;
 const REGAINING: f64 = 30.0;
-/// How long it counts which way a sensor said it turned (s): two wheels that start together say so within half of it.
-const SAID_S: f64 = 1.0;
 /// Readings before the tracker knows enough to be surprised.
 const WARM: u32 = 8;
 /// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
@@ -43,8 +41,8 @@ pub(super) struct WheelChannel {
     /// By how many pulses its last count may be wrong.
     pub(super) doubt: f64,
     doubt_before: f64,
-    /// Which way it last said it turned (1, −1, or 0 if it never did), and how long ago (s).
-    told: (f64, f64),
+    /// Which way its sensor lately said it turned.
+    pub(super) told: ToldWay,
     tachometer: Tachometer,
     windows: CountWindows,
     readings: u32,
@@ -67,7 +65,7 @@ impl WheelChannel {
             missing_for: 0.0,
             doubt: 0.0,
             doubt_before: 0.0,
-            told: (0.0, 0.0),
+            told: ToldWay::default(),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,
@@ -87,8 +85,7 @@ impl WheelChannel {
     ) -> f64 {
         let Some(reading) = period.wheels.get(which) else { return 0.0 };
         let expected = self.tracker.expected(t) / self.pitch;
-        let may_slide = allowed.slide && self.wheelset.axle.may_slide();
-        let may_slip = allowed.slip && self.wheelset.axle.may_slip();
+        let (may_slide, may_slip) = self.may_differ(allowed);
         // Only a wheel that has lost its grip can regain it.
         let (up, down) = match (lost, may_slide, may_slip) {
             (Some(_), ..) => (REGAINING, REGAINING),
@@ -142,22 +139,9 @@ impl WheelChannel {
         counted
     }
 
-    /// Minds which way the sensor says it turned; says which way it lately did, 0 if it did not turn.
-    pub(super) fn says(&mut self, reading: &WheelReading, t: f64) -> f64 {
-        let (way, age) = &mut self.told;
-        *age += t;
-        let turned = matches!(reading.count, Count::Pulses(pulses) if pulses > 0);
-        let says = match reading.direction {
-            Direction::Forward => 1.0,
-            Direction::Backward => -1.0,
-            Direction::Unknown => 0.0,
-        };
-        if turned && says != 0.0 {
-            self.told = (says, 0.0);
-        } else if *age > SAID_S {
-            *way = 0.0;
-        }
-        self.told.0 * self.tachometer.wiring()
+    /// Minds which way the sensor says it turned.
+    pub(super) fn hear(&mut self, reading: &WheelReading, way: f64, t: f64) {
+        self.told.hear(reading, self.tachometer.wiring(), way * self.pulses, t);
     }
 
     /// The first reading of a run: only a speed is known from it.
@@ -187,10 +171,8 @@ impl WheelChannel {
 
     /// How fast it turns by its last counts alone (m/s), moved to now with an acceleration (m/s²). The tracker is quicker,
     /// but overshoots when a wheel that regains its grip stops accelerating.
-    pub(super) fn steady_speed(&self, acceleration: f64) -> f64 {
-        self.windows
-            .mean_speed(self.pitch)
-            .map_or(self.tracker.speed(), |(speed, age)| speed + acceleration * age)
+    pub(super) fn steady_speed(&self, acceleration: f64) -> Option<f64> {
+        self.windows.mean_speed(self.pitch).map(|(speed, age)| speed + acceleration * age)
     }
 
     /// The train has turned round.
@@ -198,6 +180,12 @@ impl WheelChannel {
         self.tracker.reverse();
         self.windows.reverse();
         self.smooth_acceleration = -self.smooth_acceleration;
+    }
+
+    /// Whether it may slide and whether it may slip now.
+    pub(super) fn may_differ(&self, allowed: &Allowed) -> (bool, bool) {
+        let axle = self.wheelset.axle;
+        (allowed.slide && axle.may_slide(), allowed.slip && axle.may_slip())
     }
 
     /// Its sample was read, whether or not its sensor is believed.
