@@ -117,7 +117,9 @@ impl CommandWatch {
             Range { low: -max_brake, high: max_traction }
         };
         let acceleration = self.lately(now, t);
-        let by_command = if self.disproved {
+        let by_command = if traction {
+            acceleration.high
+        } else if self.disproved {
             -vehicle.thresholds.least_sliding_deceleration.as_m_per_s2()
         } else {
             gradient - self.built_up * full * (1.0 - command.tolerance)

@@ -27,7 +27,7 @@ const SMOOTHED_S: f64 = 0.5;
 /// By how much more a wheel may creep unseen beside one that slides.
 const SLIPPERY: f64 = 1.5;
 /// How far back a bound by braked wheels is taken from (s): a slide is seen earlier.
-const SLIDE_SEEN_S: f64 = 0.4;
+const SLIDE_SEEN_S: f64 = 0.5;
 /// Share of full traction at which a powered wheel may creep by all that goes unseen; proportionally below.
 const FULL_CREEP_EFFORT: f64 = 0.2;
 
@@ -79,6 +79,7 @@ pub(super) struct SpeedBounds {
     /// Of the upper bounds by braked wheels.
     by_braked: Recent,
     apart: f64,
+    sliding: i32,
     together_for: f64,
     all_slid: bool,
     any_spun: bool,
@@ -99,6 +100,7 @@ impl SpeedBounds {
             by_powered: Recent::new(-speed.low, LOOK_BACK_S),
             by_braked: Recent::new(speed.high, SLIDE_SEEN_S),
             apart: 0.0,
+            sliding: 0,
             together_for: 0.0,
             all_slid: false,
             any_spun: false,
@@ -155,6 +157,7 @@ impl SpeedBounds {
         let creep = limits.thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
         let mut rolling = Vote::NONE;
         let mut powered = f64::NEG_INFINITY;
+        let mut driven_too = None;
         let mut spun = false;
         for wheel in wheels {
             let driven = allowed.slip && wheel.axle.may_slip();
@@ -163,7 +166,12 @@ impl SpeedBounds {
                 rolling = rolling.also(wheel.turns.low, f64::min);
             } else if wheel.lost != Some(Loss::Spin) {
                 powered = powered.max(wheel.turns.low * (1.0 - creep));
+                driven_too = Some(wheel.turns.low).filter(|low| low.is_finite());
             }
+        }
+        if let Some(bound) = rolling.0 {
+            // A driven wheel turns no slower than the train: it can only show that the others turn too fast.
+            rolling = Vote(Some(driven_too.map_or(bound, |driven: f64| driven.min(bound))));
         }
         // A wheel that starts to spin is seen a little late.
         let powered = -self.by_powered.push(-powered, t);
@@ -215,18 +223,23 @@ impl SpeedBounds {
         // Below the peak of adhesion a wheel creeps without being seen, but that far only where adhesion is poor.
         let creep = if sliding > 0 { limits.thresholds.rolling_creepage * SLIPPERY } else { 0.0 };
         let not_below = shown / (1.0 - creep);
-        let not_above = kept_up / (1.0 - limits.thresholds.rolling_creepage * allowed.brake_effort);
+        let creep =
+            limits.thresholds.rolling_creepage * if sliding > 0 { SLIPPERY } else { allowed.brake_effort };
+        let not_above = kept_up / (1.0 - creep);
         free.min(by_command.max(not_below)).min(not_above)
     }
 
-    /// Whether both wheels have turned alike for long enough.
+    /// Whether the wheels that do not slide have kept up with each other, or with nobody because the other is not
+    /// believed or slides, for long enough.
     fn together(&mut self, [first, second]: &[WheelBounds; 2], sliding: i32, t: f64) -> bool {
         let (least, part) = TOGETHER;
         let (one, both) = (first.is_asked() || second.is_asked(), first.is_asked() && second.is_asked());
         self.apart += (first.speed - second.speed - self.apart) * (t / SMOOTHED_S).min(1.0);
-        // A wheel whose fellow is not believed keeps up with nobody; it does so as long as it is not seen to slide.
-        let alike = !both || self.apart.abs() < least.max(part * first.speed);
-        self.together_for = if one && alike && sliding == 0 { self.together_for + t } else { 0.0 };
+        let alike = !both || sliding > 0 || self.apart.abs() < least.max(part * first.speed);
+        // Each wheel that begins or ceases to slide begins the time anew.
+        let same = sliding == self.sliding;
+        self.sliding = sliding;
+        self.together_for = if one && alike && same { self.together_for + t } else { 0.0 };
         self.together_for >= TOGETHER_S
     }
 }
