@@ -4,19 +4,21 @@
 //! slips or slides; narrow the bounds; let the trusted wheels correct the filter, or the virtual sensor stand in for
 //! them; add up the distance.
 
-use super::command_watch::{Allowed, CommandWatch};
-use super::distance_bounds::{Counted, DistanceBounds};
+use super::balise_link::DistanceInterval;
+use super::command_watch::CommandWatch;
+use super::distance_bounds::DistanceBounds;
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
 use super::past::Past;
-use super::settings::OdometrySettings;
-use super::speed_bounds::{Limits, SpeedBounds, WheelBounds};
+use super::places::{Places, Rolled};
+use super::published::Published;
+use super::settings::{Carrier, OdometrySettings};
+use super::speed_bounds::SpeedBounds;
 use super::train_filter::TrainFilter;
-use super::virtual_sensor::{Beginning, Envelope, LostWheel, VirtualSensor};
+use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
+use crate::calibration::WheelScale;
 use crate::units::{Acceleration, Length, Speed};
-use crate::wheels::{
-    Heading, Loss, Period, Quality, Range, Shown, Signs, SlipSlide, TrainSigns, Vehicle, VehicleError,
-};
+use crate::wheels::{Heading, Loss, Period, Range, SlipSlide, Vehicle, VehicleError};
 
 /// A longer time without a period breaks the run: the train can have done anything (s).
 const GAP_S: f64 = 2.0;
@@ -24,51 +26,41 @@ const GAP_S: f64 = 2.0;
 const CERTAIN_HEADING: f64 = 1.5;
 /// Slower than this it may (m/s).
 const TURNED_ROUND: f64 = 0.1;
-/// Both sensors silent or disbelieved for longer: the estimate is a guess (s).
-const BLIND_S: f64 = 5.0;
 /// Variance of the speed that the first period tells, in squared pulses per period: a count at a random phase.
 const FIRST_COUNT: f64 = 1.0 / 6.0;
 /// Jerk density while the virtual sensor stands in (m²/s⁵): accelerations are known to 0.3 m/s² after a second.
 const BLIND_JERK: f64 = 0.1;
 
-/// Difference of speeds at which the wheel that seems to slip or slide loses half its share: three standard deviations
-/// of the difference of two wheels that roll (m/s), and what their diameters may differ by (part of the speed).
-const APART: (f64, f64) = (0.25, 0.004);
-/// Share of a powered wheel in traction beside one that is not: its creep is a bias, the other has none.
-const CREEPING_SHARE: f64 = 0.05;
-/// How closely two wheels have to turn alike to be believed against everything else (m/s, part of the speed) ...
-const ALIKE: (f64, f64) = (0.2, 0.006);
-/// ... and for how long (s), with nothing holding them back or driving them, and otherwise.
-const ALIKE_FREE_S: f64 = 1.0;
-const ALIKE_HELD_S: f64 = 8.0;
-/// Wheels silent for longer in a slide are locked (s).
-const LOCKED_S: f64 = 0.15;
-
 /// Follows one train from its first period.
 #[derive(Debug, Clone)]
 pub struct Odometer {
-    vehicle: Vehicle,
-    settings: OdometrySettings,
-    wheels: [WheelChannel; 2],
-    command: CommandWatch,
-    slips: SlipSlide,
-    bounds: SpeedBounds,
-    ways: DistanceBounds,
-    train: TrainFilter,
-    stand_in: Option<VirtualSensor>,
-    last: Option<MotionEstimate>,
+    pub(super) vehicle: Vehicle,
+    pub(super) settings: OdometrySettings,
+    pub(super) wheels: [WheelChannel; 2],
+    pub(super) command: CommandWatch,
+    pub(super) slips: SlipSlide,
+    pub(super) bounds: SpeedBounds,
+    pub(super) ways: DistanceBounds,
+    pub(super) train: TrainFilter,
+    pub(super) stand_in: Option<VirtualSensor>,
+    pub(super) last: Option<MotionEstimate>,
     /// Seconds since the first period.
-    clock: f64,
+    pub(super) clock: f64,
     /// 1 the way in which distance grows, −1 the other.
-    way: f64,
-    distance: f64,
+    pub(super) way: f64,
+    pub(super) distance: f64,
     /// How far the counts put the train ahead of where the filter believes it (m).
-    ahead: f64,
-    blind: f64,
+    pub(super) ahead: f64,
+    pub(super) blind: f64,
     /// How long both wheels have turned alike (s).
-    alike_for: f64,
+    pub(super) alike_for: f64,
     /// What the train did before anything slipped or slid.
-    past: Past,
+    pub(super) past: Past,
+    /// The published filter, where it carries the estimate.
+    pub(super) published: Option<Published>,
+    pub(super) places: Option<Places>,
+    /// Over- and under-reading up to the last balise (m).
+    pub(super) amounts: [f64; 2],
 }
 
 impl Odometer {
@@ -85,6 +77,12 @@ impl Odometer {
     #[must_use]
     pub fn settings(&self) -> OdometrySettings {
         self.settings
+    }
+
+    /// What was learnt of the diameters; nothing if the settings do without.
+    #[must_use]
+    pub fn diameters(&self) -> Option<[WheelScale; 2]> {
+        self.places.as_ref().map(|places| places.diameters().scales())
     }
 
     /// Takes in the readings of one period. Distance is zero at the end of the first.
@@ -150,8 +148,14 @@ impl Odometer {
         let top = self.vehicle.max_speed.as_m_per_s();
         let before = self.ways.distance();
         let reach = Range { low: before.low - top * t, high: before.high + top * t };
-        let mut fresh =
-            Self { way: self.way, distance: self.distance, ..Self::fresh(self.vehicle, self.settings) };
+        let fresh = Self::fresh(self.vehicle, self.settings);
+        let mut fresh = Self {
+            way: self.way,
+            distance: self.distance,
+            places: self.places.clone(),
+            amounts: self.amounts,
+            ..fresh
+        };
         fresh.ways.relocate(reach);
         let first = fresh.begin(period);
         *self = fresh;
@@ -182,6 +186,12 @@ impl Odometer {
             blind: 0.0,
             alike_for: 0.0,
             past: Past::new(),
+            published: match settings.carrier {
+                Carrier::Published { fusion, manoeuvre } => Some(Published::new(fusion, manoeuvre)),
+                Carrier::Counts { .. } => None,
+            },
+            places: settings.balises.map(|accuracy| Places::new(vehicle.wheelsets, accuracy)),
+            amounts: [0.0; 2],
         }
     }
 
@@ -219,8 +229,11 @@ impl Odometer {
         let possible = self.bounds.possible(&allowed, t);
         let turns = [first.turns(allowed.acceleration), second.turns(allowed.acceleration)];
         let before = self.train.v;
-        let jerk = if self.stand_in.is_some() { BLIND_JERK } else { self.settings.jerk_density };
-        let mut way = self.train.run(t, jerk);
+        let jerk = match self.settings.carrier {
+            Carrier::Counts { jerk_density } if self.stand_in.is_none() => jerk_density,
+            _ => BLIND_JERK,
+        };
+        let way = self.train.run(t, jerk);
         let mut lost = self.judge(&turns, possible, &allowed, t);
         if self.agreed(&allowed, t) {
             self.slips.clear();
@@ -236,22 +249,13 @@ impl Odometer {
         let bounded = self.narrow(possible, &turns, &allowed, lost, t);
 
         let trusted = self.trusted(lost);
-        let shares = self.shares(trusted, &allowed);
-        if trusted.contains(&true) {
-            way += self.correct(counted, way, shares);
-            self.blind = 0.0;
-        } else {
-            way = self.stand_in(lost, &allowed, before, t);
-        }
-        if self.stand_in.is_none() {
-            self.past.remember(self.train.v, self.train.a, self.clock);
-        }
-        let kept = bounded.nearest(self.train.v);
-        if kept != self.train.v {
-            self.train.v = kept;
+        let (way, shares) = self.carry(counted, lost, &allowed, before, way, t);
+        if self.published.is_none() {
+            self.train.v = bounded.nearest(self.train.v);
         }
         self.distance += self.way * way;
         self.ways.moved(speed_before, bounded, allowed.acceleration, &self.counted(lost, &allowed), t);
+        self.place(period, effort, lost, way);
         let estimate = MotionEstimate {
             time: period.time,
             speed: Speed::from_m_per_s(self.way * self.train.v),
@@ -268,263 +272,38 @@ impl Odometer {
         estimate
     }
 
-    /// Which wheelsets slip or slide, and which sensors are believed.
-    fn judge(&mut self, turns: &[Range; 2], possible: Range, allowed: &Allowed, t: f64) -> [Option<Loss>; 2] {
-        let train = TrainSigns {
-            speed: self.train.v,
-            acceleration: self.train.a,
-            possible,
-            slide: allowed.slide,
-            slip: allowed.slip,
-        };
-        let [first, second] = &self.wheels;
-        let [first_turns, second_turns] = turns;
-        let signs = |wheel: &WheelChannel, range: &Range| Signs {
-            speed: wheel.tracker.speed(),
-            acceleration: wheel.tracker.acceleration(),
-            range: *range,
-            acceleration_deviation: wheel.tracker.acceleration_deviation(),
-            read: wheel.quality == Quality::Ok && !wheel.watch.doubted(),
-            axle: wheel.wheelset.axle,
-        };
-        let lost = self.slips.judge(&[signs(first, first_turns), signs(second, second_turns)], &train, t);
-        self.watch_sensors(turns, possible, allowed, t);
-        lost
-    }
-
-    /// Which sensors are believed.
-    fn watch_sensors(&mut self, turns: &[Range; 2], possible: Range, allowed: &Allowed, t: f64) {
-        let [first, second] = &self.wheels;
-        let speeds = [first, second].map(|wheel| wheel.is_read().then(|| wheel.tracker.speed()));
-        let [first_speed, second_speed] = speeds;
-        let beyond = |wheel: &WheelChannel, range: &Range| {
-            let (slides, slips) = wheel.may_differ(allowed);
-            (range.high < possible.low && !slides) || (range.low > possible.high && !slips)
-        };
-        let [first_turns, second_turns] = turns;
-        let [first_beyond, second_beyond] = [beyond(first, first_turns), beyond(second, second_turns)];
-        let [first_sudden, second_sudden] = [first, second].map(|wheel| wheel.quality == Quality::Excluded);
-        // What both say at once is no fault of either: the row was read late, or the train is not what it was taken for.
-        let both = (first_beyond || first_sudden) && (second_beyond || second_sudden);
-        let train = self.train.v;
-        for (((wheel, other), impossible), too_sudden) in self
-            .wheels
-            .iter_mut()
-            .zip([second_speed, first_speed])
-            .zip([first_beyond, second_beyond])
-            .zip([first_sudden, second_sudden])
-        {
-            if wheel.quality == Quality::Missing {
-                continue;
-            }
-            let (slides, slips) = wheel.may_differ(allowed);
-            let shown = Shown {
-                pulses: wheel.pulses,
-                speed: wheel.tracker.speed(),
-                other,
-                train,
-                may_differ: slides || slips,
-                impossible: impossible && !both,
-                too_sudden: too_sudden && !both,
-            };
-            wheel.watch.look(&shown, t);
-        }
-    }
-
-    /// Whether both wheels have turned alike and smoothly for so long that they roll, whatever was thought of them.
-    fn agreed(&mut self, allowed: &Allowed, t: f64) -> bool {
-        let [first, second] = &self.wheels;
-        let counted = first.is_counted() && second.is_counted();
-        let apart = (first.tracker.speed() - second.tracker.speed()).abs();
-        let (noise, part) = ALIKE;
-        let alike = apart < noise + part * first.tracker.speed().abs();
-        let harder = self.vehicle.max_brake.as_m_per_s2().max(self.vehicle.max_traction.as_m_per_s2());
-        let smooth = [first, second].iter().all(|wheel| wheel.smooth_acceleration.abs() < harder);
-        let turning = first.pulses != 0.0 && second.pulses != 0.0;
-        self.alike_for = if counted && alike && smooth && turning { self.alike_for + t } else { 0.0 };
-        // Two sensors that are both thought to be wrong are not likely to be.
-        let excluded = first.watch.excluded() && second.watch.excluded();
-        let held_back = (allowed.slide || allowed.slip) && !excluded;
-        self.alike_for > if held_back { ALIKE_HELD_S } else { ALIKE_FREE_S }
-            && (self.vehicle.independent || !held_back)
-    }
-
-    fn narrow(
-        &mut self,
-        possible: Range,
-        turns: &[Range; 2],
-        allowed: &Allowed,
-        lost: [Option<Loss>; 2],
-        t: f64,
-    ) -> Range {
-        let [first, second] = &self.wheels;
-        let [first_turns, second_turns] = *turns;
-        let [first_lost, second_lost] = lost;
-        let of = |wheel: &WheelChannel, turns: Range, lost| WheelBounds {
-            turns: if wheel.watch.doubted() { Range::ANY } else { turns },
-            speed: wheel.tracker.speed(),
-            axle: wheel.wheelset.axle,
-            lost,
-        };
-        let wheels = [of(first, first_turns, first_lost), of(second, second_turns, second_lost)];
-        let Vehicle { thresholds, independent, .. } = self.vehicle;
-        self.bounds.narrow(possible, &wheels, allowed, &Limits { thresholds, independent }, t)
-    }
-
-    /// Which wheels may correct the filter.
-    fn trusted(&self, lost: [Option<Loss>; 2]) -> [bool; 2] {
+    /// Lets balises correct the distance and the diameters. The train has just run `way` (m).
+    fn place(&mut self, period: &Period, effort: Option<f64>, lost: [Option<Loss>; 2], way: f64) {
+        let Some(places) = &mut self.places else { return };
         let [first, second] = &self.wheels;
         let [first_lost, second_lost] = lost;
-        [first.is_read() && first_lost.is_none(), second.is_read() && second_lost.is_none()]
-    }
-
-    /// How much each wheel and the virtual sensor say.
-    fn shares(&self, trusted: [bool; 2], allowed: &Allowed) -> [f64; 3] {
-        let [first, second] = &self.wheels;
-        match trusted {
-            [false, false] => [0.0, 0.0, 1.0],
-            [true, false] => [1.0, 0.0, 0.0],
-            [false, true] => [0.0, 1.0, 0.0],
-            [true, true] => {
-                let weight = |wheel: &WheelChannel, other: &WheelChannel| {
-                    let sharp = 1.0 / (wheel.pitch * wheel.pitch);
-                    let creeps =
-                        allowed.slip && wheel.wheelset.axle.may_slip() && !other.wheelset.axle.may_slip();
-                    let behind = if allowed.slide {
-                        other.tracker.speed() - wheel.tracker.speed()
-                    } else if allowed.slip {
-                        wheel.tracker.speed() - other.tracker.speed()
-                    } else {
-                        0.0
-                    };
-                    let (noise, part) = APART;
-                    let apart = behind.max(0.0) / (noise + part * self.train.v.abs());
-                    sharp * if creeps { CREEPING_SHARE } else { 1.0 } / (1.0 + apart * apart * apart * apart)
-                };
-                let (a, b) = (weight(first, second), weight(second, first));
-                [a / (a + b), b / (a + b), 0.0]
-            }
-        }
-    }
-
-    /// Lets the trusted wheels correct the filter; by how much that moved the train (m).
-    ///
-    /// The wheels are read as one counter to which each adds its share of every period. Two counters of their own would
-    /// drift apart by what their diameters differ, and tear at the filter whenever the shares change.
-    fn correct(&mut self, [first_counted, second_counted]: [f64; 2], way: f64, [a, b, _]: [f64; 3]) -> f64 {
-        if self.stand_in.take().is_some() {
-            self.ahead = 0.0;
-        }
-        let [first, second] = &self.wheels;
-        let off = |wheel: &WheelChannel, share: f64| share * share * wheel.pitch * wheel.pitch * (1.0 / 12.0);
-        let r = off(first, a) + off(second, b);
-        self.ahead += a * first_counted + b * second_counted - way;
-        let moved = self.train.place(self.ahead, r).moved;
-        self.ahead -= moved;
-        moved
-    }
-
-    /// The virtual sensor takes over; how far the train went (m).
-    fn stand_in(&mut self, lost: [Option<Loss>; 2], allowed: &Allowed, before: f64, t: f64) -> f64 {
-        let [first, second] = lost;
-        let Some(kind) = first.or(second) else {
-            // No wheel is read at all: the train goes on as it did.
-            self.blind += t;
-            self.train.a *= 1.0 - (t / BLIND_S).min(1.0);
-            return 0.5 * (before + self.train.v) * t;
+        let rolled = |wheel: &WheelChannel, lost: Option<Loss>| Rolled {
+            nominal: self.way * wheel.pulses * wheel.wheelset_pitch,
+            rolls: lost.is_none() && wheel.is_read() && wheel.doubt == 0.0,
         };
-        let thresholds = self.vehicle.thresholds;
-        let limit = self.vehicle.max_traction.as_m_per_s2();
-        let envelope = self.settings.envelope;
-        let speed = match envelope {
-            Envelope::Fixed => before,
-            Envelope::Touches => self.past.speed_without(kind, before, self.clock),
-        };
-        let commanded = allowed.commanded;
-        let begins = Beginning { speed, commanded };
-        let sensor = self
-            .stand_in
-            .get_or_insert_with(|| VirtualSensor::new(kind, begins, limit, envelope, thresholds));
-        let [a, b] = &self.wheels;
-        let rate = sensor.rate();
-        let wheels = [a, b].map(|wheel| {
-            let speed = match envelope {
-                Envelope::Fixed => Some(wheel.tracker.speed()),
-                Envelope::Touches => wheel.steady_speed(rate),
-            };
-            let acceleration = wheel.tracker.acceleration();
-            speed.filter(|_| wheel.is_read()).map(|speed| LostWheel { speed, acceleration })
-        });
-        let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
-        let speed = sensor.next(wheels, commanded, locked, t);
-        self.train.v = speed;
-        self.train.a = sensor.rate();
-        0.5 * (before + speed) * t
-    }
-
-    /// What the wheels' counts say about the way of the period.
-    fn counted(&self, lost: [Option<Loss>; 2], allowed: &Allowed) -> [Counted; 2] {
-        let [first, second] = &self.wheels;
-        let [first_lost, second_lost] = lost;
-        let of = |wheel: &WheelChannel, lost: Option<Loss>| {
-            let good = wheel.doubt.is_finite() && !wheel.watch.doubted();
-            let axle = wheel.wheelset.axle;
-            Counted {
-                pulses: wheel.pulses,
-                doubt: if good { wheel.doubt } else { 0.0 },
-                pitch: wheel.pitch_range,
-                at_least: good && lost != Some(Loss::Spin) && !(allowed.slip && axle.may_slip()),
-                at_most: good && lost != Some(Loss::Slide) && !(allowed.slide && axle.may_slide()),
-            }
-        };
-        [of(first, first_lost), of(second, second_lost)]
-    }
-
-    fn states(&self, lost: [Option<Loss>; 2]) -> [WheelState; 2] {
-        let [first, second] = &self.wheels;
-        let [first_lost, second_lost] = lost;
-        let state = |wheel: &WheelChannel, lost| match lost {
-            _ if !wheel.is_read() => WheelState::Excluded,
-            Some(Loss::Slide) => WheelState::Slide,
-            Some(Loss::Spin) => WheelState::Spin,
-            None => WheelState::Rolling,
-        };
-        [state(first, first_lost), state(second, second_lost)]
-    }
-
-    fn mode(&self, lost: [Option<Loss>; 2], trusted: [bool; 2]) -> Mode {
-        let corrected = self.stand_in.as_ref().map_or(0.0, VirtualSensor::elapsed);
-        let longest = self.vehicle.thresholds.longest_correction.as_s();
-        if self.blind > BLIND_S || (corrected > longest && self.train.v > TURNED_ROUND) {
-            return Mode::Ambiguous;
-        }
-        if self.wheels.iter().any(|wheel| !wheel.is_read()) {
-            return Mode::Degraded;
-        }
-        match (trusted, lost) {
-            ([false, false], _) => Mode::Correction,
-            (_, [None, None]) => Mode::Normal,
-            _ => Mode::OneSlip,
-        }
-    }
-
-    /// Fills in the bounds, in the sense in which distance grows, and the amounts that never decrease.
-    fn finished(&self, estimate: MotionEstimate, last: &MotionEstimate) -> MotionEstimate {
-        let (mut speed, mut ways) = (self.bounds.speed(), self.ways.distance());
+        places.roll(period.time, [rolled(first, first_lost), rolled(second, second_lost)], effort);
+        let Some(balise) = period.balise.filter(|place| place.is_finite()) else { return };
+        let mut bounds = self.ways.distance();
         if self.way < 0.0 {
-            (speed, ways) = (speed.reversed(), ways.reversed());
+            bounds = bounds.reversed();
         }
-        let distance = estimate.distance.as_m();
-        let over = Length::from_m(distance - ways.low).max(last.over);
-        let under = Length::from_m(ways.high - distance).max(last.under);
-        MotionEstimate {
-            speed_low: Speed::from_m_per_s(speed.low),
-            speed_high: Speed::from_m_per_s(speed.high),
-            distance_low: Length::from_m(ways.low),
-            distance_high: Length::from_m(ways.high),
-            over,
-            under,
-            ..estimate
+        let now = DistanceInterval {
+            estimate: Length::from_m(self.distance),
+            low: Length::from_m(bounds.low),
+            high: Length::from_m(bounds.high),
+        };
+        let ran = Length::from_m(self.way * way);
+        if let Some(known) = places.pass(period.time, balise, ran, &now) {
+            // What was uncertain up to here is summed up; what is uncertain from here on begins anew.
+            let [over, under] = &mut self.amounts;
+            *over += (self.distance - bounds.low).max(0.0);
+            *under += (bounds.high - self.distance).max(0.0);
+            self.distance = known.estimate.as_m();
+            let place = Range { low: known.low.as_m(), high: known.high.as_m() };
+            self.ways.relocate(if self.way < 0.0 { place.reversed() } else { place });
+        }
+        for (wheel, (scale, bounds)) in self.wheels.iter_mut().zip(places.scales()) {
+            wheel.rescale(scale, bounds);
         }
     }
 
@@ -545,6 +324,9 @@ impl Odometer {
         self.ways.reverse();
         self.slips.clear();
         self.stand_in = None;
+        if let Some(published) = &mut self.published {
+            published.restart();
+        }
         self.ahead = -self.ahead;
         for wheel in &mut self.wheels {
             wheel.reverse();

@@ -79,6 +79,14 @@ impl TrainFilter {
         Correction { moved: ks * y, nis: y * y * per_s }
     }
 
+    /// Something else has carried the speed.
+    pub(super) fn set(&mut self, v: f64, a: f64, variance: f64) {
+        self.v = v;
+        self.a = a;
+        self.pvv = variance;
+        self.keep_positive();
+    }
+
     /// The train has turned round.
     pub(super) fn reverse(&mut self) {
         self.v = -self.v;

@@ -29,6 +29,9 @@ const SMOOTHED_S: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(super) struct WheelChannel {
     pub(super) wheelset: Wheelset,
+    /// By the diameter it is believed to have (m) ...
+    pub(super) wheelset_pitch: f64,
+    /// ... and by what was learnt of it.
     pub(super) pitch: f64,
     pub(super) pitch_range: Range,
     pub(super) tracker: WheelTracker,
@@ -55,6 +58,7 @@ impl WheelChannel {
         let period = vehicle.period.as_s();
         Self {
             wheelset,
+            wheelset_pitch: pitch,
             pitch,
             pitch_range: Range::around(pitch, wheelset.diameter_tolerance),
             tracker: WheelTracker::new(pitch, period),
@@ -173,6 +177,13 @@ impl WheelChannel {
     /// but overshoots when a wheel that regains its grip stops accelerating.
     pub(super) fn steady_speed(&self, acceleration: f64) -> Option<f64> {
         self.windows.mean_speed(self.pitch).map(|(speed, age)| speed + acceleration * age)
+    }
+
+    /// Its diameter is so many times the believed one.
+    pub(super) fn rescale(&mut self, scale: f64, bounds: Range) {
+        self.pitch = self.wheelset_pitch * scale;
+        self.pitch_range =
+            Range { low: self.wheelset_pitch * bounds.low, high: self.wheelset_pitch * bounds.high };
     }
 
     /// The train has turned round.
