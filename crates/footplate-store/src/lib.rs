@@ -26,6 +26,7 @@ mod train_file;
 mod ttobench;
 mod vehicle_file;
 mod whole_file;
+mod written_table;
 
 pub use batch::{Batch, BatchError, BatchEvent, BatchRun, Polling};
 pub use calibration_file::{
@@ -58,7 +59,7 @@ pub use store::{
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{
     RowPlace, TachometerBlock, TachometerColumns, TachometerError, TachometerNote, TachometerOddity,
-    TachometerReader, TimeFaults, Truth,
+    TachometerReader, TachometerWriter, TimeFaults, Truth, WrittenColumns,
 };
 pub use train_file::{TrainFile, TrainFileForm, parse_train, read_train, write_train};
 pub use vehicle_file::{
@@ -66,3 +67,4 @@ pub use vehicle_file::{
     parse_vehicle, read_vehicle, write_vehicle,
 };
 pub use whole_file::{WholeFile, write_whole};
+pub use written_table::{TableForm, UnknownForm};

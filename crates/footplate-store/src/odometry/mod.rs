@@ -5,13 +5,13 @@
 
 mod counted_way;
 mod detection;
-mod result_csv;
+mod result_rows;
 mod rival;
 mod run;
 mod score;
 mod summary;
 
-pub use result_csv::{RESULT_COLUMNS, ResultCsv};
+pub use result_rows::{LiveResult, ResultWriter};
 pub use rival::Rival;
 pub use run::{OdometryRun, Preset, RunContext, RunScores};
 pub use score::OdometryScore;

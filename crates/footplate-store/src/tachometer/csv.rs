@@ -14,8 +14,8 @@ use super::csv_bytes;
 use super::csv_line::{Line, LineReader};
 use super::error::TachometerError;
 use super::note::{RowPlace, TachometerNote, TachometerOddity};
+use super::row_watch::RowWatch;
 use super::run_names::RunNames;
-use super::time_watch::TimeWatch;
 use crate::table::{LONGEST_LINE, TableError};
 
 /// How much is asked of the input at once, and four times the longest line.
@@ -28,7 +28,7 @@ pub(super) struct CsvReader<R> {
     columns: TachometerColumns,
     line_reader: LineReader,
     runs: RunNames,
-    times: TimeWatch,
+    watch: RowWatch,
     /// What the header had that is odd, until the first block takes it along.
     notes: Vec<TachometerNote>,
     has_rows: bool,
@@ -56,7 +56,7 @@ impl<R: Read> CsvReader<R> {
             columns,
             line_reader,
             runs: RunNames::default(),
-            times: TimeWatch::default(),
+            watch: RowWatch::default(),
             notes,
             has_rows: false,
         })
@@ -74,7 +74,7 @@ impl<R: Read> CsvReader<R> {
             while block.len() < BLOCK_ROWS && self.lines.has_line() {
                 self.read_row(block)?;
             }
-            block.time_faults = self.times.faults();
+            block.time_faults = self.watch.faults();
             block.read_up_to = self.lines.taken;
             self.has_rows |= !block.is_empty();
             // What is odd about the header or the end is worth a block without rows.
@@ -82,6 +82,7 @@ impl<R: Read> CsvReader<R> {
                 return Ok(true);
             }
             if !self.lines.fill()? {
+                self.watch.end(&self.lines.file, &self.columns)?;
                 let file = self.lines.file.clone();
                 return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows { file }) };
             }
@@ -109,13 +110,10 @@ impl<R: Read> CsvReader<R> {
                 Err(error) => return Err(error.into()),
             }
         }
-        let place = Some(RowPlace::Line(self.lines.line));
-        let time = block.times.last().copied().unwrap_or_default();
-        if let Some(oddity) = self.times.see(block.run(row), time) {
-            block.notes.push(TachometerNote { place, oddity });
-        }
+        let place = RowPlace::Line(self.lines.line);
+        self.watch.see(&self.lines.file, &self.columns, block, row, place)?;
         if is_last {
-            block.notes.push(TachometerNote { place, oddity: TachometerOddity::LineNotEnded });
+            block.notes.push(TachometerNote { place: Some(place), oddity: TachometerOddity::LineNotEnded });
         }
         Ok(())
     }

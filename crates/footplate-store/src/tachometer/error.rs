@@ -39,4 +39,40 @@ pub enum TachometerError {
         /// The column that looks like time.
         column: String,
     },
+    /// A Parquet file that cannot be read on.
+    #[error(
+        "{file}: it begins like Parquet and cannot be read as that: {problem}; was it written and copied to its end?"
+    )]
+    Parquet {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A column of a Parquet file with a type that cannot hold what it should.
+    #[error("{file}, column {column}: its type is {found}; it should be {expected}")]
+    ParquetType {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// Its type.
+        found: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A value of a Parquet file that is not what it should be.
+    #[error("{file}, row {row}, column {column}: `{value}` should be {expected}")]
+    ParquetValue {
+        /// The file.
+        file: String,
+        /// The row, counted from 1.
+        row: u64,
+        /// The column.
+        column: String,
+        /// What stands there.
+        value: String,
+        /// What would be right.
+        expected: String,
+    },
 }

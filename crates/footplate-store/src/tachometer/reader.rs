@@ -1,19 +1,26 @@
 //! A recording that is being read, whatever its form.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::block::TachometerBlock;
 use super::columns::TachometerColumns;
 use super::csv::CsvReader;
 use super::error::TachometerError;
+use super::parquet::{PARQUET_MAGIC, ParquetReader};
 use crate::table::TableError;
 
 /// A tachometer recording that is being read.
 pub struct TachometerReader {
-    csv: CsvReader<Box<dyn Read + Send>>,
+    form: Form,
     extent: Option<u64>,
+}
+
+enum Form {
+    Csv(Box<CsvReader<Box<dyn Read + Send>>>),
+    Parquet(Box<ParquetReader>),
 }
 
 impl TachometerReader {
@@ -22,32 +29,63 @@ impl TachometerReader {
     /// # Errors
     /// That it cannot be read or is no recording, and what would be right.
     pub fn open(path: &Path) -> Result<Self, TachometerError> {
-        let file = path.display().to_string();
-        let opened = File::open(path).and_then(|input| {
-            // A folder opens like a file on some systems, and then fails with a number.
+        let name = path.display().to_string();
+        let opened = File::open(path).and_then(|mut input| {
             let about = input.metadata()?;
-            if about.is_dir() { Err(io::Error::other("it is a folder")) } else { Ok((input, about.len())) }
+            // A folder opens like a file on some systems, and then fails with a number.
+            if about.is_dir() {
+                return Err(io::Error::other("it is a folder"));
+            }
+            if !about.is_file() {
+                // A pipe cannot be read twice.
+                return Ok((input, None, false));
+            }
+            let is_parquet = beginning(&mut input)? == PARQUET_MAGIC;
+            input.seek(SeekFrom::Start(0))?;
+            Ok((input, Some(about.len()), is_parquet))
         });
         match opened {
-            Ok((input, bytes)) => {
-                Ok(Self { extent: Some(bytes), ..Self::of_stream(&file, Box::new(input))? })
-            }
-            Err(source) => Err(TableError::Read { file, source }.into()),
+            Ok((input, _, true)) => Self::parquet(&name, input),
+            Ok((input, None, false)) => Self::of_stream(&name, Box::new(input)),
+            Ok((input, extent, false)) => Self::csv(&name, Box::new(input), extent),
+            Err(source) => Err(TableError::Read { file: name, source }.into()),
         }
     }
 
-    /// Reads from an input that comes as it likes. `name` is what messages call it.
+    /// Reads from an input that comes as it likes. `name` is what messages call it. Of Parquet, whose beginning stands
+    /// at its end, a temporary copy is made.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn of_stream(name: &str, input: Box<dyn Read + Send>) -> Result<Self, TachometerError> {
-        Ok(Self { csv: CsvReader::open(name, input)?, extent: None })
+    pub fn of_stream(name: &str, mut input: Box<dyn Read + Send>) -> Result<Self, TachometerError> {
+        let unreadable = |source| TableError::Read { file: name.to_owned(), source };
+        let begin = beginning(&mut input).map_err(unreadable)?;
+        let is_parquet = begin == PARQUET_MAGIC;
+        let mut whole = io::Cursor::new(begin).chain(input);
+        if is_parquet {
+            let mut copy = tempfile::tempfile().map_err(unreadable)?;
+            io::copy(&mut whole, &mut copy).map_err(unreadable)?;
+            return Self::parquet(name, copy);
+        }
+        Self::csv(name, Box::new(whole), None)
+    }
+
+    fn csv(name: &str, input: Box<dyn Read + Send>, extent: Option<u64>) -> Result<Self, TachometerError> {
+        Ok(Self { form: Form::Csv(Box::new(CsvReader::open(name, input)?)), extent })
+    }
+
+    fn parquet(name: &str, input: File) -> Result<Self, TachometerError> {
+        let reader = guarded(name, || ParquetReader::open(name, input))?;
+        Ok(Self { extent: Some(reader.rows()), form: Form::Parquet(Box::new(reader)) })
     }
 
     /// The columns it has.
     #[must_use]
     pub fn columns(&self) -> &TachometerColumns {
-        self.csv.columns()
+        match &self.form {
+            Form::Csv(reader) => reader.columns(),
+            Form::Parquet(reader) => reader.columns(),
+        }
     }
 
     /// How much there is to read, in bytes of a text and in rows of a table; unknown of a stream.
@@ -57,12 +95,32 @@ impl TachometerReader {
     }
 
     /// The next rows, at most a few thousand, and from a live input those that are there; `false` at the end. A block
-    /// without rows brings notes. What
-    /// was in the block is gone, but its memory is used again.
+    /// without rows brings notes. What was in the block is gone, but its memory is used again.
     ///
     /// # Errors
     /// What is wrong with a row, and where.
     pub fn read_block(&mut self, block: &mut TachometerBlock) -> Result<bool, TachometerError> {
-        self.csv.read_block(block)
+        match &mut self.form {
+            Form::Csv(reader) => reader.read_block(block),
+            Form::Parquet(reader) => {
+                let name = reader.file().to_owned();
+                guarded(&name, || reader.read_block(block))
+            }
+        }
     }
+}
+
+/// Does what the decoder of Parquet may not survive: it panics at some damages, which here are errors like any other.
+fn guarded<T>(name: &str, work: impl FnOnce() -> Result<T, TachometerError>) -> Result<T, TachometerError> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        let problem = "the decoder gave up".to_owned();
+        Err(TachometerError::Parquet { file: name.to_owned(), problem })
+    })
+}
+
+/// The first bytes, by which a form is told; fewer only of a shorter input.
+fn beginning(input: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut begin = Vec::with_capacity(PARQUET_MAGIC.len());
+    input.take(PARQUET_MAGIC.len() as u64).read_to_end(&mut begin)?;
+    Ok(begin)
 }

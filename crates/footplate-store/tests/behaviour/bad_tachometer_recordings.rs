@@ -99,8 +99,9 @@ proptest! {
 
     #[test]
     fn quotes_and_spaces_change_nothing(
-        rows in prop::collection::vec((0_i64..10_000_000_000, 0_i64..1000, any::<Option<f64>>()), 1..20),
+        mut rows in prop::collection::vec((0_i64..10_000_000_000, 0_i64..1000, any::<Option<f64>>()), 1..20),
     ) {
+        rows.sort_by_key(|(ns, ..)| *ns);
         let mut plain = "t_s,pulses_1,pulses_2,balise_m\n".to_owned();
         let mut quoted = plain.clone();
         for (ns, count, number) in rows {
@@ -111,4 +112,19 @@ proptest! {
         }
         prop_assert_eq!(read_text(plain).unwrap().rows, read_text(quoted).unwrap().rows);
     }
+}
+
+#[test]
+fn times_and_counts_that_have_changed_places_are_noticed() {
+    // A second a row, and 20 pulses give or take one: what stands below t_s goes up and down.
+    let rows: String = (0..30).map(|row| format!("{},{row},{}\n", 20 + row % 3, 20 + row % 2)).collect();
+    assert_eq!(
+        refusal(&format!("t_s,pulses_1,pulses_2\n{rows}")),
+        "run.csv: `t_s` does not increase from row to row and `pulses_1` does; are the two columns swapped in the header?"
+    );
+    assert!(read_text(format!("pulses_2,t_s,pulses_1\n{rows}")).is_ok());
+    // A clock that stands or jumps once is left to the odometer.
+    let rows: String =
+        (0..30).map(|row| format!("{},{row},1\n", if row < 20 { 5 } else { row - 20 })).collect();
+    assert!(read_text(format!("t_s,counter_1,pulses_2\n{rows}")).is_ok());
 }

@@ -22,5 +22,6 @@ mod store_shared;
 mod store_survives;
 mod stores;
 mod tachometer_recordings;
+mod tachometer_round_trip;
 mod trains_and_lines;
 mod vehicle_files;

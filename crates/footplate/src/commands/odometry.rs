@@ -113,8 +113,7 @@ impl Arguments {
             let recording = OpenRecording::open(file, self.score)?;
             if let (Some(out), Some(output)) = (&self.out, output.take()) {
                 let with_runs = self.files.len() > 1 || recording.has_run_ids();
-                let begun = Results::begin(out, output, with_runs);
-                results = Some(begun.with_context(|| format!("writing {}", out.display()))?);
+                results = Some(Results::begin(out, output, with_runs)?);
             }
             walked.push(recording.walk(context, results.as_mut())?);
         }

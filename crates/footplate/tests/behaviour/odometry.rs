@@ -73,6 +73,18 @@ fn estimates_come_in_the_columns_of_the_contract() {
     assert_eq!(text.lines().next(), Some(HEADER));
     assert_eq!(text.lines().count(), 41);
     assert!(text.lines().nth(2).unwrap().starts_with("0.05,"), "times are exact");
+    // As Parquet, which the same reader tells by its first bytes and misses its columns in; other endings are refused.
+    let parquet = folder.join("result.parquet").display().to_string();
+    assert_eq!(odometry(&[PLAIN, "--out", &parquet]).status, 0);
+    assert!(std::fs::read(&parquet).unwrap().starts_with(b"PAR1"));
+    assert!(odometry(&[&parquet]).errors.contains("missing columns: pulses_1 (or counter_1), pulses_2"));
+    std::fs::remove_file(&parquet).unwrap();
+    let unknown = odometry(&[PLAIN, "--out", "result.xlsx"]);
+    assert!(
+        unknown.status == 2 && unknown.errors.contains("should end in .csv or .parquet"),
+        "{}",
+        unknown.errors
+    );
     // The same on standard output, and nothing else.
     assert_eq!(odometry(&[PLAIN, "--out", "-"]).output, text);
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1, "nothing is left beside the result");
