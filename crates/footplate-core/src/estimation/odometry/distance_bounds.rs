@@ -4,10 +4,12 @@
 //! always wide. The counts of a wheel that is known to turn no faster (or no slower) than the train moves are off by one
 //! pulse over any way; they are used from the moment on at which that is known.
 
+use super::vote::Vote;
 use crate::wheels::Range;
 
-/// Pulses by which a way by counts can be off: one for the phase at the start and end, a tenth for pitch errors.
-const PULSES_OFF: f64 = 1.1;
+/// Pulses by which a way by counts can be off: one for the phase at the start and end, half for pitch errors and a row
+/// that was read a little late.
+const PULSES_OFF: f64 = 1.5;
 
 /// A wheel's counts since it was last known to bound the distance from one side.
 #[derive(Debug, Clone, Copy)]
@@ -17,21 +19,24 @@ struct Anchor {
     /// What it has counted since, in pulses, weighted with the pitch (m).
     counted: f64,
     set: bool,
+    /// Since it was anchored there was a time when it could only loosen the bound.
+    only_loosens: bool,
 }
 
 impl Anchor {
-    const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false };
+    const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false, only_loosens: false };
 
     /// The bound after `way` more (m), if the wheel held it for the whole period and before.
-    fn bound(&mut self, holds: bool, way: f64, off: f64) -> Option<f64> {
+    fn bound(&mut self, holds: bool, loosens: bool, way: f64, off: f64) -> Option<f64> {
         self.set &= holds;
+        self.only_loosens |= loosens;
         self.counted += way;
         self.set.then_some(self.bound + self.counted + off)
     }
 
-    fn anchor(&mut self, holds: bool, bound: f64) {
-        if holds && !self.set {
-            *self = Self { bound, counted: 0.0, set: true };
+    fn anchor(&mut self, holds: bool, loosens: bool, bound: f64) {
+        if holds && (!self.set || (self.only_loosens && !loosens)) {
+            *self = Self { bound, counted: 0.0, set: true, only_loosens: loosens };
         }
     }
 }
@@ -43,6 +48,10 @@ pub(super) struct Counted {
     pub(super) pulses: f64,
     /// By how many of them the count may be wrong.
     pub(super) doubt: f64,
+    /// It may loosen the bound from below, but not set it: its sensor is in doubt, or traction may turn it faster.
+    pub(super) loosens_low: bool,
+    /// The same from above: its sensor is in doubt, or the brake may hold it back.
+    pub(super) loosens_high: bool,
     /// Pitch (m).
     pub(super) pitch: Range,
     /// The train moved at least as far.
@@ -82,6 +91,8 @@ impl DistanceBounds {
         let bend = acceleration.width() * t * t * 0.125;
         let mut low = self.distance.low + 0.5 * (before.low + now.low) * t - bend;
         let mut high = self.distance.high + 0.5 * (before.high + now.high) * t + bend;
+        // Where both wheels bound the same side the looser bound counts: no single sensor can break it.
+        let (mut by_low, mut by_high) = (Vote::NONE, Vote::NONE);
         for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
             let (short, long) = if wheel.pulses < 0.0 {
                 (wheel.pitch.high, wheel.pitch.low)
@@ -90,13 +101,19 @@ impl DistanceBounds {
             };
             let off = PULSES_OFF * wheel.pitch.high;
             let doubt = wheel.doubt * wheel.pitch.high;
-            if let Some(bound) = low_anchor.bound(wheel.at_least, wheel.pulses * short - doubt, -off) {
-                low = low.max(bound);
+            if let Some(bound) =
+                low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
+            {
+                by_low = by_low.also(bound, low_anchor.only_loosens, f64::min);
             }
-            if let Some(bound) = high_anchor.bound(wheel.at_most, wheel.pulses * long + doubt, off) {
-                high = high.min(bound);
+            if let Some(bound) =
+                high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
+            {
+                by_high = by_high.also(bound, high_anchor.only_loosens, f64::max);
             }
         }
+        low = by_low.outcome().map_or(low, |bound| low.max(bound));
+        high = by_high.outcome().map_or(high, |bound| high.min(bound));
         if low > high {
             // Something taken for granted is not so; the speeds alone are left.
             (low, high) = (
@@ -108,8 +125,8 @@ impl DistanceBounds {
         }
         self.distance = Range { low, high };
         for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
-            low_anchor.anchor(wheel.at_least, low);
-            high_anchor.anchor(wheel.at_most, high);
+            low_anchor.anchor(wheel.at_least, wheel.loosens_low, low);
+            high_anchor.anchor(wheel.at_most, wheel.loosens_high, high);
         }
         self.distance
     }

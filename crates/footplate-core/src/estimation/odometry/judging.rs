@@ -113,7 +113,8 @@ impl Odometer {
         let [first_turns, second_turns] = *turns;
         let [first_lost, second_lost] = lost;
         let of = |wheel: &WheelChannel, turns: Range, lost| WheelBounds {
-            turns: if wheel.watch.doubted() { Range::ANY } else { turns },
+            turns: if wheel.watch.excluded() { Range::ANY } else { turns },
+            doubted: wheel.watch.doubted(),
             speed: wheel.tracker.speed(),
             axle: wheel.wheelset.axle,
             lost,
@@ -128,14 +129,16 @@ impl Odometer {
         let [first, second] = &self.wheels;
         let [first_lost, second_lost] = lost;
         let of = |wheel: &WheelChannel, lost: Option<Loss>| {
-            let good = wheel.doubt.is_finite() && !wheel.watch.doubted();
-            let axle = wheel.wheelset.axle;
+            let good = wheel.doubt.is_finite() && !wheel.watch.excluded();
+            let (slides, slips) = wheel.may_differ(allowed);
             Counted {
                 pulses: wheel.pulses,
                 doubt: if good { wheel.doubt } else { 0.0 },
+                loosens_low: wheel.watch.doubted() || slips,
+                loosens_high: wheel.watch.doubted() || slides,
                 pitch: wheel.pitch_range,
-                at_least: good && lost != Some(Loss::Spin) && !(allowed.slip && axle.may_slip()),
-                at_most: good && lost != Some(Loss::Slide) && !(allowed.slide && axle.may_slide()),
+                at_least: good && lost != Some(Loss::Spin),
+                at_most: good && lost != Some(Loss::Slide),
             }
         };
         [of(first, first_lost), of(second, second_lost)]

@@ -32,6 +32,7 @@ mod tolerance;
 mod touch_line;
 mod train_filter;
 mod virtual_sensor;
+mod vote;
 mod wheel_channel;
 
 pub use accuracy_monitor::{AccuracyMonitor, OdometerAccuracy};

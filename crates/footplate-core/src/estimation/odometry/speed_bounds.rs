@@ -13,6 +13,7 @@
 
 use super::command_watch::Allowed;
 use super::recent::Recent;
+use super::vote::Vote;
 use crate::wheels::{Axle, Loss, Range, Thresholds};
 
 /// How far back the bound goes for one that is still sound when a slide or slip is seen (s): longer than any
@@ -36,6 +37,8 @@ const FULL_CREEP_EFFORT: f64 = 0.2;
 pub(super) struct WheelBounds {
     /// Between which speeds it turns; `Range::ANY` if nothing is known.
     pub(super) turns: Range,
+    /// Its sensor is in doubt: it may loosen a bound, but not set one.
+    pub(super) doubted: bool,
     /// The speed it is followed at.
     pub(super) speed: f64,
     pub(super) axle: Axle,
@@ -47,25 +50,6 @@ pub(super) struct WheelBounds {
 pub(super) struct Limits {
     pub(super) thresholds: Thresholds,
     pub(super) independent: bool,
-}
-
-/// The bound on which every wheel asked agrees, so that one sensor that is wrong cannot break it.
-#[derive(Debug, Clone, Copy)]
-struct Vote(Option<f64>);
-
-impl Vote {
-    const NONE: Self = Self(None);
-
-    fn also(self, bound: f64, looser: fn(f64, f64) -> f64) -> Self {
-        if bound.is_infinite() {
-            return self;
-        }
-        Self(Some(self.0.map_or(bound, |so_far| looser(so_far, bound))))
-    }
-
-    fn or(self, nothing: f64) -> f64 {
-        self.0.unwrap_or(nothing)
-    }
 }
 
 /// Follows the bounds of the speed, in the direction of travel.
@@ -87,7 +71,7 @@ pub(super) struct SpeedBounds {
 
 impl WheelBounds {
     fn is_asked(&self) -> bool {
-        self.turns.high.is_finite()
+        self.turns.high.is_finite() && !self.doubted
     }
 }
 
@@ -163,21 +147,21 @@ impl SpeedBounds {
             let driven = allowed.slip && wheel.axle.may_slip();
             spun |= wheel.lost == Some(Loss::Spin);
             if !driven {
-                rolling = rolling.also(wheel.turns.low, f64::min);
-            } else if wheel.lost != Some(Loss::Spin) {
+                rolling = rolling.also(wheel.turns.low, wheel.doubted, f64::min);
+            } else if wheel.lost != Some(Loss::Spin) && !wheel.doubted {
                 powered = powered.max(wheel.turns.low * (1.0 - creep));
                 driven_too = Some(wheel.turns.low).filter(|low| low.is_finite());
             }
         }
-        if let Some(bound) = rolling.0 {
-            // A driven wheel turns no slower than the train: it can only show that the others turn too fast.
-            rolling = Vote(Some(driven_too.map_or(bound, |driven: f64| driven.min(bound))));
-        }
+        // A driven wheel turns no slower than the train: it can only show that the others turn too fast.
+        let rolling = rolling
+            .outcome()
+            .map_or(f64::NEG_INFINITY, |bound| driven_too.map_or(bound, |driven: f64| driven.min(bound)));
         // A wheel that starts to spin is seen a little late.
         let powered = -self.by_powered.push(-powered, t);
         let free = if spun && !self.any_spun { free.min(-self.lowest.largest()) } else { free };
         self.any_spun = spun;
-        free.max(rolling.or(f64::NEG_INFINITY)).max(powered)
+        free.max(rolling).max(powered)
     }
 
     fn high(
@@ -197,16 +181,16 @@ impl SpeedBounds {
             if allowed.slide && wheel.axle.may_slide() {
                 braked += 1;
                 sliding += i32::from(slides);
-                if !slides && wheel.turns.high.is_finite() {
+                if !slides && wheel.is_asked() {
                     shown = shown.max(wheel.turns.high);
                 }
             } else {
-                trusted = trusted.also(wheel.turns.high, f64::max);
+                trusted = trusted.also(wheel.turns.high, wheel.doubted, f64::max);
             }
         }
         let together = self.together(wheels, sliding, t) && limits.independent;
         let kept_up = self.by_braked.push(if together { shown } else { f64::INFINITY }, t);
-        if let Some(trusted) = trusted.0 {
+        if let Some(trusted) = trusted.outcome() {
             self.all_slid = false;
             return free.min(trusted);
         }

@@ -167,7 +167,7 @@ impl WheelChannel {
 
     /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
-        if self.watch.doubted() || self.doubt.is_infinite() {
+        if self.watch.excluded() || self.doubt.is_infinite() {
             return Range::ANY;
         }
         self.windows.speed(self.pitch_range, acceleration)

@@ -1,0 +1,25 @@
+//! What all wheels that bound something from one side agree on.
+
+/// The bound on which every wheel asked agrees, so that one sensor that is wrong cannot break it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Vote {
+    bound: Option<f64>,
+    /// One of the wheels is beyond doubt.
+    counts: bool,
+}
+
+impl Vote {
+    pub(super) const NONE: Self = Self { bound: None, counts: false };
+
+    pub(super) fn also(self, bound: f64, doubted: bool, looser: fn(f64, f64) -> f64) -> Self {
+        if bound.is_infinite() {
+            return self;
+        }
+        let bound = self.bound.map_or(bound, |so_far| looser(so_far, bound));
+        Self { bound: Some(bound), counts: self.counts || !doubted }
+    }
+
+    pub(super) fn outcome(self) -> Option<f64> {
+        self.bound.filter(|_| self.counts)
+    }
+}
