@@ -1,9 +1,10 @@
 //! What carries the estimate in a period: the wheels that are trusted, or the virtual sensor that stands in for them.
 
 use super::command_watch::Allowed;
+use super::inertia::Inertia;
 use super::odometer::Odometer;
 use super::published::PeriodCount;
-use super::virtual_sensor::{Beginning, Envelope, LostWheel, VirtualSensor};
+use super::virtual_sensor::{Beginning, Envelope, Guides, LostWheel, VirtualSensor};
 use super::wheel_channel::WheelChannel;
 use crate::wheels::Loss;
 
@@ -37,7 +38,11 @@ impl Odometer {
         let shares = self.shares(trusted, allowed);
         let way = if trusted.contains(&true) {
             self.blind = 0.0;
-            way + self.correct(counted, way, shares)
+            let way = way + self.correct(counted, way, shares);
+            if let Some(inertia) = &mut self.inertia {
+                inertia.align(self.train.v, !allowed.slide && !allowed.slip);
+            }
+            way
         } else {
             self.stand_in(lost, allowed, before, t)
         };
@@ -164,9 +169,10 @@ impl Odometer {
             speed.filter(|_| wheel.is_read()).map(|speed| LostWheel { speed, acceleration })
         });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
-        let speed = sensor.next(wheels, commanded, locked, t);
-        self.train.v = speed;
+        let felt = self.inertia.as_ref().map(Inertia::acceleration);
+        let speed = sensor.next(wheels, Guides { commanded, felt, locked }, t);
         self.train.a = sensor.rate();
+        self.train.v = speed;
         0.5 * (before + speed) * t
     }
 }

@@ -11,6 +11,7 @@ mod current_statistical;
 mod distance_bounds;
 mod federated_filter;
 mod ground_touch;
+mod inertia;
 pub mod inertial;
 mod judging;
 mod local_filter;

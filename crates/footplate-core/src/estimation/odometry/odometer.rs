@@ -7,6 +7,7 @@
 use super::balise_link::DistanceInterval;
 use super::command_watch::CommandWatch;
 use super::distance_bounds::DistanceBounds;
+use super::inertia::Inertia;
 use super::motion_estimate::{Mode, MotionEstimate, WheelState};
 use super::past::Past;
 use super::places::{Places, Rolled};
@@ -52,6 +53,8 @@ pub struct Odometer {
     /// How far the counts put the train ahead of where the filter believes it (m).
     pub(super) ahead: f64,
     pub(super) blind: f64,
+    /// No wheel has been read yet.
+    pub(super) unread: bool,
     /// How long both wheels have turned alike (s).
     pub(super) alike_for: f64,
     /// What the train did before anything slipped or slid.
@@ -59,6 +62,8 @@ pub struct Odometer {
     /// The published filter, where it carries the estimate.
     pub(super) published: Option<Published>,
     pub(super) places: Option<Places>,
+    /// The inertial sensor, once there is one.
+    pub(super) inertia: Option<Inertia>,
     /// Over- and under-reading up to the last balise (m).
     pub(super) amounts: [f64; 2],
 }
@@ -96,9 +101,19 @@ impl Odometer {
         if t > GAP_S {
             return self.resume(period, last, t);
         }
-        let estimate = self.follow(period, last, t);
+        let estimate =
+            if self.unread { self.begin_late(period, last, t) } else { self.follow(period, last, t) };
         self.last = Some(estimate);
         estimate
+    }
+
+    /// A period after a first one of which nothing was read, as of running counters, whose first value says nothing.
+    fn begin_late(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
+        let first = self.begin(period);
+        let fastest = self.bounds.speed().high;
+        self.ways.relocate(Range { low: 0.0, high: self.ways.distance().high + fastest * t });
+        self.distance += self.train.v * t;
+        self.finished(MotionEstimate { distance: Length::from_m(self.distance), ..first }, &last)
     }
 
     /// The first period of a run.
@@ -121,6 +136,7 @@ impl Odometer {
             [Some(v), None] | [None, Some(v)] => (v, FIRST_COUNT),
             [None, None] => (0.0, most * most * t * t),
         };
+        self.unread = read == [None, None];
         self.train = TrainFilter::new(speed, variance * (first.pitch / t) * (first.pitch / t) + 1e-4);
         self.bounds = SpeedBounds::new(bounds);
         let estimate = MotionEstimate {
@@ -184,6 +200,7 @@ impl Odometer {
             distance: 0.0,
             ahead: 0.0,
             blind: 0.0,
+            unread: true,
             alike_for: 0.0,
             past: Past::new(),
             published: match settings.carrier {
@@ -191,6 +208,7 @@ impl Odometer {
                 Carrier::Counts { .. } => None,
             },
             places: settings.balises.map(|accuracy| Places::new(vehicle.wheelsets, accuracy)),
+            inertia: None,
             amounts: [0.0; 2],
         }
     }
@@ -246,7 +264,10 @@ impl Odometer {
             self.command.disprove();
         }
         let speed_before = self.bounds.speed();
-        let bounded = self.narrow(possible, &turns, &allowed, lost, t);
+        let mut bounded = self.narrow(possible, &turns, &allowed, lost, t);
+        if self.settings.inertial {
+            bounded = self.feel(period, before, bounded, t);
+        }
 
         let trusted = self.trusted(lost);
         let (way, shares) = self.carry(counted, lost, &allowed, before, way, t);
@@ -270,6 +291,22 @@ impl Odometer {
         let estimate = self.finished(estimate, &last);
         self.turn_round();
         estimate
+    }
+
+    /// Lets the inertial sensor narrow the bounds; what is left of them.
+    fn feel(&mut self, period: &Period, before: f64, bounded: Range, t: f64) -> Range {
+        let reading = period
+            .acceleration
+            .map(|reading| self.way * reading.as_m_per_s2())
+            .filter(|reading| reading.is_finite());
+        if self.inertia.is_none() && reading.is_some() {
+            self.inertia = Some(Inertia::new(before, self.bounds.speed()));
+        }
+        let Some(inertia) = &mut self.inertia else { return bounded };
+        inertia.read(reading, t);
+        let both = inertia.hold(bounded);
+        self.bounds.set(both);
+        both
     }
 
     /// Lets balises correct the distance and the diameters. The train has just run `way` (m).
@@ -328,6 +365,8 @@ impl Odometer {
             published.restart();
         }
         self.ahead = -self.ahead;
+        // Its bias and the gradient are felt the other way round.
+        self.inertia = None;
         for wheel in &mut self.wheels {
             wheel.reverse();
         }

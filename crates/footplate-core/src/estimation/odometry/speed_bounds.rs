@@ -95,6 +95,11 @@ impl SpeedBounds {
         self.speed
     }
 
+    /// Something else knows it better.
+    pub(super) fn set(&mut self, speed: Range) {
+        self.speed = speed;
+    }
+
     /// Where the train can have got to within `t` seconds, before any wheel is asked.
     pub(super) fn possible(&self, allowed: &Allowed, t: f64) -> Range {
         Range {

@@ -64,6 +64,17 @@ pub(super) struct LostWheel {
     pub(super) acceleration: f64,
 }
 
+/// What else tells how the train moves while its wheels do not.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Guides {
+    /// By how much it would decelerate by its command (m/s²); infinite if there is none.
+    pub(super) commanded: f64,
+    /// How its speed changes by an inertial sensor (m/s²).
+    pub(super) felt: Option<f64>,
+    /// Neither wheel turns at all.
+    pub(super) locked: bool,
+}
+
 /// Follows one slide or spin.
 #[derive(Debug, Clone)]
 pub(super) struct VirtualSensor {
@@ -124,22 +135,15 @@ impl VirtualSensor {
         sign(self.kind) * self.rate
     }
 
-    /// Goes on for `t` seconds in which the wheels that are read turn so, while the command would decelerate the train by so much
-    /// (m/s²); `locked` if neither turns at all.
-    pub(super) fn next(
-        &mut self,
-        wheels: [Option<LostWheel>; 2],
-        commanded: f64,
-        locked: bool,
-        t: f64,
-    ) -> f64 {
+    /// Goes on for `t` seconds in which the wheels that are read turn so.
+    pub(super) fn next(&mut self, wheels: [Option<LostWheel>; 2], guides: Guides, t: f64) -> f64 {
         self.elapsed += t;
         self.since_touch += t;
         if self.envelope == Envelope::Touches {
-            self.rate = self.learnt(commanded, locked);
+            self.rate = self.learnt(guides);
         } else if self.kind == Loss::Slide {
             let Thresholds { correction, lock_correction, .. } = self.thresholds;
-            self.rate = -if locked { lock_correction } else { correction }.as_m_per_s2();
+            self.rate = -if guides.locked { lock_correction } else { correction }.as_m_per_s2();
         }
         let toward = sign(self.kind);
         let fallen = self.speed + self.rate * t;
@@ -179,7 +183,11 @@ impl VirtualSensor {
         self.touched = true;
     }
 
-    fn learnt(&self, commanded: f64, locked: bool) -> f64 {
+    fn learnt(&self, Guides { commanded, felt, locked }: Guides) -> f64 {
+        if let Some(felt) = felt {
+            // What is felt needs no guess of how much the rail gives.
+            return sign(self.kind) * felt;
+        }
         if locked && self.kind == Loss::Slide {
             // Nothing can touch any more: the best guess, not one that asks to be corrected.
             return (LOCKED * self.touches.slope()).max(-commanded).min(-GENTLEST);
