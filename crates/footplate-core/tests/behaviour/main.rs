@@ -6,6 +6,7 @@ mod federated_filters;
 mod inertial;
 mod motion_checks;
 mod motion_models;
+mod odometer;
 mod profiles;
 mod short_moves;
 mod speed_change_laws;

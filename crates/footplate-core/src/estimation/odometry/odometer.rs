@@ -29,6 +29,12 @@ const CERTAIN_HEADING: f64 = 1.5;
 const TURNED_ROUND: f64 = 0.1;
 /// Variance of the speed that the first period tells, in squared pulses per period: a count at a random phase.
 const FIRST_COUNT: f64 = 1.0 / 6.0;
+/// By how much the speed of the first period may be wrong for the diameter and creepage of a wheel (part of it).
+const FIRST_CREEP: f64 = 0.02;
+/// What is larger is no command, no reading of an accelerometer (m/s²) and no place on any line (m).
+const LARGEST_EFFORT: f64 = 1.5;
+const LARGEST_READING: f64 = 50.0;
+const FARTHEST_PLACE: f64 = 1e8;
 /// Jerk density while the virtual sensor stands in (m²/s⁵): accelerations are known to 0.3 m/s² after a second.
 const BLIND_JERK: f64 = 0.1;
 
@@ -110,8 +116,10 @@ impl Odometer {
     /// A period after a first one of which nothing was read, as of running counters, whose first value says nothing.
     fn begin_late(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         let first = self.begin(period);
-        let fastest = self.bounds.speed().high;
-        self.ways.relocate(Range { low: 0.0, high: self.ways.distance().high + fastest * t });
+        let Range { low, high } = self.bounds.speed();
+        let before = self.ways.distance();
+        let reach = Range { low: before.low + (low * t).min(0.0), high: before.high + (high * t).max(0.0) };
+        self.ways.relocate(reach);
         self.distance += self.train.v * t;
         self.finished(MotionEstimate { distance: Length::from_m(self.distance), ..first }, &last)
     }
@@ -126,10 +134,11 @@ impl Odometer {
         let mut bounds = Range { low: 0.0, high: most };
         let speeds = read.iter().flatten();
         if let Some(fastest) = speeds.clone().copied().reduce(f64::max) {
-            bounds.high = (fastest * 1.02 + off).min(most);
+            bounds.high = (fastest + FIRST_CREEP * fastest.abs() + off).min(most);
         }
         if let Some(slowest) = speeds.copied().reduce(f64::min) {
-            bounds.low = (slowest * 0.98 - off).max(0.0);
+            let low = (slowest - FIRST_CREEP * slowest.abs() - off).max(-most);
+            bounds.low = if slowest < 0.0 { low } else { low.max(0.0) };
         }
         let (speed, variance) = match read {
             [Some(a), Some(b)] => (0.5 * (a + b), 0.5 * FIRST_COUNT),
@@ -215,7 +224,7 @@ impl Odometer {
 
     fn follow(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         self.clock += t;
-        let effort = period.effort.filter(|effort| effort.is_finite());
+        let effort = period.effort.filter(|effort| effort.abs() <= LARGEST_EFFORT);
         let seen = {
             let [first, second] = &self.wheels;
             let (a, b) = (first.smooth_acceleration, second.smooth_acceleration);
@@ -298,7 +307,7 @@ impl Odometer {
         let reading = period
             .acceleration
             .map(|reading| self.way * reading.as_m_per_s2())
-            .filter(|reading| reading.is_finite());
+            .filter(|reading| reading.abs() <= LARGEST_READING);
         if self.inertia.is_none() && reading.is_some() {
             self.inertia = Some(Inertia::new(before, self.bounds.speed()));
         }
@@ -319,7 +328,7 @@ impl Odometer {
             rolls: lost.is_none() && wheel.is_read() && wheel.doubt == 0.0,
         };
         places.roll(period.time, [rolled(first, first_lost), rolled(second, second_lost)], effort);
-        let Some(balise) = period.balise.filter(|place| place.is_finite()) else { return };
+        let Some(balise) = period.balise.filter(|place| place.as_m().abs() <= FARTHEST_PLACE) else { return };
         let mut bounds = self.ways.distance();
         if self.way < 0.0 {
             bounds = bounds.reversed();
