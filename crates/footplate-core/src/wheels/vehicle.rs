@@ -48,21 +48,25 @@ pub struct BrakeCommand {
     pub full: Acceleration,
     /// The true deceleration lies within this part of it, either way.
     pub tolerance: f64,
-    /// Acceleration by gradients and resistance, either way, that the line may add.
+    /// Acceleration by gradients, either way, that the line may add.
     pub gradient: Acceleration,
+    /// What running resistance adds to braking at most; it never drives.
+    pub resistance: Acceleration,
     /// How long the brake takes from nothing to its full force.
     pub build_up: TimeSpan,
 }
 
 impl BrakeCommand {
     /// What can be claimed of every brake that an emergency stop makes decelerate by `max_brake`: full service braking is
-    /// three quarters of it, give or take 40 % for load and friction, on lines with gradients up to 25 mm/m.
+    /// three quarters of it, give or take 40 % for load and friction, on lines with gradients up to 25 mm/m, running
+    /// resistance among them.
     #[must_use]
     pub fn cautious(max_brake: Acceleration) -> Self {
         Self {
             full: max_brake * 0.75,
             tolerance: 0.4,
             gradient: Acceleration::from_m_per_s2(0.25),
+            resistance: Acceleration::ZERO,
             build_up: TimeSpan::from_s(4.0),
         }
     }
@@ -118,6 +122,7 @@ impl Vehicle {
         within("full_brake_m_s2", command.full.as_m_per_s2(), (0.01, STRONGEST_M_PER_S2))?;
         within("full_brake_tolerance", command.tolerance, (0.0, 1.0))?;
         within("gradient_m_s2", command.gradient.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
+        within("resistance_m_s2", command.resistance.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
         within("build_up_s", command.build_up.as_s(), (0.0, 60.0))?;
         self.thresholds.check()
     }

@@ -75,6 +75,13 @@ pub(crate) enum Placement {
     TwoCars,
 }
 
+impl Placement {
+    /// Whether each measured wheelset is braked by itself: not on one bogie, whose converter feeds all its motors.
+    pub(crate) const fn is_independent(self) -> bool {
+        matches!(self, Self::TwoCars)
+    }
+}
+
 /// One train with all that is not measured of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Consist {

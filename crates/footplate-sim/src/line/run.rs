@@ -51,8 +51,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         is_powered,
     };
     let wheelsets = setup.powered.map(wheelset);
-    let vehicle =
-        LineVehicle::claimed(name, &setup.design, setup.steepest, setup.brake_tolerance, period, wheelsets);
+    let vehicle = LineVehicle::claimed(name, &setup, period, wheelsets);
 
     let mut of_faults = Draws::new(seed, Purpose::Faults);
     let mut channels = Channels::draw(setup.fault, vehicle.counter_modulus, &mut of_faults);

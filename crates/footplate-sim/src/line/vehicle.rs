@@ -2,8 +2,8 @@
 
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 
-use super::consist::Design;
 use super::resistance::GRAVITY;
+use super::setup::Setup;
 
 /// A simulated train as its operator knows it. Every claim is true in the simulated world, as loosely as an operator
 /// would state it.
@@ -21,6 +21,9 @@ pub struct LineVehicle {
     pub max_brake: Acceleration,
     /// The wheelsets of the two tachometers.
     pub wheelsets: [LineWheelset; 2],
+    /// They sit in different bogies, each with its own cylinder and anti-slide valve. Not so on one bogie, where one
+    /// converter can draw both away from the train together.
+    pub independent: bool,
     /// What the brake command does when the rail carries it.
     pub brake_command: LineBrake,
     /// After how many pulses a running counter begins again; as large as the counter's register.
@@ -47,8 +50,10 @@ pub struct LineBrake {
     pub full: Acceleration,
     /// The true deceleration lies within this part of it, either way.
     pub tolerance: f64,
-    /// What gradients and resistance may add to it, either way.
+    /// What gradients may add to it, either way.
     pub gradient: Acceleration,
+    /// What running resistance adds to it at most; it never takes away.
+    pub resistance: Acceleration,
     /// How long the brake takes from nothing to its full force, and back.
     pub build_up: TimeSpan,
 }
@@ -67,29 +72,25 @@ const BUILD_UP_S: f64 = 1.6;
 const COUNTER_MODULUS: i64 = 1 << 16;
 
 impl LineVehicle {
-    /// What is claimed of a design on a line with gradients up to the steepest (m/m).
-    pub(crate) fn claimed(
-        name: &str,
-        design: &Design,
-        steepest: f64,
-        brake_tolerance: f64,
-        period: TimeSpan,
-        wheelsets: [LineWheelset; 2],
-    ) -> Self {
-        let slope = steepest * GRAVITY + ROOM_M_PER_S2;
-        let gradient = slope + design.strongest_resistance();
+    /// What is claimed of the train that was set up, on the steepest gradient of its line.
+    pub(crate) fn claimed(name: &str, setup: &Setup, period: TimeSpan, wheelsets: [LineWheelset; 2]) -> Self {
+        let design = &setup.design;
+        let gradient = setup.steepest * GRAVITY + ROOM_M_PER_S2;
+        let resistance = design.strongest_resistance();
         let hundredths = |value: f64| Acceleration::from_m_per_s2((100.0 * value).ceil() / 100.0);
         Self {
             name: name.to_owned(),
             period,
             max_speed: design.train.max_speed * (1.0 + OVERSPEED),
-            max_traction: hundredths(design.start() * (1.0 + BRAKE_TOLERANCE) + slope),
-            max_brake: hundredths(design.full_brake() * (1.0 + BRAKE_TOLERANCE) + gradient),
+            max_traction: hundredths(design.start() * (1.0 + BRAKE_TOLERANCE) + gradient),
+            max_brake: hundredths(design.full_brake() * (1.0 + BRAKE_TOLERANCE) + gradient + resistance),
             wheelsets,
+            independent: setup.placement.is_independent(),
             brake_command: LineBrake {
                 full: Acceleration::from_m_per_s2(design.full_brake()),
-                tolerance: brake_tolerance,
+                tolerance: setup.brake_tolerance,
                 gradient: hundredths(gradient),
+                resistance: hundredths(resistance),
                 build_up: TimeSpan::from_s(design.full_brake() / design.jerk + BUILD_UP_S),
             },
             counter_modulus: COUNTER_MODULUS,

@@ -64,6 +64,10 @@ impl<'t, 'i> Entries<'t, 'i> {
         self.take(key).map(|value| text(key, value, "a text in quotes")).transpose()
     }
 
+    pub(super) fn optional_truth(&mut self, key: &'static str) -> Result<Option<bool>, Fault> {
+        self.take(key).map(|value| truth(key, value)).transpose()
+    }
+
     /// Fails on the first key that was not asked for.
     pub(super) fn end(self) -> Result<(), Fault> {
         let unknown = self.table.keys().find(|key| !self.known.contains(&key.get_ref().as_ref()));
@@ -109,6 +113,14 @@ pub(super) fn text<'t>(
     match value.get_ref() {
         DeValue::String(text) => Ok(text),
         other => Err(kind(key, other, value.span().start, expected)),
+    }
+}
+
+/// Whether a value says yes.
+fn truth(key: &'static str, value: &Spanned<DeValue<'_>>) -> Result<bool, Fault> {
+    match value.get_ref() {
+        DeValue::Boolean(truth) => Ok(*truth),
+        other => Err(kind(key, other, value.span().start, "true or false")),
     }
 }
 

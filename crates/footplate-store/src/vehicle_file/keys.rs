@@ -15,7 +15,7 @@ const fn key<T>(name: &'static str, get: fn(&T) -> f64, set: fn(&mut T, f64)) ->
 }
 
 /// The keys of `[thresholds]`.
-pub(super) const THRESHOLDS: [Key<Thresholds>; 13] = [
+pub(super) const THRESHOLDS: [Key<Thresholds>; 14] = [
     key(
         "slip_acceleration_m_s2",
         |t| t.slip_acceleration.as_m_per_s2(),
@@ -27,6 +27,7 @@ pub(super) const THRESHOLDS: [Key<Thresholds>; 13] = [
         |t, value| t.slide_deceleration = Acceleration::from_m_per_s2(value),
     ),
     key("creepage", |t| t.creepage, |t, value| t.creepage = value),
+    key("rolling_creepage", |t| t.rolling_creepage, |t, value| t.rolling_creepage = value),
     key(
         "creepage_floor_m_s",
         |t| t.creepage_floor.as_m_per_s(),
@@ -68,13 +69,18 @@ pub(super) const THRESHOLDS: [Key<Thresholds>; 13] = [
 ];
 
 /// The keys of `[brake_command]`.
-pub(super) const BRAKE_COMMAND: [Key<BrakeCommand>; 4] = [
+pub(super) const BRAKE_COMMAND: [Key<BrakeCommand>; 5] = [
     key("full_brake_m_s2", |b| b.full.as_m_per_s2(), |b, value| b.full = Acceleration::from_m_per_s2(value)),
     key("full_brake_tolerance", |b| b.tolerance, |b, value| b.tolerance = value),
     key(
         "gradient_m_s2",
         |b| b.gradient.as_m_per_s2(),
         |b, value| b.gradient = Acceleration::from_m_per_s2(value),
+    ),
+    key(
+        "resistance_m_s2",
+        |b| b.resistance.as_m_per_s2(),
+        |b, value| b.resistance = Acceleration::from_m_per_s2(value),
     ),
     key("build_up_s", |b| b.build_up.as_s(), |b, value| b.build_up = TimeSpan::from_s(value)),
 ];

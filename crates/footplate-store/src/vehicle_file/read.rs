@@ -69,6 +69,7 @@ fn read_text(text: &str) -> Result<VehicleFile, Fault> {
     let max_speed = numbers.take(&mut entries, "max_speed_m_s")?;
     let max_traction = numbers.take(&mut entries, "max_traction_m_s2")?;
     let max_brake = numbers.take(&mut entries, "max_brake_m_s2")?;
+    let independent = entries.optional_truth("independent")?.unwrap_or(false);
     let wheelsets = wheelsets(entries.needs("wheelset")?, &mut numbers)?;
     let brake_command = entries.take("brake_command");
     let thresholds = entries.take("thresholds");
@@ -80,6 +81,7 @@ fn read_text(text: &str) -> Result<VehicleFile, Fault> {
         wheelsets,
     )
     .map_err(|error| numbers.fault(error))?;
+    vehicle.independent = independent;
     if let Some(value) = brake_command {
         let table = table("brake_command", value, "a table `[brake_command]`")?;
         let entries = Entries::new(table, value.span(), "`[brake_command]`");

@@ -18,6 +18,11 @@ pub fn write_vehicle(file: &VehicleFile) -> String {
     let [traction, brake] = [vehicle.max_traction, vehicle.max_brake].map(Acceleration::as_m_per_s2);
     line(&mut text, "max_traction_m_s2", traction, "the most the train can do, grade included");
     line(&mut text, "max_brake_m_s2", brake, "emergency brake on dry rail, grade included");
+    if vehicle.independent {
+        text.push_str(
+            "independent = true  # each wheelset has its own brake: both never slide alike for long\n",
+        );
+    }
     for (wheelset, pulses) in vehicle.wheelsets.iter().zip(["pulses_1", "pulses_2"]) {
         let _ = writeln!(text, "\n[[wheelset]]  # {pulses}\nteeth = {}", wheelset.teeth);
         line(&mut text, "diameter_m", wheelset.diameter.as_m(), "");
@@ -76,9 +81,12 @@ mod tests {
             full: Acceleration::from_m_per_s2(1.0),
             tolerance: 0.3,
             gradient: Acceleration::from_m_per_s2(1e-7),
+            resistance: Acceleration::from_m_per_s2(0.2),
             build_up: TimeSpan::from_ms(1500),
         };
+        file.vehicle.independent = true;
         file.vehicle.thresholds.creepage = 0.07;
+        file.vehicle.thresholds.rolling_creepage = 0.01;
         file.vehicle.thresholds.clear_after = TimeSpan::from_ms(700);
         let text = write_vehicle(&file);
         assert_eq!(parse_vehicle("v.toml", text.as_bytes()).unwrap(), file, "{text}");

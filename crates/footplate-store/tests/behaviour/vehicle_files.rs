@@ -83,12 +83,32 @@ fn tables_replace_only_what_they_name() {
     // Three quarters of the emergency brake, as docs/formats/vehicle.md says.
     assert!((vehicle.brake_command.full - Acceleration::from_m_per_s2(1.05)).abs().as_m_per_s2() < 1e-12);
 
+    let text = format!(
+        "{DEFAULT_VEHICLE}\n[thresholds]\nrolling_creepage = 0.01\n[brake_command]\nresistance_m_s2 = 0.2\n"
+    );
+    let vehicle = parse_vehicle("train.toml", text.as_bytes()).unwrap().vehicle;
+    assert_eq!(vehicle.thresholds.rolling_creepage, 0.01);
+    assert_eq!(vehicle.brake_command.resistance.as_m_per_s2(), 0.2);
+    let wrong = format!("{DEFAULT_VEHICLE}\n[brake_command]\nresistance_m_s2 = -0.2\n");
+    assert!(refusal(&wrong).contains("resistance_m_s2 is -0.2; it should lie between 0 and 5"));
+
     let wrong = format!("{DEFAULT_VEHICLE}\n[thresholds]\ncreepge = 0.1\n");
     assert!(refusal(&wrong).contains("`creepge` is no key of `[thresholds]`; did you mean `creepage`?"));
     let wrong = format!("{DEFAULT_VEHICLE}\n[thresholds]\ncreepage = 8\n");
     assert!(refusal(&wrong).contains("creepage is 8; it should lie between 0 and 1"));
     let wrong = DEFAULT_VEHICLE.replacen("name", "thresholds = 3\nname", 1);
     assert!(refusal(&wrong).contains("thresholds is 3; it should be a table `[thresholds]`"));
+}
+
+#[test]
+fn whether_wheelsets_are_braked_independently_is_said_with_true_or_false() {
+    let with = |value: &str| DEFAULT_VEHICLE.replacen("name", &format!("independent = {value}\nname"), 1);
+    let read = |text: &str| parse_vehicle("train.toml", text.as_bytes()).unwrap().vehicle.independent;
+    assert_eq!([DEFAULT_VEHICLE, &with("true"), &with("false")].map(read), [false, true, false]);
+    assert_eq!(
+        refusal(&with("1")),
+        "train.toml, line 1, column 15: independent is 1; it should be true or false"
+    );
 }
 
 #[test]
@@ -126,6 +146,7 @@ proptest! {
         file.vehicle.max_traction = Acceleration::from_m_per_s2(traction);
         file.vehicle.thresholds.creepage = creepage;
         file.vehicle.brake_command.tolerance = tolerance;
+        file.vehicle.independent = teeth % 2 == 0;
         file.vehicle.wheelsets[1].teeth = teeth;
         file.vehicle.wheelsets[1].axle = axle;
         let text = write_vehicle(&file);

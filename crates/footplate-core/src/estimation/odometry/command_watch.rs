@@ -106,11 +106,12 @@ impl CommandWatch {
         self.traction = driven.max(self.traction - t / FADE_S);
 
         let gradient = command.gradient.as_m_per_s2();
+        let resistance = command.resistance.as_m_per_s2();
         let max_traction = vehicle.max_traction.as_m_per_s2();
         let max_brake = vehicle.max_brake.as_m_per_s2();
         let now = if effort.is_some() {
             Range {
-                low: -(self.brake * full * (1.0 + command.tolerance) + gradient).min(max_brake),
+                low: -(self.brake * full * (1.0 + command.tolerance) + gradient + resistance).min(max_brake),
                 high: (self.traction * max_traction + gradient).min(max_traction),
             }
         } else {
