@@ -7,6 +7,7 @@ mod compare;
 mod forecasts_hold;
 mod inertial_slides;
 mod layout;
+mod odometer_on_scenarios;
 mod odometry;
 mod predict;
 mod program;
