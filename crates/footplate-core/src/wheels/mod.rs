@@ -19,7 +19,7 @@ mod wheelset;
 
 pub use count_windows::CountWindows;
 pub use period::{Count, Direction, Period, WheelReading};
-pub use range::Range;
+pub use range::{Range, larger, smaller};
 pub use sensor_watch::{SensorWatch, Shown};
 pub use slip_slide::{BothAxles, Loss, Signs, SlipSlide, TrainSigns};
 pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn};

@@ -4,6 +4,8 @@
 //! kg m² needs some tenths of a second to stop, a cable breaks between two periods. Every exclusion is taken back once
 //! the sensor agrees with the train for a while.
 
+use super::range::larger;
+
 /// Speed of the train above which a silent wheel that cannot slide is dead (m/s).
 const DEAD_ABOVE: f64 = 1.5;
 /// How long it has to be silent (s).
@@ -85,7 +87,7 @@ impl SensorWatch {
         self.silent_for = if shown.pulses == 0.0 { self.silent_for + t } else { 0.0 };
 
         let away = |from: f64, (least, part): (f64, f64)| {
-            (shown.speed - from).abs() > least.max(part * from.abs().max(shown.speed.abs()))
+            (shown.speed - from).abs() > larger(least, part * larger(from.abs(), shown.speed.abs()))
         };
         let silent = self.silent_for > 0.0;
         let dead =

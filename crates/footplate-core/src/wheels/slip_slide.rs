@@ -13,7 +13,7 @@
 //! Proof is believed at once, the others after [`raise_after`](super::Thresholds::raise_after). While one slides none is
 //! said to spin, and the other way round: a wheel that regains its grip accelerates as hard as one that spins.
 
-use super::range::Range;
+use super::range::{Range, larger};
 use super::thresholds::Thresholds;
 use super::wheelset::Axle;
 
@@ -128,7 +128,7 @@ impl SlipSlide {
             [self.own(first, first_before, train, latched), self.own(second, second_before, train, latched)];
         let by_difference = self.by_difference(wheels, train, latched, [own[0].is_some(), own[1].is_some()]);
         self.before = [first.acceleration, second.acceleration];
-        let fastest = first.speed.max(second.speed);
+        let fastest = larger(first.speed, second.speed);
         for (((lost, wheel), sign), timers) in self
             .lost
             .iter_mut()
@@ -182,8 +182,9 @@ impl SlipSlide {
         let next = 2.0 * wheel.acceleration - before;
         // Twice the acceleration less the one before: the noise of one, doubled, at three standard deviations.
         let noise = 3.0 * wheel.acceleration_deviation;
-        let apart = (limits.creepage * train.speed.max(wheel.speed)).max(limits.creepage_floor.as_m_per_s());
-        let compared = train.speed.max(wheel.speed) > limits.slowest_ratio.as_m_per_s();
+        let faster = larger(train.speed, wheel.speed);
+        let apart = larger(limits.creepage * faster, limits.creepage_floor.as_m_per_s());
+        let compared = faster > limits.slowest_ratio.as_m_per_s();
         if train.slide && wheel.axle.may_slide() && latched != Some(Loss::Spin) {
             let proven = wheel.range.high < train.possible.low;
             let dives = next < -limits.slide_deceleration.as_m_per_s2() - noise;
@@ -212,7 +213,7 @@ impl SlipSlide {
         own: [bool; 2],
     ) -> [Option<Loss>; 2] {
         let limits = &self.thresholds;
-        let apart = limits.difference.as_m_per_s().max(limits.difference_ratio * train.speed);
+        let apart = larger(limits.difference.as_m_per_s(), limits.difference_ratio * train.speed);
         let difference = first.speed - second.speed;
         let [first_own, second_own] = own;
         let nothing = [None, None];

@@ -6,6 +6,7 @@
 //! faster than any wheelset on rails is not believed however often it is said ([`Quality::Excluded`]).
 
 use super::period::{Count, Direction, WheelReading};
+use super::range::larger;
 
 /// Widths of running counters in use, narrowest first (bits).
 const COUNTER_BITS: [u32; 4] = [8, 16, 24, 32];
@@ -161,7 +162,7 @@ impl Tachometer {
         expected: &Expected,
     ) -> Increment {
         let span = self.unread + periods;
-        let most = expected.most * span.max(1.0);
+        let most = expected.most * larger(span, 1.0);
         match reading.count {
             Count::Missing => Increment::Nothing,
             Count::Counter(value) => {
@@ -190,7 +191,7 @@ impl Tachometer {
                 }
                 let counted = counted * way;
                 let expected_in_all = expected.pulses + self.assumed;
-                let expected_in_one = expected_in_all / span.max(1.0);
+                let expected_in_one = expected_in_all / larger(span, 1.0);
                 // A count after lost rows may cover them or its own period only: whichever is nearer to the expected.
                 let covers_one =
                     span > LOST_ROWS && (counted - expected_in_one).abs() < (counted - expected_in_all).abs();

@@ -6,7 +6,7 @@ use super::odometer::Odometer;
 use super::published::PeriodCount;
 use super::virtual_sensor::{Beginning, Envelope, Guides, LostWheel, VirtualSensor};
 use super::wheel_channel::WheelChannel;
-use crate::wheels::Loss;
+use crate::wheels::{Loss, larger};
 
 /// Difference of speeds at which the wheel that seems to slip or slide loses half its share: three standard deviations
 /// of the difference of two wheels that roll (m/s), and what their diameters may differ by (part of the speed).
@@ -111,7 +111,7 @@ impl Odometer {
                         0.0
                     };
                     let (noise, part) = APART;
-                    let apart = behind.max(0.0) / (noise + part * self.train.v.abs());
+                    let apart = larger(behind, 0.0) / (noise + part * self.train.v.abs());
                     sharp * if creeps { CREEPING_SHARE } else { 1.0 } / (1.0 + apart * apart * apart * apart)
                 };
                 let (a, b) = (weight(first, second), weight(second, first));

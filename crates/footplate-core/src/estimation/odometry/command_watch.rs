@@ -3,7 +3,8 @@
 //! A brake takes time to build up and to let go, and a wheel that was held back takes time to turn with the train
 //! again. What may still hold is assumed to hold; what may not yet is not.
 
-use crate::wheels::{Range, Vehicle};
+use super::sound::sound;
+use crate::wheels::{Range, Vehicle, larger, smaller};
 
 /// Efforts nearer to zero are coasting: what analogue controllers show at rest.
 const COASTING: f64 = 0.02;
@@ -99,11 +100,11 @@ impl CommandWatch {
 
         let command = &vehicle.brake_command;
         let full = command.full.as_m_per_s2();
-        let wanted = effort.map_or(0.0, |effort| (-effort).clamp(0.0, 1.0));
-        let driven = effort.map_or(f64::from(u8::from(traction)), |effort| effort.clamp(0.0, 1.0));
-        self.built_up = wanted.min(self.built_up + t / command.build_up.as_s().max(t));
-        self.brake = wanted.max(self.brake - t / FADE_S);
-        self.traction = driven.max(self.traction - t / FADE_S);
+        let wanted = effort.map_or(0.0, |effort| sound(-effort, 0.0, 1.0));
+        let driven = effort.map_or(f64::from(u8::from(traction)), |effort| sound(effort, 0.0, 1.0));
+        self.built_up = smaller(wanted, self.built_up + t / larger(command.build_up.as_s(), t));
+        self.brake = larger(wanted, self.brake - t / FADE_S);
+        self.traction = larger(driven, self.traction - t / FADE_S);
 
         let gradient = command.gradient.as_m_per_s2();
         let resistance = command.resistance.as_m_per_s2();
@@ -111,8 +112,11 @@ impl CommandWatch {
         let max_brake = vehicle.max_brake.as_m_per_s2();
         let now = if effort.is_some() {
             Range {
-                low: -(self.brake * full * (1.0 + command.tolerance) + gradient + resistance).min(max_brake),
-                high: (self.traction * max_traction + gradient).min(max_traction),
+                low: -smaller(
+                    self.brake * full * (1.0 + command.tolerance) + gradient + resistance,
+                    max_brake,
+                ),
+                high: smaller(self.traction * max_traction + gradient, max_traction),
             }
         } else {
             Range { low: -max_brake, high: max_traction }
@@ -125,7 +129,7 @@ impl CommandWatch {
         } else {
             gradient - self.built_up * full * (1.0 - command.tolerance)
         };
-        let at_most_by_command = by_command.min(acceleration.high);
+        let at_most_by_command = smaller(by_command, acceleration.high);
         Allowed {
             slide,
             slip,

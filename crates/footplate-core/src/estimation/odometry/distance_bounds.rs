@@ -5,7 +5,7 @@
 //! pulse over any way; they are used from the moment on at which that is known.
 
 use super::vote::Vote;
-use crate::wheels::Range;
+use crate::wheels::{Range, larger, smaller};
 
 /// Pulses by which a way by counts can be off: one for the phase at the start and end, half for pitch errors and a row
 /// that was read a little late.
@@ -104,16 +104,16 @@ impl DistanceBounds {
             if let Some(bound) =
                 low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
             {
-                by_low = by_low.also(bound, low_anchor.only_loosens, f64::min);
+                by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
             }
             if let Some(bound) =
                 high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
             {
-                by_high = by_high.also(bound, high_anchor.only_loosens, f64::max);
+                by_high = by_high.also(bound, high_anchor.only_loosens, larger);
             }
         }
-        low = by_low.outcome().map_or(low, |bound| low.max(bound));
-        high = by_high.outcome().map_or(high, |bound| high.min(bound));
+        low = by_low.outcome().map_or(low, |bound| larger(low, bound));
+        high = by_high.outcome().map_or(high, |bound| smaller(high, bound));
         if low > high {
             // Something taken for granted is not so; the speeds alone are left.
             (low, high) = (

@@ -5,7 +5,7 @@ use super::distance_bounds::Counted;
 use super::odometer::Odometer;
 use super::speed_bounds::{Limits, WheelBounds};
 use super::wheel_channel::WheelChannel;
-use crate::wheels::{Loss, Quality, Range, Shown, Signs, TrainSigns, Vehicle};
+use crate::wheels::{Loss, Quality, Range, Shown, Signs, TrainSigns, Vehicle, larger};
 
 /// How closely two wheels have to turn alike to be believed against everything else (m/s, part of the speed) ...
 const ALIKE: (f64, f64) = (0.2, 0.006);
@@ -90,7 +90,7 @@ impl Odometer {
         let apart = (first.tracker.speed() - second.tracker.speed()).abs();
         let (noise, part) = ALIKE;
         let alike = apart < noise + part * first.tracker.speed().abs();
-        let harder = self.vehicle.max_brake.as_m_per_s2().max(self.vehicle.max_traction.as_m_per_s2());
+        let harder = larger(self.vehicle.max_brake.as_m_per_s2(), self.vehicle.max_traction.as_m_per_s2());
         let smooth = [first, second].iter().all(|wheel| wheel.smooth_acceleration.abs() < harder);
         let turning = first.pulses != 0.0 && second.pulses != 0.0;
         self.alike_for = if counted && alike && smooth && turning { self.alike_for + t } else { 0.0 };

@@ -19,7 +19,7 @@ use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
 use crate::calibration::WheelScale;
 use crate::units::{Acceleration, Length, Speed};
-use crate::wheels::{Heading, Loss, Period, Range, SlipSlide, Vehicle, VehicleError};
+use crate::wheels::{Heading, Loss, Period, Range, SlipSlide, Vehicle, VehicleError, larger, smaller};
 
 /// A longer time without a period breaks the run: the train can have done anything (s).
 const GAP_S: f64 = 2.0;
@@ -228,7 +228,7 @@ impl Odometer {
         let seen = {
             let [first, second] = &self.wheels;
             let (a, b) = (first.smooth_acceleration, second.smooth_acceleration);
-            if a.min(b) < -a.max(b) { a.min(b) } else { a.max(b) }
+            if smaller(a, b) < -larger(a, b) { smaller(a, b) } else { larger(a, b) }
         };
         let held = self.slips.lost().contains(&Some(Loss::Slide));
         let allowed = self.command.next(effort, seen, held, t, &self.vehicle);

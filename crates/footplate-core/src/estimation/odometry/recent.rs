@@ -1,5 +1,7 @@
 //! The largest value of the last moments, in fixed memory.
 
+use crate::wheels::larger;
+
 /// The extreme of a number within the last moments, from two halves that take turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Recent {
@@ -15,7 +17,7 @@ impl Recent {
     }
 
     pub(super) const fn largest(&self) -> f64 {
-        self.now.max(self.before)
+        larger(self.now, self.before)
     }
 
     /// Takes in a value, larger ones count.
@@ -26,7 +28,7 @@ impl Recent {
             self.now = value;
             self.age = 0.0;
         } else {
-            self.now = self.now.max(value);
+            self.now = larger(self.now, value);
         }
         self.largest()
     }

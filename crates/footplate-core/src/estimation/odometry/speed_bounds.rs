@@ -14,7 +14,7 @@
 use super::command_watch::Allowed;
 use super::recent::Recent;
 use super::vote::Vote;
-use crate::wheels::{Axle, Loss, Range, Thresholds};
+use crate::wheels::{Axle, Loss, Range, Thresholds, larger, smaller};
 
 /// How far back the bound goes for one that is still sound when a slide or slip is seen (s): longer than any
 /// detection takes.
@@ -143,7 +143,7 @@ impl SpeedBounds {
         limits: &Limits,
         t: f64,
     ) -> f64 {
-        let creep = limits.thresholds.creepage * (allowed.traction_effort / FULL_CREEP_EFFORT).min(1.0);
+        let creep = limits.thresholds.creepage * smaller(allowed.traction_effort / FULL_CREEP_EFFORT, 1.0);
         let mut rolling = Vote::NONE;
         let mut powered = f64::NEG_INFINITY;
         let mut driven_too = None;
@@ -152,21 +152,21 @@ impl SpeedBounds {
             let driven = allowed.slip && wheel.axle.may_slip();
             spun |= wheel.lost == Some(Loss::Spin);
             if !driven {
-                rolling = rolling.also(wheel.turns.low, wheel.doubted, f64::min);
+                rolling = rolling.also(wheel.turns.low, wheel.doubted, smaller);
             } else if wheel.lost != Some(Loss::Spin) && !wheel.doubted {
-                powered = powered.max(wheel.turns.low * (1.0 - creep));
+                powered = larger(powered, wheel.turns.low * (1.0 - creep));
                 driven_too = Some(wheel.turns.low).filter(|low| low.is_finite());
             }
         }
         // A driven wheel turns no slower than the train: it can only show that the others turn too fast.
-        let rolling = rolling
-            .outcome()
-            .map_or(f64::NEG_INFINITY, |bound| driven_too.map_or(bound, |driven: f64| driven.min(bound)));
+        let rolling = rolling.outcome().map_or(f64::NEG_INFINITY, |bound| {
+            driven_too.map_or(bound, |driven: f64| smaller(driven, bound))
+        });
         // A wheel that starts to spin is seen a little late.
         let powered = -self.by_powered.push(-powered, t);
-        let free = if spun && !self.any_spun { free.min(-self.lowest.largest()) } else { free };
+        let free = if spun && !self.any_spun { smaller(free, -self.lowest.largest()) } else { free };
         self.any_spun = spun;
-        free.max(rolling).max(powered)
+        larger(larger(free, rolling), powered)
     }
 
     fn high(
@@ -187,17 +187,17 @@ impl SpeedBounds {
                 braked += 1;
                 sliding += i32::from(slides);
                 if !slides && wheel.is_asked() {
-                    shown = shown.max(wheel.turns.high);
+                    shown = larger(shown, wheel.turns.high);
                 }
             } else {
-                trusted = trusted.also(wheel.turns.high, wheel.doubted, f64::max);
+                trusted = trusted.also(wheel.turns.high, wheel.doubted, larger);
             }
         }
         let together = self.together(wheels, sliding, t) && limits.independent;
         let kept_up = self.by_braked.push(if together { shown } else { f64::INFINITY }, t);
         if let Some(trusted) = trusted.outcome() {
             self.all_slid = false;
-            return free.min(trusted);
+            return smaller(free, trusted);
         }
         if sliding == braked && braked > 0 && !self.all_slid {
             // All slide now: the bound goes back to one from before the slide began.
@@ -207,7 +207,7 @@ impl SpeedBounds {
         self.all_slid &= allowed.slide;
         let by_command = self.speed.high + allowed.at_most_by_command * t;
         if self.all_slid {
-            return free.min(by_command);
+            return smaller(free, by_command);
         }
         // Below the peak of adhesion a wheel creeps without being seen, but that far only where adhesion is poor.
         let creep = if sliding > 0 { limits.thresholds.rolling_creepage * SLIPPERY } else { 0.0 };
@@ -215,7 +215,7 @@ impl SpeedBounds {
         let creep =
             limits.thresholds.rolling_creepage * if sliding > 0 { SLIPPERY } else { allowed.brake_effort };
         let not_above = kept_up / (1.0 - creep);
-        free.min(by_command.max(not_below)).min(not_above)
+        smaller(smaller(free, larger(by_command, not_below)), not_above)
     }
 
     /// Whether the wheels that do not slide have kept up with each other, or with nobody because the other is not
@@ -223,8 +223,8 @@ impl SpeedBounds {
     fn together(&mut self, [first, second]: &[WheelBounds; 2], sliding: i32, t: f64) -> bool {
         let (least, part) = TOGETHER;
         let (one, both) = (first.is_asked() || second.is_asked(), first.is_asked() && second.is_asked());
-        self.apart += (first.speed - second.speed - self.apart) * (t / SMOOTHED_S).min(1.0);
-        let alike = !both || sliding > 0 || self.apart.abs() < least.max(part * first.speed);
+        self.apart += (first.speed - second.speed - self.apart) * smaller(t / SMOOTHED_S, 1.0);
+        let alike = !both || sliding > 0 || self.apart.abs() < larger(least, part * first.speed);
         // Each wheel that begins or ceases to slide begins the time anew.
         let same = sliding == self.sliding;
         self.sliding = sliding;

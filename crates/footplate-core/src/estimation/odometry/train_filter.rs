@@ -8,6 +8,8 @@
 //! With a variance divided by the share of each wheel this one filter is the federated filter with fusion-reset and
 //! `R/β`: information adds up, so it does not matter where the prior is parked (shown in `docs/theory`).
 
+use super::sound::sound;
+
 /// Variances that the diagonal keeps within, so that it stays positive and finite whatever comes (m²/s², m²/s⁴).
 const SPEED_VARIANCE: (f64, f64) = (1e-8, 1e4);
 const ACCELERATION_VARIANCE: (f64, f64) = (1e-8, 1e2);
@@ -100,8 +102,8 @@ impl TrainFilter {
 
     #[inline]
     fn keep_positive(&mut self) {
-        self.pss = self.pss.clamp(PLACE_VARIANCE.0, PLACE_VARIANCE.1);
-        self.pvv = self.pvv.clamp(SPEED_VARIANCE.0, SPEED_VARIANCE.1);
-        self.paa = self.paa.clamp(ACCELERATION_VARIANCE.0, ACCELERATION_VARIANCE.1);
+        self.pss = sound(self.pss, PLACE_VARIANCE.0, PLACE_VARIANCE.1);
+        self.pvv = sound(self.pvv, SPEED_VARIANCE.0, SPEED_VARIANCE.1);
+        self.paa = sound(self.paa, ACCELERATION_VARIANCE.0, ACCELERATION_VARIANCE.1);
     }
 }

@@ -3,7 +3,7 @@
 use super::command_watch::Allowed;
 use crate::wheels::{
     CountWindows, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer, ToldWay, Vehicle,
-    WheelReading, WheelTracker, Wheelset,
+    WheelReading, WheelTracker, Wheelset, smaller,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
@@ -139,7 +139,7 @@ impl WheelChannel {
         self.readings = self.readings.saturating_add(1);
         self.tracker.turned(counted, t);
         self.smooth_acceleration +=
-            (self.tracker.acceleration() - self.smooth_acceleration) * (t / SMOOTHED_S).min(1.0);
+            (self.tracker.acceleration() - self.smooth_acceleration) * smaller(t / SMOOTHED_S, 1.0);
         counted
     }
 
