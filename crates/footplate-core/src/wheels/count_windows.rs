@@ -7,7 +7,7 @@
 
 #![expect(clippy::indexing_slicing, reason = "a ring indexed modulo its length")]
 
-use super::range::Range;
+use super::range::{Range, larger, smaller};
 
 /// Readings remembered: the longest window at the shortest period in use.
 const RING: usize = 64;
@@ -22,38 +22,81 @@ const MEAN_WINDOW: usize = 2;
 /// revolution, 0.5 % a tooth, each at both ends).
 const PITCH_ERROR: f64 = 0.1;
 
+/// A window turned by less than this more or less than it counted (pulses).
+const ONE_PULSE: f64 = 1.0 + PITCH_ERROR;
 /// Fewer pulses do not prove that a wheel turns.
 const SHAKEN: f64 = 3.0;
+
+/// What was known at the end of one reading.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    /// When it was (s).
+    time: f64,
+    /// How many pulses it can be away from the beginning at most, backwards and forwards. Kept like this because both
+    /// bounds of a window are then the same operations, two at a time.
+    back: f64,
+    forth: f64,
+}
+
+/// One window of those that end now.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    /// How many readings it reaches back.
+    lag: usize,
+    /// How long it is: half of it (s), and its inverse (1/s).
+    half: f64,
+    per_second: f64,
+}
 
 /// The last counts of one wheel.
 #[derive(Debug, Clone)]
 pub struct CountWindows {
-    times: [f64; RING],
-    totals: [f64; RING],
-    doubts: [f64; RING],
+    readings: [Reading; RING],
     newest: usize,
     /// Readings in a row that are good, the newest included.
     good: usize,
-    lags: [usize; WINDOWS],
+    windows: [Window; WINDOWS],
+    /// The time between the last two readings (s), and how many readings came that regularly.
+    period: f64,
+    regular: usize,
 }
 
 impl CountWindows {
     /// Windows of a wheel that is read every `period` seconds.
     #[must_use]
     pub fn new(period: f64) -> Self {
-        let lags = LENGTHS_S.map(|length| (libm::round(length / period) as usize).clamp(1, RING - 1));
-        Self { times: [0.0; RING], totals: [0.0; RING], doubts: [0.0; RING], newest: 0, good: 0, lags }
+        let windows = LENGTHS_S.map(|length| {
+            let lag = (libm::round(length / period) as usize).clamp(1, RING - 1);
+            Window { lag, half: 0.5 * length, per_second: 1.0 / length }
+        });
+        let nothing = Reading { time: 0.0, back: 0.0, forth: 0.0 };
+        Self { readings: [nothing; RING], newest: 0, good: 0, windows, period: 0.0, regular: 0 }
     }
 
-    /// So many pulses more by the time `now` (s), of which so many may be wrong.
-    pub fn counted(&mut self, now: f64, pulses: f64, doubt: f64) {
-        let total = self.totals[self.newest] + pulses;
-        let doubts = self.doubts[self.newest] + doubt;
+    /// So many pulses in the last `period` seconds, of which so many may be wrong.
+    #[inline]
+    pub fn counted(&mut self, period: f64, pulses: f64, doubt: f64) {
+        let Reading { time, back, forth } = self.readings[self.newest];
         self.newest = (self.newest + 1) % RING;
-        self.times[self.newest] = now;
-        self.totals[self.newest] = total;
-        self.doubts[self.newest] = doubts;
+        self.readings[self.newest] =
+            Reading { time: time + period, back: back + (doubt - pulses), forth: forth + (doubt + pulses) };
         self.good = (self.good + 1).min(RING);
+        self.regular = if period == self.period { self.regular + 1 } else { 0 };
+        self.period = period;
+        // Once every window lies within regular readings, none changes its length any more.
+        if self.regular <= RING {
+            self.measure();
+        }
+    }
+
+    /// How long each window is.
+    fn measure(&mut self) {
+        let now = self.readings[self.newest].time;
+        for window in &mut self.windows {
+            let span = now - self.readings[(self.newest + RING - window.lag) % RING].time;
+            window.half = 0.5 * span;
+            window.per_second = 1.0 / span;
+        }
     }
 
     /// The last reading was not good: no window may reach over it.
@@ -63,8 +106,8 @@ impl CountWindows {
 
     /// Counts the other way from now on.
     pub fn reverse(&mut self) {
-        for total in &mut self.totals {
-            *total = -*total;
+        for reading in &mut self.readings {
+            core::mem::swap(&mut reading.back, &mut reading.forth);
         }
     }
 
@@ -72,51 +115,72 @@ impl CountWindows {
     /// ago its middle was (s); nothing before there is one.
     #[must_use]
     pub fn mean_speed(&self, pitch: f64) -> Option<(f64, f64)> {
-        let lag = self.lags[MEAN_WINDOW];
+        let Window { lag, half, per_second } = self.windows[MEAN_WINDOW];
         if lag >= self.good {
             return None;
         }
-        let then = (self.newest + RING - lag) % RING;
-        let span = self.times[self.newest] - self.times[then];
-        Some(((self.totals[self.newest] - self.totals[then]) * pitch / span, 0.5 * span))
+        let turned = self.turned(lag);
+        Some((0.5 * (turned.forth - turned.back) * pitch * per_second, half))
+    }
+
+    /// How many pulses it can have turned at most since so many readings, backwards and forwards.
+    #[inline]
+    fn turned(&self, lag: usize) -> Turned {
+        let (now, then) = (&self.readings[self.newest], &self.readings[(self.newest + RING - lag) % RING]);
+        Turned { back: now.back - then.back + ONE_PULSE, forth: now.forth - then.forth + ONE_PULSE }
     }
 
     /// Between which speeds (m/s) the wheel must turn now, with a pitch (m) within `pitch` and accelerations (m/s²)
     /// within `acceleration`.
     #[must_use]
     pub fn speed(&self, pitch: Range, acceleration: Range) -> Range {
-        let mut speed = Range::ANY;
-        let Self { times, totals, doubts, newest, .. } = self;
-        let (now, total, doubt) = (times[*newest], totals[*newest], 1.0 + PITCH_ERROR + doubts[*newest]);
-        for window in 0..WINDOWS {
-            let lag = self.lags[window];
+        let mut fastest = [f64::INFINITY; 2];
+        for Window { lag, half, per_second } in self.windows {
             if lag >= self.good {
                 break;
             }
-            let then = (newest + RING - lag) % RING;
-            let span = now - times[then];
-            let pulses = total - totals[then];
-            let per_second = 1.0 / span;
-            let off = doubt - doubts[then];
-            let (mut fewest, mut most) = (pulses - off, pulses + off);
-            let (mut shortest, mut longest) = (pitch.low, pitch.high);
-            // A wheel that runs, forward and beyond doubt, passes this by.
-            if pulses < SHAKEN || fewest < 0.0 {
-                // A tooth that stands at the edge and is shaken over it to and fro is no motion.
-                if pulses.abs() < SHAKEN {
-                    (fewest, most) = (fewest.min(0.0), most.max(0.0));
-                }
-                // A negative count is longest with the longest pitch.
-                shortest = if fewest < 0.0 { pitch.high } else { pitch.low };
-                longest = if most < 0.0 { pitch.low } else { pitch.high };
-            }
-            let slowest = fewest * shortest * per_second + 0.5 * span * acceleration.low;
-            let fastest = most * longest * per_second + 0.5 * span * acceleration.high;
-            // One instruction each, where `f64::max` and `f64::min` take six to mind what is no number.
-            speed.low = if slowest > speed.low { slowest } else { speed.low };
-            speed.high = if fastest < speed.high { fastest } else { speed.high };
+            let [back, forth] = self.turned(lag).ways(pitch);
+            let [fastest_back, fastest_forth] = fastest;
+            fastest = [
+                smaller(back * per_second - half * acceleration.low, fastest_back),
+                smaller(forth * per_second + half * acceleration.high, fastest_forth),
+            ];
         }
-        speed
+        let [back, forth] = fastest;
+        Range { low: -back, high: forth }
+    }
+}
+
+/// How many pulses a wheel can have turned at most in a window, backwards and forwards; the one is negative that it
+/// certainly turned the other way.
+#[derive(Debug, Clone, Copy)]
+struct Turned {
+    back: f64,
+    forth: f64,
+}
+
+impl Turned {
+    /// How far the wheel rolled at most, backwards and forwards (m).
+    #[inline]
+    fn ways(self, pitch: Range) -> [f64; 2] {
+        // A wheel that runs, forward and beyond doubt.
+        if self.back <= -SHAKEN {
+            return [self.back * pitch.low, self.forth * pitch.high];
+        }
+        self.little_ways(pitch)
+    }
+
+    /// The same of a wheel that may have stood or turned back. Apart from the rest, so that one that runs passes it by.
+    #[cold]
+    #[inline(never)]
+    fn little_ways(self, pitch: Range) -> [f64; 2] {
+        // A tooth that stands at the edge and is shaken over it to and fro is no motion.
+        let shaken = 0.5 * (self.forth - self.back).abs() < SHAKEN;
+        // A negative count is longest with the longest pitch.
+        [self.back, self.forth].map(|most| {
+            let most = if shaken { larger(most, 0.0) } else { most };
+            most * if most < 0.0 { pitch.low } else { pitch.high }
+        })
     }
 }
 
@@ -132,7 +196,7 @@ mod tests {
         loop {
             let t = f64::from(k) * period;
             let pulses = libm::floor((v * t + 0.5 * a * t * t) / pitch + 0.37);
-            windows.counted(t, pulses - before, 0.0);
+            windows.counted(if k == 0 { 0.0 } else { period }, pulses - before, 0.0);
             before = pulses;
             if t >= until {
                 return (windows, v + a * t);
@@ -178,18 +242,20 @@ mod tests {
     /// Every window by itself, each with all cases minded.
     fn asked_one_by_one(windows: &CountWindows, pitch: Range, acceleration: Range) -> Range {
         let mut speed = Range::ANY;
-        for lag in windows.lags.into_iter().filter(|lag| *lag < windows.good) {
-            let then = (windows.newest + RING - lag) % RING;
-            let span = windows.times[windows.newest] - windows.times[then];
-            let pulses = windows.totals[windows.newest] - windows.totals[then];
-            let off = 1.0 + PITCH_ERROR + windows.doubts[windows.newest] - windows.doubts[then];
+        for Window { lag, half, per_second } in
+            windows.windows.into_iter().filter(|each| each.lag < windows.good)
+        {
+            let (now, then) =
+                (windows.readings[windows.newest], windows.readings[(windows.newest + RING - lag) % RING]);
+            let (back, forth) = (now.back - then.back, now.forth - then.forth);
+            let (pulses, off) = (0.5 * (forth - back), 0.5 * (forth + back) + 1.0 + PITCH_ERROR);
             let shaken = pulses.abs() < SHAKEN;
             let fewest = if shaken { (pulses - off).min(0.0) } else { pulses - off };
             let most = if shaken { (pulses + off).max(0.0) } else { pulses + off };
-            let slowest = fewest * if fewest < 0.0 { pitch.high } else { pitch.low } * (1.0 / span);
-            let fastest = most * if most < 0.0 { pitch.low } else { pitch.high } * (1.0 / span);
-            speed.low = speed.low.max(slowest + 0.5 * span * acceleration.low);
-            speed.high = speed.high.min(fastest + 0.5 * span * acceleration.high);
+            let slowest = fewest * if fewest < 0.0 { pitch.high } else { pitch.low } * per_second;
+            let fastest = most * if most < 0.0 { pitch.low } else { pitch.high } * per_second;
+            speed.low = speed.low.max(slowest + half * acceleration.low);
+            speed.high = speed.high.min(fastest + half * acceleration.high);
         }
         speed
     }
@@ -205,11 +271,17 @@ mod tests {
             let tremor = (seed >> 60) as f64 - 7.5;
             let pulses = libm::round(40.0 - f64::from(reading) / 60.0 + 0.2 * tremor);
             let doubt = if seed >> 58 == 0 { 3.0 } else { 0.0 };
-            windows.counted(f64::from(reading) * 0.05, pulses, doubt);
+            windows.counted(0.05, pulses, doubt);
             if reading % 500 == 499 {
                 windows.interrupt();
             }
-            assert_eq!(windows.speed(pitch, acceleration), asked_one_by_one(&windows, pitch, acceleration));
+            let (both, one_by_one) =
+                (windows.speed(pitch, acceleration), asked_one_by_one(&windows, pitch, acceleration));
+            let close = |one: f64, other: f64| one == other || (one - other).abs() < 1e-10;
+            assert!(
+                close(both.low, one_by_one.low) && close(both.high, one_by_one.high),
+                "{reading}: {both:?} {one_by_one:?}"
+            );
         }
     }
 }

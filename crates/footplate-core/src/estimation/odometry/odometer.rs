@@ -246,7 +246,7 @@ impl Odometer {
         }
         let heading = Heading { way: self.way, certain: self.train.v.abs() > CERTAIN_HEADING, disputed };
         let [first_lost, second_lost] = self.slips.lost();
-        let at = (self.clock, t, self.vehicle.period.as_s());
+        let at = (t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
         let counted = [
             first.read(period, 0, at, heading, &allowed, first_lost),

@@ -34,6 +34,8 @@ pub(super) struct WheelChannel {
     /// ... and by what was learnt of it.
     pub(super) pitch: f64,
     pub(super) pitch_range: Range,
+    /// The inverse of the pitch (1/m).
+    pulses_per_m: f64,
     pub(super) tracker: WheelTracker,
     pub(super) watch: SensorWatch,
     pub(super) quality: Quality,
@@ -61,6 +63,7 @@ impl WheelChannel {
             wheelset_pitch: pitch,
             pitch,
             pitch_range: Range::around(pitch, wheelset.diameter_tolerance),
+            pulses_per_m: 1.0 / pitch,
             tracker: WheelTracker::new(pitch, period),
             watch: SensorWatch::new(),
             quality: Quality::Missing,
@@ -77,18 +80,18 @@ impl WheelChannel {
         }
     }
 
-    /// Takes in a reading at `now` (s), `t` seconds after the last one; says how far the wheel turned (m).
+    /// Takes in a reading, `t` seconds after the last one and `nominal` after by plan; says how far the wheel turned (m).
     pub(super) fn read(
         &mut self,
         period: &Period,
         which: usize,
-        (now, t, nominal): (f64, f64, f64),
+        (t, nominal): (f64, f64),
         heading: Heading,
         allowed: &Allowed,
         lost: Option<Loss>,
     ) -> f64 {
         let Some(reading) = period.wheels.get(which) else { return 0.0 };
-        let expected = self.tracker.expected(t) / self.pitch;
+        let expected = self.tracker.expected(t) * self.pulses_per_m;
         let (may_slide, may_slip) = self.may_differ(allowed);
         // Only a wheel that has lost its grip can regain it.
         let (up, down) = match (lost, may_slide, may_slip) {
@@ -98,8 +101,10 @@ impl WheelChannel {
             (None, false, false) => (ROLLING, ROLLING),
         };
         let warm = self.readings >= WARM && !self.watch.excluded();
+        // What an acceleration of 1 m/s² that sets in at once adds to a count.
+        let added = t * t * self.pulses_per_m;
         let leeway = |acceleration: f64| {
-            if warm { SURPRISE_PULSES + acceleration * t * t / self.pitch } else { f64::INFINITY }
+            if warm { SURPRISE_PULSES + acceleration * added } else { f64::INFINITY }
         };
         // Expectation and leeway in the sense in which the tachometer counts.
         let (more, fewer) =
@@ -108,8 +113,8 @@ impl WheelChannel {
             pulses: expected * heading.way,
             more,
             fewer,
-            rolling: RARE_PULSES + ROLLING * t * t / self.pitch,
-            ever: SURPRISE_PULSES + EVER * 2.0 * t * t / self.pitch,
+            rolling: RARE_PULSES + ROLLING * added,
+            ever: SURPRISE_PULSES + EVER * 2.0 * added,
             most: self.most_per_second * t + SURPRISE_PULSES,
         };
         let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
@@ -119,11 +124,11 @@ impl WheelChannel {
         self.doubt = turn.doubt;
         if turn.doubt.is_finite() {
             // A row that was read late is short of nothing, but the next window may begin with it.
-            self.windows.counted(now, self.pulses, turn.doubt + self.doubt_before);
+            self.windows.counted(t, self.pulses, turn.doubt + self.doubt_before);
             self.doubt_before = turn.doubt;
         } else {
             self.doubt_before = 0.0;
-            self.windows.counted(now, self.pulses, 0.0);
+            self.windows.counted(t, self.pulses, 0.0);
             self.windows.interrupt();
         }
         if matches!(turn.quality, Quality::Missing | Quality::Excluded) {
@@ -182,6 +187,7 @@ impl WheelChannel {
     /// Its diameter is so many times the believed one.
     pub(super) fn rescale(&mut self, scale: f64, bounds: Range) {
         self.pitch = self.wheelset_pitch * scale;
+        self.pulses_per_m = 1.0 / self.pitch;
         self.pitch_range =
             Range { low: self.wheelset_pitch * bounds.low, high: self.wheelset_pitch * bounds.high };
     }
