@@ -34,7 +34,7 @@ struct Score {
     last: MotionEstimate,
 }
 
-fn vehicle(of: &LineVehicle, scenario: &str) -> Vehicle {
+fn vehicle(of: &LineVehicle) -> Vehicle {
     let wheelsets = of.wheelsets.map(|wheelset| Wheelset {
         teeth: wheelset.teeth,
         diameter: wheelset.diameter,
@@ -48,14 +48,13 @@ fn vehicle(of: &LineVehicle, scenario: &str) -> Vehicle {
         max_traction: of.max_traction,
         max_brake: of.max_brake,
         wheelsets,
-        // In S5 one converter feeds both measured wheelsets.
-        independent: scenario != "S5",
+        independent: of.independent,
         brake_command: BrakeCommand {
             full: brake.full,
             tolerance: brake.tolerance,
             gradient: brake.gradient,
+            resistance: brake.resistance,
             build_up: brake.build_up,
-            ..BrakeCommand::cautious(of.max_brake)
         },
         thresholds: Thresholds::derived(of.max_traction, of.max_brake),
     }
@@ -86,8 +85,8 @@ fn period(sample: &LineSample) -> Period {
     }
 }
 
-fn walk(name: &str, run: &LineRun, settings: OdometrySettings) -> Score {
-    let mut odometer = Odometer::new(vehicle(&run.vehicle, name), settings).expect("a claimed vehicle");
+fn walk(run: &LineRun, settings: OdometrySettings) -> Score {
+    let mut odometer = Odometer::new(vehicle(&run.vehicle), settings).expect("a claimed vehicle");
     let (mut squares, mut worst, mut width) = (0.0, 0.0_f64, 0.0);
     let (mut outside, mut violations, mut false_flags) = ([0; 2], [0; 2], 0);
     let (mut onset, mut flagged) = (None, None);
@@ -130,7 +129,7 @@ fn walk(name: &str, run: &LineRun, settings: OdometrySettings) -> Score {
 
 fn scores(name: &str, conditions: LineConditions) -> Vec<Score> {
     let scenario = LineScenario::by_name(name).expect("a scenario");
-    SEEDS.map(|seed| walk(name, &scenario.run(seed, conditions), OdometrySettings::recommended())).collect()
+    SEEDS.map(|seed| walk(&scenario.run(seed, conditions), OdometrySettings::recommended())).collect()
 }
 
 fn teeth(teeth: u32) -> LineConditions {
@@ -246,7 +245,7 @@ fn a_common_slide_drawn_out_slowly_is_within_the_bounds_all_the_same() {
 fn the_published_algorithm_is_worse_where_both_slide() {
     let scenario = LineScenario::by_name("S3").expect("a scenario");
     let of = |settings: OdometrySettings| {
-        median(SEEDS.map(|seed| walk("S3", &scenario.run(seed, teeth(100)), settings).rms).collect())
+        median(SEEDS.map(|seed| walk(&scenario.run(seed, teeth(100)), settings).rms).collect())
     };
     let (published, ours) = (of(OdometrySettings::paper()), of(OdometrySettings::recommended()));
     assert!(published > 2.0 * ours, "{published} against {ours}");
