@@ -20,7 +20,7 @@ const LENGTHS_S: [f64; WINDOWS] = [0.1, 0.16, 0.25, 0.4, 0.6, 0.9];
 const MEAN_WINDOW: usize = 2;
 /// What jitter and pitch errors of a tooth can add to the one pulse of a count, in pulses (2 % of a pitch once per
 /// revolution, 0.5 % a tooth, each at both ends).
-const PITCH_ERROR: f64 = 0.1;
+const PITCH_ERROR: f64 = 0.05;
 
 /// A window turned by less than this more or less than it counted (pulses).
 const ONE_PULSE: f64 = 1.0 + PITCH_ERROR;

@@ -54,8 +54,8 @@ impl Thresholds {
             slide_deceleration: max_brake + beyond,
             // Beyond the peak of adhesion on dry rail and near it on wet rail (Polach).
             creepage: 0.08,
-            // Service braking on wet rail uses a quarter of the adhesion and creeps by a quarter of the peak (Polach).
-            rolling_creepage: 0.02,
+            // Full braking on wet rail uses a third of the adhesion, and creeps by a fifth of where that peaks (Polach).
+            rolling_creepage: 0.016,
             creepage_floor: Speed::from_m_per_s(0.3),
             difference: Speed::from_m_per_s(1.0),
             difference_ratio: 0.025,

@@ -20,7 +20,7 @@ use crate::wheels::{Axle, Loss, Range, Thresholds, larger, smaller};
 /// detection takes.
 const LOOK_BACK_S: f64 = 0.8;
 /// How long two independent wheelsets have to keep up with each other ...
-const TOGETHER_S: f64 = 3.0;
+const TOGETHER_S: f64 = 2.0;
 /// ... and how closely (m/s, part of the speed): what diameters and creep explain.
 const TOGETHER: (f64, f64) = (0.15, 0.006);
 /// Time over which their difference is smoothed (s): a followed speed is noisy by 0.1 m/s at 80 pulses a turn.
@@ -28,7 +28,7 @@ const SMOOTHED_S: f64 = 0.5;
 /// By how much more a wheel may creep unseen beside one that slides.
 const SLIPPERY: f64 = 1.5;
 /// How far back a bound by braked wheels is taken from (s): a slide is seen earlier.
-const SLIDE_SEEN_S: f64 = 0.5;
+const SLIDE_SEEN_S: f64 = 0.35;
 /// Share of full traction at which a powered wheel may creep by all that goes unseen; proportionally below.
 const FULL_CREEP_EFFORT: f64 = 0.2;
 
