@@ -90,6 +90,8 @@ impl CountWindows {
     }
 
     /// How long each window is.
+    #[cold]
+    #[inline(never)]
     fn measure(&mut self) {
         let now = self.readings[self.newest].time;
         for window in &mut self.windows {
@@ -132,6 +134,7 @@ impl CountWindows {
 
     /// Between which speeds (m/s) the wheel must turn now, with a pitch (m) within `pitch` and accelerations (m/s²)
     /// within `acceleration`.
+    #[inline]
     #[must_use]
     pub fn speed(&self, pitch: Range, acceleration: Range) -> Range {
         let mut fastest = [f64::INFINITY; 2];

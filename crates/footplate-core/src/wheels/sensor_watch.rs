@@ -80,6 +80,7 @@ impl SensorWatch {
     }
 
     /// Takes in one period of `t` seconds.
+    #[inline]
     pub fn look(&mut self, shown: &Shown, t: f64) {
         let same = shown.pulses == self.last;
         self.same_for = if same { self.same_for + t } else { 0.0 };
@@ -92,9 +93,9 @@ impl SensorWatch {
         let silent = self.silent_for > 0.0;
         let dead =
             silent && shown.train.abs() > DEAD_ABOVE && !shown.may_differ && self.silent_for > DEAD_AFTER_S;
-        let disagrees = shown.other.is_some_and(|other| away(other, DISAGREE));
-        let stuck = !silent && self.same_for > STUCK_AFTER_S && disagrees;
-        let parted = self.same_for > DOUBTED_AFTER_S && shown.other.is_some_and(|other| away(other, DOUBT));
+        let other_away = |how| shown.other.is_some_and(|other| away(other, how));
+        let stuck = !silent && self.same_for > STUCK_AFTER_S && other_away(DISAGREE);
+        let parted = self.same_for > DOUBTED_AFTER_S && other_away(DOUBT);
         self.doubted = !silent && (parted || self.same_for > TOO_STEADY_S);
 
         let still_silent = silent && shown.train.abs() > DEAD_ABOVE;

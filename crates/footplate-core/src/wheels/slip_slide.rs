@@ -128,6 +128,12 @@ impl SlipSlide {
             [self.own(first, first_before, train, latched), self.own(second, second_before, train, latched)];
         let by_difference = self.by_difference(wheels, train, latched, [own[0].is_some(), own[1].is_some()]);
         self.before = [first.acceleration, second.acceleration];
+        let [first_own, second_own] = own;
+        if self.lost == [None; 2] && first_own.or(second_own).is_none() && by_difference == [None; 2] {
+            // Both roll, and nothing speaks against it: almost every period of almost every run.
+            self.suspected = [0.0; 2];
+            return self.lost;
+        }
         let fastest = larger(first.speed, second.speed);
         for (((lost, wheel), sign), timers) in self
             .lost

@@ -104,6 +104,7 @@ impl Tachometer {
     }
 
     /// What the wheel turned in a period that is `periods` odometry periods long.
+    #[inline]
     pub fn read(
         &mut self,
         reading: &WheelReading,
@@ -154,6 +155,7 @@ impl Tachometer {
     }
 
     /// Signed pulses since the last reading, if they can be a count.
+    #[inline]
     fn increment(
         &mut self,
         reading: &WheelReading,

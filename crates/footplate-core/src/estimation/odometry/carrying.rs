@@ -99,22 +99,25 @@ impl Odometer {
             [true, false] => [1.0, 0.0, 0.0],
             [false, true] => [0.0, 1.0, 0.0],
             [true, true] => {
-                let weight = |wheel: &WheelChannel, other: &WheelChannel| {
+                // By how much the first one seems to slip or slide beside the second, in usual differences.
+                let first_ahead = first.tracker.speed() - second.tracker.speed();
+                let (noise, part) = APART;
+                let usual = noise + part * self.train.v.abs();
+                let apart = if allowed.slide {
+                    -first_ahead / usual
+                } else if allowed.slip {
+                    first_ahead / usual
+                } else {
+                    0.0
+                };
+                let weight = |wheel: &WheelChannel, other: &WheelChannel, apart: f64| {
                     let sharp = 1.0 / (wheel.pitch * wheel.pitch);
                     let creeps =
                         allowed.slip && wheel.wheelset.axle.may_slip() && !other.wheelset.axle.may_slip();
-                    let behind = if allowed.slide {
-                        other.tracker.speed() - wheel.tracker.speed()
-                    } else if allowed.slip {
-                        wheel.tracker.speed() - other.tracker.speed()
-                    } else {
-                        0.0
-                    };
-                    let (noise, part) = APART;
-                    let apart = larger(behind, 0.0) / (noise + part * self.train.v.abs());
+                    let apart = larger(apart, 0.0);
                     sharp * if creeps { CREEPING_SHARE } else { 1.0 } / (1.0 + apart * apart * apart * apart)
                 };
-                let (a, b) = (weight(first, second), weight(second, first));
+                let (a, b) = (weight(first, second, apart), weight(second, first, -apart));
                 [a / (a + b), b / (a + b), 0.0]
             }
         }

@@ -26,9 +26,11 @@ impl Odometer {
     }
 
     pub(super) fn mode(&self, lost: [Option<Loss>; 2], trusted: [bool; 2]) -> Mode {
-        let corrected = self.stand_in.as_ref().map_or(0.0, VirtualSensor::elapsed);
-        let longest = self.vehicle.thresholds.longest_correction.as_s();
-        if self.blind > BLIND_S || (corrected > longest && self.train.v > NEARLY_STANDING) {
+        let too_long = |sensor: &VirtualSensor| {
+            sensor.elapsed() > self.vehicle.thresholds.longest_correction.as_s()
+                && self.train.v > NEARLY_STANDING
+        };
+        if self.blind > BLIND_S || self.stand_in.as_ref().is_some_and(too_long) {
             return Mode::Ambiguous;
         }
         if self.wheels.iter().any(|wheel| !wheel.is_read()) {

@@ -81,6 +81,7 @@ impl WheelChannel {
     }
 
     /// Takes in a reading, `t` seconds after the last one and `nominal` after by plan; says how far the wheel turned (m).
+    #[inline]
     pub(super) fn read(
         &mut self,
         period: &Period,
