@@ -5,6 +5,7 @@ mod commands;
 mod counted;
 mod progress;
 mod reading;
+mod spread;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

@@ -9,10 +9,12 @@ mod result_rows;
 mod rival;
 mod run;
 mod score;
+mod simulated;
 mod summary;
 
 pub use result_rows::{LiveResult, ResultWriter};
 pub use rival::Rival;
 pub use run::{OdometryRun, Preset, RunContext, RunScores};
 pub use score::OdometryScore;
+pub use simulated::{simulated_columns, simulated_rows, simulated_vehicle};
 pub use summary::{FlagCounts, ModeCounts, RunSummary};

@@ -1,7 +1,7 @@
 //! `footplate odometry`: tachometer recordings to speed, distance and bounds that hold.
 
 mod block_stream;
-mod json;
+pub(super) mod json;
 mod recording;
 mod results;
 mod tables;

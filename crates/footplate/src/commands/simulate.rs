@@ -1,6 +1,7 @@
 //! `footplate simulate`: worlds whose truth is known.
 
 mod layout;
+mod line;
 mod recording;
 mod truth;
 
@@ -18,7 +19,7 @@ use super::Outcome;
     after_help = "Example: footplate simulate layout --layout track-a --scenario stops --seed 7 --out runs"
 )]
 pub(crate) struct Arguments {
-    /// List the scenarios and laws of speed change.
+    /// List the scenarios and laws of speed change of layouts; `line --list` lists those of lines.
     #[arg(long)]
     list: bool,
     #[command(subcommand)]
@@ -28,16 +29,20 @@ pub(crate) struct Arguments {
 #[derive(Subcommand)]
 enum World {
     Layout(layout::Arguments),
+    Line(line::Arguments),
 }
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        if let Some(World::Layout(arguments)) = self.world {
-            return arguments.run(output);
+        match self.world {
+            Some(World::Layout(arguments)) => arguments.run(output),
+            Some(World::Line(arguments)) => arguments.run(output),
+            None => {
+                if self.list {
+                    layout::list(output)?;
+                }
+                Ok(Outcome::Done)
+            }
         }
-        if self.list {
-            layout::list(output)?;
-        }
-        Ok(Outcome::Done)
     }
 }

@@ -13,6 +13,7 @@ mod predict;
 mod program;
 mod report;
 mod simulate;
+mod simulate_line;
 mod simulated;
 mod store;
 mod usage;

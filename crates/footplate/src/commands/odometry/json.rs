@@ -76,7 +76,8 @@ fn insert_scores(fields: &mut Map<String, Value>, scores: &RunScores, preset: Pr
     fields.insert("baselines".into(), Value::Object(rivals.collect()));
 }
 
-fn score(score: &OdometryScore) -> Value {
+/// The figures of a score by their names in files.
+pub(in crate::commands) fn score(score: &OdometryScore) -> Value {
     let figures =
         score.figures().into_iter().map(|(key, value)| (key.to_owned(), value.map_or(Value::Null, figure)));
     let mut fields: Map<String, Value> = figures.collect();

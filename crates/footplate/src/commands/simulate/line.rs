@@ -1,0 +1,284 @@
+//! `footplate simulate line`: full-size trains on wheels with tachometers, as recordings or straight through the odometer.
+
+mod family;
+mod files;
+mod score_page;
+mod scored_run;
+mod seeds;
+mod world;
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use footplate_core::TimeSpan;
+use footplate_sim::line::{LineConditions, LineScenario};
+use footplate_store::TableForm;
+
+use self::family::Family;
+use self::files::WrittenRun;
+use self::score_page::ScorePage;
+use self::scored_run::{ScoredRun, score};
+use self::seeds::Seeds;
+use self::world::{Scenarios, World};
+use super::super::Outcome;
+use crate::progress::with_progress;
+use crate::spread::{all_cores, spread};
+
+/// Least share of periods whose true speed has to lie within the interval (per cent), as `footplate odometry` asks for.
+const SPEED_INSIDE_PCT: f64 = 99.99;
+/// Periods that an odometer takes (s).
+const PERIODS_S: (f64, f64) = (0.001, 1.0);
+
+/// Let full-size trains slip and slide, and write what two tachometers say of it, with the truth.
+///
+/// For every run two files are written to the folder: NAME-SEED.csv, a recording that `footplate odometry --score` reads,
+/// and NAME-SEED.toml, the vehicle as its operator knows it. The same seed writes the same bytes. With `--score`, runs go
+/// through the odometer at once, both presets and what simpler ones make of the same counts, and a table says how good
+/// each was.
+#[derive(Args)]
+#[command(
+    arg_required_else_help = true,
+    after_help = "Examples: footplate simulate line --scenario S1 --seed 7 --out runs
+          footplate odometry runs/S1-7.csv --vehicle runs/S1-7.toml --score
+          footplate simulate line --train train.toml --line line.toml --out runs
+          footplate simulate line --score --seeds 1..100 --teeth 80,100,200
+
+Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
+)]
+pub(super) struct Arguments {
+    /// List the scenarios.
+    #[arg(long)]
+    list: bool,
+    /// The scenario, several with commas between them, or all.
+    #[arg(long, value_name = "NAME", value_parser = Scenarios::parse, conflicts_with_all = ["train", "line"])]
+    scenario: Option<Scenarios>,
+    /// A full-size train's file instead of a scenario (docs/formats/train.md).
+    #[arg(long, value_name = "FILE", requires = "line")]
+    train: Option<PathBuf>,
+    /// The line's file that it runs on, from the first stop to the last (docs/formats/line.md).
+    #[arg(long, value_name = "FILE", requires = "train")]
+    line: Option<PathBuf>,
+    /// The seed of the run, or of many: 1..100.
+    #[arg(long, visible_alias = "seeds", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
+    seed: Seeds,
+    /// Pulses per revolution of both tachometers; with --score also several: 80,100,200.
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "100",
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    teeth: Vec<u32>,
+    /// From one sample to the next, in seconds.
+    #[arg(long, value_name = "S", default_value = "0.05", value_parser = period)]
+    period: TimeSpan,
+    /// The diameters that the vehicle states are the true ones.
+    #[arg(long)]
+    exact_diameters: bool,
+    /// The train has an inertial sensor.
+    #[arg(long)]
+    inertial: bool,
+    /// The folder to write to; made if it is not there.
+    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["list", "score"], conflicts_with = "score")]
+    out: Option<PathBuf>,
+    /// What recordings are written as.
+    #[arg(long, value_enum, default_value_t = FormName::Csv)]
+    format: FormName,
+    /// Score the odometer on the runs, without files; all scenarios if none is named.
+    #[arg(long)]
+    score: bool,
+    /// Write the scores as a page of the documentation.
+    #[arg(long, requires = "score", conflicts_with = "json")]
+    markdown: bool,
+    /// Write JSON: a line for each recording, or the scores.
+    #[arg(long)]
+    json: bool,
+    /// How many runs at once; without it, as many as there are cores. The result is the same.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FormName {
+    /// A text, a row a line.
+    Csv,
+    /// Columns, compressed.
+    Parquet,
+}
+
+/// One run to be made.
+#[derive(Debug, Clone, Copy)]
+struct Job {
+    world: usize,
+    teeth: u32,
+    seed: u64,
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if self.list {
+            for scenario in LineScenario::all() {
+                writeln!(output, "{:<4} {}", scenario.name(), scenario.description())?;
+            }
+            return Ok(Outcome::Done);
+        }
+        let worlds = self.worlds()?;
+        match &self.out {
+            Some(folder) => self.write_files(folder, &worlds, output),
+            None => self.write_scores(&worlds, output),
+        }
+    }
+
+    fn worlds(&self) -> anyhow::Result<Vec<World>> {
+        if let (Some(train), Some(line)) = (&self.train, &self.line) {
+            return Ok(vec![World::service(train, line)?]);
+        }
+        let scenarios = match &self.scenario {
+            Some(Scenarios(scenarios)) => scenarios.clone(),
+            None if self.score => LineScenario::all().to_vec(),
+            None => bail!(
+                "nothing says what runs; give --scenario with a name that `footplate simulate line --list` lists, or \
+                 --train and --line"
+            ),
+        };
+        Ok(scenarios.into_iter().map(World::Scenario).collect())
+    }
+
+    /// Every world with every number of teeth and every seed, in this order.
+    fn jobs(&self, worlds: usize) -> Vec<Job> {
+        let with_teeth = (0..worlds).flat_map(|world| self.teeth.iter().map(move |teeth| (world, *teeth)));
+        with_teeth
+            .flat_map(|(world, teeth)| self.seed.iter().map(move |seed| Job { world, teeth, seed }))
+            .collect()
+    }
+
+    fn conditions(&self, teeth: u32) -> LineConditions {
+        LineConditions {
+            teeth,
+            period: self.period,
+            exact_diameters: self.exact_diameters,
+            inertial_sensor: self.inertial,
+        }
+    }
+
+    /// Does something for every job on all cores; results in the order of the jobs.
+    fn each<T: Send>(
+        &self,
+        what: &'static str,
+        worlds: &[World],
+        work: impl Fn(Job, &World) -> anyhow::Result<T> + Sync,
+    ) -> anyhow::Result<Vec<T>> {
+        let jobs = self.jobs(worlds.len());
+        let threads = self.threads.unwrap_or_else(all_cores);
+        with_progress(what, jobs.len(), |done| {
+            spread(jobs.len(), threads, |at| {
+                let result = work(jobs[at], &worlds[jobs[at].world]);
+                done.fetch_add(1, Ordering::Relaxed);
+                result
+            })
+        })
+    }
+
+    fn write_files(
+        &self,
+        folder: &Path,
+        worlds: &[World],
+        output: &mut dyn Write,
+    ) -> anyhow::Result<Outcome> {
+        if self.teeth.len() > 1 {
+            bail!(
+                "--out writes one recording for each seed; give --teeth one number and not {}",
+                self.teeth.len()
+            );
+        }
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make folder `{}`", folder.display()))?;
+        let form = match self.format {
+            FormName::Csv => TableForm::Csv,
+            FormName::Parquet => TableForm::Parquet,
+        };
+        let written = self.each("simulating", worlds, |Job { teeth, seed, .. }, world| {
+            let run = world.run(seed, self.conditions(teeth));
+            WrittenRun::write(folder, &world.file_name(), seed, form, &run)
+        })?;
+        for run in &written {
+            if self.json {
+                writeln!(output, "{}", run.as_json())?;
+            } else {
+                writeln!(output, "{}", run.as_text())?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn write_scores(&self, worlds: &[World], output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let runs = self.each("simulating and scoring", worlds, |Job { world: at, teeth, seed }, world| {
+            let (scores, flags) = score(&world.run(seed, self.conditions(teeth)))?;
+            Ok(ScoredRun { world: at, teeth, seed, scores, flags })
+        })?;
+        let names: Vec<String> = worlds.iter().map(|world| world.name().to_owned()).collect();
+        let page = self.page(&names, &runs);
+        if self.json {
+            writeln!(output, "{}", serde_json::to_string_pretty(&page.as_json(&runs, &names))?)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        Ok(if page.falls_short(SPEED_INSIDE_PCT) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    fn page<'r>(&self, names: &[String], runs: &'r [ScoredRun]) -> ScorePage<'r> {
+        let family = |name: &str, is_in: &dyn Fn(usize) -> bool| {
+            Family::new(name, runs.iter().filter(|run| is_in(run.world)))
+        };
+        let families = names.iter().enumerate().map(|(at, name)| family(name, &|world| world == at));
+        let kind =
+            |name: &str| if self.train.is_some() { name.to_owned() } else { name.chars().take(1).collect() };
+        let mut kinds: Vec<String> = names.iter().map(|name| kind(name)).collect();
+        kinds.dedup();
+        let of_kind = |wanted: &String| {
+            family(wanted, &|world| names.get(world).is_some_and(|name| kind(name) == *wanted))
+        };
+        ScorePage {
+            families: families.collect(),
+            groups: kinds.iter().map(of_kind).collect(),
+            all: family("all", &|_| true),
+            asked: self.asked(),
+        }
+    }
+
+    /// What makes the same page again.
+    fn asked(&self) -> String {
+        let teeth: Vec<String> = self.teeth.iter().map(ToString::to_string).collect();
+        let mut asked = format!("--score --seeds {} --teeth {}", self.seed.written(), teeth.join(","));
+        if let Some(Scenarios(scenarios)) = &self.scenario {
+            let names: Vec<&str> = scenarios.iter().map(LineScenario::name).collect();
+            asked.push_str(&format!(" --scenario {}", names.join(",")));
+        }
+        if let (Some(train), Some(line)) = (&self.train, &self.line) {
+            asked.push_str(&format!(" --train {} --line {}", train.display(), line.display()));
+        }
+        if self.period != LineConditions::default().period {
+            asked.push_str(&format!(" --period {}", self.period.as_s()));
+        }
+        for (is_given, option) in
+            [(self.exact_diameters, " --exact-diameters"), (self.inertial, " --inertial")]
+        {
+            if is_given {
+                asked.push_str(option);
+            }
+        }
+        asked.push_str(" --markdown");
+        asked
+    }
+}
+
+/// A period that an odometer takes.
+fn period(text: &str) -> anyhow::Result<TimeSpan> {
+    let (shortest, longest) = PERIODS_S;
+    match text.parse() {
+        Ok(seconds) if (shortest..=longest).contains(&seconds) => Ok(TimeSpan::from_s(seconds)),
+        _ => bail!("a period is a number of seconds between {shortest} and {longest}, such as 0.05"),
+    }
+}

@@ -1,0 +1,126 @@
+//! One simulated run through every odometer, and how good each of them was.
+
+use footplate_core::estimation::odometry::WheelState;
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_sim::line::{LineRun, WheelTruth};
+use footplate_store::odometry::{
+    OdometryRun, OdometryScore, Preset, Rival, RunContext, RunScores, simulated_rows, simulated_vehicle,
+};
+
+/// How long a wheel has to roll in truth before a flag on it is false: a second until it is trusted again, as vehicles
+/// ask for, and a second for all that lets go of it late.
+const ROLLS_FOR: TimeSpan = TimeSpan::from_ms(2000);
+
+/// A way to make speed and distance of counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Odometer {
+    Ours(Preset),
+    Theirs(Rival),
+}
+
+/// One run and how good every odometer was on it.
+pub(super) struct ScoredRun {
+    /// Which of the worlds it is of.
+    pub(super) world: usize,
+    pub(super) seed: u64,
+    pub(super) teeth: u32,
+    pub(super) scores: RunScores,
+    pub(super) flags: FalseFlags,
+}
+
+/// In how many periods the recommended preset says that a wheel slips or slides which rolls.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct FalseFlags {
+    periods: u64,
+    flagged: u64,
+}
+
+impl Odometer {
+    /// All of them, in the order of tables.
+    pub(super) const ALL: [Self; 5] = [
+        Self::Ours(Preset::Recommended),
+        Self::Ours(Preset::Paper),
+        Self::Theirs(Rival::RawMean),
+        Self::Theirs(Rival::RawMax),
+        Self::Theirs(Rival::WheelsOnly),
+    ];
+
+    pub(super) const fn key(self) -> &'static str {
+        match self {
+            Self::Ours(preset) => preset.key(),
+            Self::Theirs(rival) => rival.key(),
+        }
+    }
+
+    pub(super) const fn title(self) -> &'static str {
+        match self {
+            Self::Ours(preset) => preset.key(),
+            Self::Theirs(rival) => rival.title(),
+        }
+    }
+
+    /// How good it was.
+    pub(super) fn score(self, scores: &RunScores) -> OdometryScore {
+        match self {
+            Self::Ours(preset) => scores.preset(preset),
+            Self::Theirs(wanted) => scores
+                .rivals()
+                .find(|(rival, _)| *rival == wanted)
+                .map_or_else(OdometryScore::default, |(_, score)| score),
+        }
+    }
+}
+
+impl FalseFlags {
+    fn see(&mut self, flag: WheelState, rolls_for: TimeSpan) {
+        if rolls_for >= ROLLS_FOR {
+            self.periods += 1;
+            self.flagged += u64::from(matches!(flag, WheelState::Spin | WheelState::Slide));
+        }
+    }
+
+    pub(super) fn merge(&mut self, other: Self) {
+        self.periods += other.periods;
+        self.flagged += other.flagged;
+    }
+
+    /// Part of all periods of wheels that roll, in per cent.
+    pub(super) fn pct(self) -> Option<f64> {
+        (self.periods > 0).then(|| 100.0 * self.flagged as f64 / self.periods as f64)
+    }
+}
+
+/// Walks a run with every odometer.
+pub(super) fn score(run: &LineRun) -> anyhow::Result<(RunScores, FalseFlags)> {
+    let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
+    let context = RunContext { vehicle, preset: Preset::Recommended, score: true };
+    let mut odometry = OdometryRun::new(&context)?;
+    let mut flags = FalseFlags::default();
+    let mut rolls_since: [Option<Timestamp>; 2] = [None; 2];
+    for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
+        let estimate = odometry.step(&period, || known);
+        for ((since, does), flag) in rolls_since.iter_mut().zip(truth.wheels).zip(estimate.wheels) {
+            *since = since.or(Some(period.time)).filter(|_| does == WheelTruth::Rolling);
+            flags.see(flag, since.map_or(TimeSpan::ZERO, |since| period.time - since));
+        }
+    }
+    let scores = odometry.scores().cloned();
+    Ok((scores.ok_or_else(|| anyhow::anyhow!("a run that was to be scored has no score"))?, flags))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flag_is_false_on_a_wheel_that_has_rolled_for_two_seconds() {
+        let mut flags = FalseFlags::default();
+        assert_eq!(flags.pct(), None);
+        flags.see(WheelState::Slide, TimeSpan::from_ms(1950));
+        flags.see(WheelState::Slide, TimeSpan::from_ms(2000));
+        flags.see(WheelState::Rolling, TimeSpan::from_ms(2050));
+        flags.see(WheelState::Excluded, TimeSpan::from_ms(2050));
+        flags.see(WheelState::Spin, TimeSpan::from_ms(2050));
+        assert_eq!(flags.pct(), Some(50.0));
+    }
+}
