@@ -1,5 +1,7 @@
 //! The odometer takes whatever tachometers say, says so, and recovers from it.
 
+#![expect(clippy::expect_used, reason = "the vehicle of a test is one")]
+
 use footplate_core::estimation::odometry::{Mode, MotionEstimate, Odometer, OdometrySettings, WheelState};
 use footplate_core::wheels::{Axle, Count, Direction, Period, Vehicle, WheelReading, Wheelset};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
