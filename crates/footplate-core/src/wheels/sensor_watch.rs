@@ -120,3 +120,59 @@ impl Default for SensorWatch {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const T: f64 = 0.05;
+
+    fn shown(pulses: f64, speed: f64, train: f64) -> Shown {
+        Shown {
+            pulses,
+            speed,
+            other: Some(train),
+            train,
+            may_differ: false,
+            impossible: false,
+            too_sudden: false,
+        }
+    }
+
+    #[test]
+    fn silence_at_speed_is_a_dead_sensor_unless_the_wheel_may_be_locked() {
+        let (mut dead, mut locked) = (SensorWatch::new(), SensorWatch::new());
+        for _ in 0..12 {
+            dead.look(&shown(0.0, 0.0, 10.0), T);
+            locked.look(&Shown { may_differ: true, ..shown(0.0, 0.0, 10.0) }, T);
+        }
+        assert!(dead.excluded() && !locked.excluded());
+    }
+
+    #[test]
+    fn a_count_that_stands_still_while_the_other_moves_on_is_stuck() {
+        let mut watch = SensorWatch::new();
+        for period in 0..40 {
+            let train = 10.0 + 0.05 * f64::from(period);
+            watch.look(&shown(18.0, 10.0, train), T);
+            if period > 8 {
+                assert!(watch.doubted(), "period {period}: no longer asked for bounds");
+            }
+        }
+        assert!(watch.excluded());
+    }
+
+    #[test]
+    fn a_dead_sensor_is_not_believed_because_the_train_stands_and_is_once_it_counts_again() {
+        let mut watch = SensorWatch::new();
+        watch.look(&Shown { too_sudden: true, ..shown(0.0, 0.0, 10.0) }, T);
+        for _ in 0..200 {
+            watch.look(&shown(0.0, 0.0, 0.0), T);
+        }
+        assert!(watch.excluded(), "silent beside a train that stands");
+        for period in 0..25 {
+            watch.look(&shown(18.0 + f64::from(period % 2), 10.0, 10.0), T);
+        }
+        assert!(!watch.excluded());
+    }
+}

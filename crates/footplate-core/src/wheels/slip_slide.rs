@@ -282,3 +282,85 @@ fn rolls_again(wheel: &Signs, train: &TrainSigns, fastest: f64, loss: Loss) -> b
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Acceleration;
+
+    const T: f64 = 0.05;
+
+    fn thresholds() -> Thresholds {
+        Thresholds::derived(Acceleration::from_m_per_s2(1.2), Acceleration::from_m_per_s2(1.4))
+    }
+
+    fn wheel(speed: f64, axle: Axle) -> Signs {
+        let range = Range { low: speed - 0.2, high: speed + 0.2 };
+        Signs { speed, acceleration: 0.0, range, acceleration_deviation: 0.5, read: true, axle }
+    }
+
+    fn train(speed: f64, slide: bool, slip: bool) -> TrainSigns {
+        let possible = Range { low: speed - 0.3, high: speed + 0.3 };
+        TrainSigns { speed, acceleration: 0.0, possible, slide, slip }
+    }
+
+    fn after(policy: BothAxles, speeds: [f64; 2], train: TrainSigns, periods: usize) -> [Option<Loss>; 2] {
+        let mut slips = SlipSlide::new(thresholds(), policy, true);
+        let wheels = [wheel(speeds[0], Axle::Powered), wheel(speeds[1], Axle::Trailing)];
+        for _ in 0..periods {
+            slips.judge(&wheels, &train, T);
+        }
+        slips.lost()
+    }
+
+    #[test]
+    fn what_the_train_cannot_do_is_proof_at_once() {
+        // 0.6 m/s slower than the train can be, and less than 8 % creepage.
+        let lost = after(BothAxles::OnlyIfUndetermined, [19.4, 20.0], train(20.0, true, false), 1);
+        assert_eq!(lost, [Some(Loss::Slide), None]);
+    }
+
+    #[test]
+    fn a_trailing_wheelset_cannot_spin_and_none_slides_without_a_brake() {
+        let spinning = train(20.0, false, true);
+        assert_eq!(after(BothAxles::OnlyIfUndetermined, [22.0, 22.0], spinning, 5), [Some(Loss::Spin), None]);
+        let coasting = train(20.0, false, false);
+        assert_eq!(after(BothAxles::OnlyIfUndetermined, [15.0, 20.0], coasting, 5), [None, None]);
+    }
+
+    #[test]
+    fn as_printed_the_difference_condemns_both() {
+        let braking = train(20.0, true, false);
+        assert_eq!(after(BothAxles::Literal, [16.0, 20.0], braking, 5), [Some(Loss::Slide); 2]);
+        assert_eq!(after(BothAxles::OnlyIfUndetermined, [16.0, 20.0], braking, 5), [Some(Loss::Slide), None]);
+        assert_eq!(after(BothAxles::AlwaysBoth, [18.9, 20.0], braking, 5), [Some(Loss::Slide); 2]);
+    }
+
+    #[test]
+    fn a_wheel_that_regains_its_grip_is_not_said_to_spin() {
+        let mut slips = SlipSlide::new(thresholds(), BothAxles::OnlyIfUndetermined, true);
+        let both = train(20.0, true, true);
+        for _ in 0..3 {
+            slips.judge(&[wheel(10.0, Axle::Powered), wheel(20.0, Axle::Trailing)], &both, T);
+        }
+        let regained = Signs { acceleration: 20.0, ..wheel(22.0, Axle::Powered) };
+        let lost = slips.judge(&[regained, wheel(20.0, Axle::Trailing)], &both, T);
+        assert_eq!(lost, [Some(Loss::Slide), None], "latched");
+        for _ in 0..25 {
+            slips.judge(&[wheel(20.0, Axle::Powered), wheel(20.0, Axle::Trailing)], &both, T);
+        }
+        assert_eq!(slips.lost(), [None, None], "cleared after a second of rolling");
+    }
+
+    #[test]
+    fn zeros_never_clear_a_slide() {
+        let mut slips = SlipSlide::new(thresholds(), BothAxles::OnlyIfUndetermined, true);
+        let standing = [wheel(0.0, Axle::Powered), wheel(0.0, Axle::Trailing)];
+        for period in 0..400 {
+            // The train slows down to a stop under locked wheels.
+            let speed = (10.0 - 0.05 * f64::from(period)).max(0.0);
+            slips.judge(&standing, &train(speed, true, false), T);
+        }
+        assert_eq!(slips.lost(), [Some(Loss::Slide); 2]);
+    }
+}

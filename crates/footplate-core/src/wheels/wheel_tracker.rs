@@ -102,3 +102,46 @@ impl WheelTracker {
         self.silence
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wheel of 100 teeth that starts at 20 m/s and accelerates by `a`.
+    fn follow(a: f64, seconds: f64) -> WheelTracker {
+        let (pitch, t) = (0.027, 0.05);
+        let mut tracker = WheelTracker::new(pitch, t);
+        tracker.restart(20.0);
+        let mut counted = 0.0;
+        for k in 1..=libm::round(seconds / t) as i32 {
+            let now = f64::from(k) * t;
+            let pulses = libm::floor((20.0 * now + 0.5 * a * now * now) / pitch);
+            tracker.turned((pulses - counted) * pitch, t);
+            counted = pulses;
+        }
+        tracker
+    }
+
+    #[test]
+    fn a_wheel_that_falls_by_ten_metres_per_second_squared_is_followed_within_tenths_of_a_second() {
+        let tracker = follow(-10.0, 0.5);
+        assert!((tracker.speed() - 15.0).abs() < 0.3, "{}", tracker.speed());
+        assert!((tracker.acceleration() + 10.0).abs() < 2.0, "{}", tracker.acceleration());
+    }
+
+    #[test]
+    fn steady_speed_is_known_to_a_fraction_of_a_pulse() {
+        let tracker = follow(0.0, 5.0);
+        assert!((tracker.speed() - 20.0).abs() < 0.15, "{}", tracker.speed());
+        assert!(tracker.acceleration().abs() < 4.0 * tracker.acceleration_deviation());
+    }
+
+    #[test]
+    fn a_silent_wheel_is_slower_than_a_pulse_in_its_silence() {
+        let mut tracker = follow(0.0, 2.0);
+        for _ in 0..20 {
+            tracker.turned(0.0, 0.05);
+        }
+        assert!(tracker.speed().abs() <= 0.027 + 1e-12, "{}", tracker.speed());
+    }
+}

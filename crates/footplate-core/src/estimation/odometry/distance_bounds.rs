@@ -141,3 +141,51 @@ impl DistanceBounds {
         *self = Self::new(self.distance.reversed());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(pulses: f64) -> Counted {
+        Counted {
+            pulses,
+            doubt: 0.0,
+            loosens_low: false,
+            loosens_high: false,
+            pitch: Range::around(0.027, 0.001),
+            at_least: true,
+            at_most: true,
+        }
+    }
+
+    fn after(wheels: [Counted; 2], periods: usize) -> Range {
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let speed = Range { low: 19.0, high: 21.0 };
+        for _ in 0..periods {
+            bounds.moved(speed, speed, Range { low: -1.0, high: 1.0 }, &wheels, 0.05);
+        }
+        bounds.distance()
+    }
+
+    #[test]
+    fn counts_bound_a_long_way_by_their_pitch_and_a_pulse() {
+        // 37 pulses of 27 mm in 50 ms: 19.98 m/s.
+        let distance = after([counted(37.0), counted(37.0)], 2000);
+        let way = 2000.0 * 37.0 * 0.027;
+        assert!(distance.low < way && way < distance.high);
+        assert!(distance.width() < way * 0.002 + 0.3, "{distance:?}: the speeds alone leave 200 m");
+    }
+
+    #[test]
+    fn a_sensor_that_loses_pulses_does_not_break_the_bounds() {
+        let distance = after([counted(36.0), counted(37.0)], 2000);
+        assert!(distance.high > 2000.0 * 37.0 * 0.027, "{distance:?}");
+    }
+
+    #[test]
+    fn a_wheel_in_doubt_loosens_and_does_not_set() {
+        let doubted = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
+        let alone = after([doubted, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
+        assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
+    }
+}

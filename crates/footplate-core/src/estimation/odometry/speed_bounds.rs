@@ -232,3 +232,71 @@ impl SpeedBounds {
         self.together_for >= TOGETHER_S
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Acceleration;
+
+    const T: f64 = 0.05;
+
+    fn limits(independent: bool) -> Limits {
+        let most = Acceleration::from_m_per_s2(1.2);
+        Limits { thresholds: Thresholds::derived(most, most), independent }
+    }
+
+    fn braking() -> Allowed {
+        Allowed {
+            slide: true,
+            slip: false,
+            acceleration: Range { low: -1.3, high: 0.1 },
+            at_most_by_command: -0.5,
+            traction_effort: 0.0,
+            commanded: 0.7,
+            brake_effort: 0.7,
+        }
+    }
+
+    fn wheel(speed: f64, lost: Option<Loss>) -> WheelBounds {
+        let turns = Range { low: speed - 0.1, high: speed + 0.1 };
+        WheelBounds { turns, doubted: false, speed, axle: Axle::Trailing, lost }
+    }
+
+    /// The upper bound after so many seconds in which both wheels slow down by `a`, `lost` from the fourth second on.
+    fn upper(independent: bool, a: f64, lost: Option<Loss>, seconds: f64) -> (f64, f64) {
+        let mut bounds = SpeedBounds::new(Range { low: 19.8, high: 20.2 });
+        let mut speed = 20.0;
+        for period in 0..libm::round(seconds / T) as i32 {
+            speed += a * T;
+            let lost = lost.filter(|_| period > 80);
+            // A slide disproves the command.
+            let at_most_by_command = if lost.is_some() { 0.0 } else { -0.5 };
+            let allowed = Allowed { at_most_by_command, ..braking() };
+            let possible = bounds.possible(&allowed, T);
+            let wheels = [wheel(speed, lost), wheel(speed, lost)];
+            bounds.narrow(possible, &wheels, &allowed, &limits(independent), T);
+        }
+        (bounds.speed().high, speed)
+    }
+
+    #[test]
+    fn braked_wheels_that_hang_together_leave_the_upper_bound_to_the_command() {
+        // Both drawn away by 0.7 m/s² beyond the train: nothing shows it, and the bound must not follow them.
+        let (high, wheels) = upper(false, -1.2, None, 10.0);
+        assert!((high - (20.2 - 0.5 * 10.0)).abs() < 0.1, "{high}");
+        assert!(wheels < 8.5);
+    }
+
+    #[test]
+    fn independent_wheels_that_keep_up_with_each_other_bound_it_together() {
+        let (high, wheels) = upper(true, -0.7, None, 10.0);
+        assert!(high > wheels && high < wheels + 1.0, "{high} above {wheels}");
+    }
+
+    #[test]
+    fn the_bound_stays_while_both_slide() {
+        let (high, _) = upper(true, -0.7, Some(Loss::Slide), 10.0);
+        assert!(high > 20.0 - 0.7 * 4.2, "not below where the slide was seen: {high}");
+        assert!(high < 20.3);
+    }
+}

@@ -209,3 +209,67 @@ fn sign(kind: Loss) -> f64 {
         Loss::Spin => -1.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Acceleration;
+
+    const T: f64 = 0.05;
+
+    fn sensor(commanded: f64) -> VirtualSensor {
+        let thresholds =
+            Thresholds::derived(Acceleration::from_m_per_s2(1.2), Acceleration::from_m_per_s2(1.4));
+        let begins = Beginning { speed: 20.0, commanded };
+        VirtualSensor::new(Loss::Slide, begins, 1.2, Envelope::Touches, thresholds)
+    }
+
+    fn guides(commanded: f64) -> Guides {
+        Guides { commanded, felt: None, locked: false }
+    }
+
+    #[test]
+    fn a_train_slides_no_harder_than_it_is_told_to_brake() {
+        let mut sensor = sensor(0.33);
+        let mut speed = 20.0;
+        for _ in 0..200 {
+            speed = sensor.next([None; 2], guides(0.33), T);
+        }
+        assert!((speed - (20.0 - 0.39 * 10.0)).abs() < 0.1, "{speed}");
+    }
+
+    #[test]
+    fn touches_teach_it_how_fast_the_train_slows_down() {
+        let mut sensor = sensor(1.0);
+        let (mut speed, mut truth) = (20.0, 20.0);
+        for period in 0..400 {
+            truth -= 0.4 * T;
+            // Every four seconds a wheel is turned up and goes with the train for half a second.
+            let phase = period % 80;
+            let wheel = match phase {
+                60..70 => LostWheel { speed: truth - 2.0, acceleration: 12.0 },
+                70..80 => LostWheel { speed: truth, acceleration: -0.4 },
+                _ => LostWheel { speed: truth - 2.0, acceleration: -0.4 },
+            };
+            speed = sensor.next([Some(wheel), None], guides(1.0), T);
+        }
+        assert!((speed - truth).abs() < 0.1, "{speed} {truth}");
+        assert!((-0.55..-0.4).contains(&sensor.rate()), "{}", sensor.rate());
+    }
+
+    #[test]
+    fn a_spin_is_the_mirror_image() {
+        let thresholds =
+            Thresholds::derived(Acceleration::from_m_per_s2(1.2), Acceleration::from_m_per_s2(1.4));
+        let begins = Beginning { speed: 2.0, commanded: f64::INFINITY };
+        let mut sensor = VirtualSensor::new(Loss::Spin, begins, 1.0, Envelope::Touches, thresholds);
+        let wheel = Some(LostWheel { speed: 9.0, acceleration: 0.0 });
+        let mut speed = 0.0;
+        for _ in 0..20 {
+            speed = sensor.next([wheel, wheel], guides(f64::INFINITY), T);
+        }
+        assert!((2.4..3.0).contains(&speed), "half of what the train can do: {speed}");
+        let slower = Some(LostWheel { speed: 2.2, acceleration: 0.0 });
+        assert!(sensor.next([slower, wheel], guides(f64::INFINITY), T) <= 2.2);
+    }
+}
