@@ -146,8 +146,13 @@ impl Odometer {
             [None, None] => (0.0, most * most * t * t),
         };
         self.unread = read == [None, None];
-        self.train = TrainFilter::new(speed, variance * (first.pitch / t) * (first.pitch / t) + 1e-4);
+        if bounds.is_empty() {
+            // Faster than the train can be: no count of a wheel.
+            bounds = Range { low: -most, high: most };
+        }
+        let speed = bounds.nearest(speed);
         self.bounds = SpeedBounds::new(bounds);
+        self.train = TrainFilter::new(speed, variance * (first.pitch / t) * (first.pitch / t) + 1e-4);
         let estimate = MotionEstimate {
             time: period.time,
             speed: Speed::from_m_per_s(speed),
