@@ -133,6 +133,7 @@ each_table() {
   "$1" prediction predict testdata/sensor-logs/*.csv --layout track-a --markdown
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
+  "$1" odometry simulate line --score --seeds 1..100 --teeth 80,100,200 --markdown
 }
 
 # What is odd in the logs is said in testdata/sensor-logs/README.md.
@@ -140,7 +141,8 @@ print_table() {
   shift
   case $1 in
     example) print_example "$2" ;;
-    *) "$TARGET/debug/footplate" "$@" 2>/dev/null ;;
+    # Status 1 says that something falls short, which the table shows.
+    *) "$TARGET/debug/footplate" "$@" 2>/dev/null || [[ $? -eq 1 ]] ;;
   esac
 }
 
