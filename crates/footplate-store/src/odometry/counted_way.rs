@@ -8,23 +8,25 @@ const COUNTER_BITS: [u32; 4] = [8, 16, 24, 32];
 
 /// What the counts of one period say.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CountedWay {
+pub struct CountedWay {
     /// How far each wheel has rolled; absent without a count.
-    pub(super) ways: [Option<Length>; 2],
+    pub ways: [Option<Length>; 2],
     /// How long that took; absent for the first period and where time does not go on.
-    pub(super) span: Option<TimeSpan>,
+    pub span: Option<TimeSpan>,
 }
 
 /// Turns counts into ways, period by period.
 #[derive(Debug, Clone)]
-pub(super) struct WayCounter {
+pub struct WayCounter {
     pitches: [Length; 2],
     counters: [Option<i64>; 2],
     last: Option<Timestamp>,
 }
 
 impl WayCounter {
-    pub(super) fn new(vehicle: &Vehicle) -> Self {
+    /// Begins with nothing counted; the ways follow from the diameters that the wheels are believed to have.
+    #[must_use]
+    pub fn new(vehicle: &Vehicle) -> Self {
         let pitches = vehicle.wheelsets.map(|wheelset| wheelset.pulse_pitch());
         Self { pitches, counters: [None; 2], last: None }
     }
@@ -33,7 +35,8 @@ impl WayCounter {
         self.pitches
     }
 
-    pub(super) fn count(&mut self, period: &Period) -> CountedWay {
+    /// Takes in a period.
+    pub fn count(&mut self, period: &Period) -> CountedWay {
         let span = self.last.map(|last| period.time - last).filter(|span| *span > TimeSpan::ZERO);
         self.last = Some(period.time);
         let [first, second] = &mut self.counters;

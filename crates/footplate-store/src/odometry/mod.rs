@@ -12,6 +12,7 @@ mod score;
 mod simulated;
 mod summary;
 
+pub use counted_way::{CountedWay, WayCounter};
 pub use result_rows::{LiveResult, ResultWriter};
 pub use rival::Rival;
 pub use run::{OdometryRun, Preset, RunContext, RunScores};

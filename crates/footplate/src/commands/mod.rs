@@ -16,5 +16,6 @@ mod predict;
 mod report;
 mod simulate;
 mod store;
+mod web_page;
 
 pub(crate) use command::{Command, Outcome};

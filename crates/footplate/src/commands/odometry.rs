@@ -3,6 +3,7 @@
 mod block_stream;
 pub(super) mod json;
 mod recording;
+mod report;
 mod results;
 mod tables;
 mod walked;
@@ -30,6 +31,7 @@ use walked::Walked;
 #[derive(Args)]
 #[command(
     after_help = "Example: footplate odometry run.csv --vehicle train.toml --score --out result.parquet\n\
+                  Charts:  footplate odometry run.csv --vehicle train.toml --report run.html\n\
                   Live:    tachometer | footplate odometry - --out -\n\n\
                   Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
 )]
@@ -46,6 +48,9 @@ pub(crate) struct Arguments {
     /// Write an estimate a period to this file, CSV or Parquet by its ending; `-` for CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write a page with charts to this file (HTML), to open in any browser without a network.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Compare with the truth that the recording holds.
     #[arg(long)]
     score: bool,
@@ -92,10 +97,13 @@ impl Arguments {
         let preset = Preset::from(self.preset);
         let context = RunContext { vehicle: vehicle.vehicle, preset, score: self.score };
         let recordings = self.walk(&context, output)?;
+        let walked = Walked { vehicle: vehicle.name, preset, recordings, is_scored: self.score };
+        if let Some(page) = &self.report {
+            report::write(page, &walked).with_context(|| format!("writing {}", page.display()))?;
+        }
         if to_standard {
             return Ok(Outcome::Done);
         }
-        let walked = Walked { vehicle: vehicle.name, preset, recordings };
         if self.json {
             writeln!(output, "{}", serde_json::to_string_pretty(&json::walked(&walked))?)?;
         } else {
@@ -108,6 +116,7 @@ impl Arguments {
     fn walk(&self, context: &RunContext, output: &mut dyn Write) -> anyhow::Result<Vec<WalkedRecording>> {
         let mut output = Some(output);
         let mut results = None;
+        let mut charts_left = if self.report.is_some() { report::MOST_RUNS } else { 0 };
         let mut walked = Vec::new();
         for file in &self.files {
             let recording = OpenRecording::open(file, self.score)?;
@@ -115,7 +124,10 @@ impl Arguments {
                 let with_runs = self.files.len() > 1 || recording.has_run_ids();
                 results = Some(Results::begin(out, output, with_runs)?);
             }
-            walked.push(recording.walk(context, results.as_mut())?);
+            // A page says how good it was wherever the truth is there.
+            let score = self.score || (self.report.is_some() && recording.has_truth());
+            let context = RunContext { score, ..*context };
+            walked.push(recording.walk(&context, results.as_mut(), &mut charts_left)?);
         }
         if let (Some(results), Some(out)) = (results, &self.out) {
             results.finish().with_context(|| format!("writing {}", out.display()))?;

@@ -4,7 +4,6 @@ mod charts;
 mod data;
 mod forecasts;
 mod health;
-mod markup;
 mod page;
 mod tables;
 

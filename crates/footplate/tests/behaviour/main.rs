@@ -9,6 +9,7 @@ mod inertial_slides;
 mod layout;
 mod odometer_on_scenarios;
 mod odometry;
+mod odometry_report;
 mod predict;
 mod program;
 mod report;

@@ -3,14 +3,13 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, mkdtempSync } from "node:fs";
-import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
 
-const AT = resolve(process.env.BROWSER_AT);
-const { chromium } = createRequire(join(AT, "package.json"))("playwright-core");
+import { AT, colours, launch, openPage, width } from "./browser.mjs";
+
 const LOGS = resolve(import.meta.dirname, "../../../../testdata/sensor-logs");
 const log = (train, kind) => join(LOGS, `choochoos_2020_track_a_train${train}_${kind}.csv`);
 
@@ -28,27 +27,12 @@ before(async () => {
   report(log(24, "run"), log(24, "stop"), log(74, "run"), log(74, "stop"), "--out", out);
   report(hostile, "--train", "74", "--out", join(folder, "hostile.html"));
   address = (name) => pathToFileURL(join(folder, name)).href;
-  browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", "--disable-gpu"] });
+  browser = await launch();
 });
 after(() => browser?.close());
 
-/** Opens the report; what the page complains of, or asks the network for, is collected. */
-async function open(options = {}, name = "report.html") {
-  const page = await browser.newPage({ viewport: { width: 1300, height: 900 }, ...options });
-  const complaints = [];
-  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
-  page.on("pageerror", (error) => complaints.push(String(error)));
-  page.on("request", (request) => request.url().startsWith("http") && complaints.push(request.url()));
-  await page.goto(address(name));
-  await page.waitForSelector(".uplot");
-  return { page, complaints };
-}
-
-/** How many different colours each chart's canvas shows: a blank one has a single one. */
-const colours = (page) => page.$$eval(".uplot canvas", (all) => all.map((canvas) => {
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-  return new Set(new Uint32Array(data.buffer)).size;
-}));
+/** Opens the report, or another page beside it. */
+const open = (options = {}, name = "report.html") => openPage(browser, address(name), options);
 
 for (const colorScheme of ["light", "dark"]) {
   test(`every chart is drawn in ${colorScheme}`, async () => {
@@ -65,9 +49,7 @@ for (const colorScheme of ["light", "dark"]) {
 
 test("a phone shows the page without scrolling sideways", async () => {
   const { page, complaints } = await open({ viewport: { width: 390, height: 844 }, isMobile: true, deviceScaleFactor: 2 });
-  // A phone zooms out until everything fits: what it then shows is wider than it is.
-  const width = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, innerWidth));
-  assert.equal(width, 390);
+  assert.equal(await width(page), 390);
   await page.screenshot({ path: join(AT, "report-phone.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();

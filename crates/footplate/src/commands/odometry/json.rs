@@ -20,7 +20,7 @@ pub(super) fn walked(walked: &Walked) -> Value {
     let runs = walked
         .recordings
         .iter()
-        .flat_map(|recording| recording.runs.iter().map(|each| run(&recording.file, each, walked.preset)));
+        .flat_map(|recording| recording.runs.iter().map(|each| run(&recording.file, each, walked)));
     whole.insert("runs".into(), runs.collect());
     whole.into()
 }
@@ -37,7 +37,7 @@ fn recording(recording: &WalkedRecording) -> Value {
     })
 }
 
-fn run(file: &str, run: &WalkedRun, preset: Preset) -> Value {
+fn run(file: &str, run: &WalkedRun, walked: &Walked) -> Value {
     let summary = run.odometry.summary();
     let mut fields = Map::new();
     fields.insert("file".into(), json!(file));
@@ -58,8 +58,8 @@ fn run(file: &str, run: &WalkedRun, preset: Preset) -> Value {
     fields.insert("top_speed_m_s".into(), figure(summary.top_speed.as_m_per_s()));
     fields.insert("modes".into(), json!(summary.modes));
     fields.insert("wheels".into(), json!(summary.flags));
-    if let Some(scores) = run.odometry.scores() {
-        insert_scores(&mut fields, scores, preset);
+    if let Some(scores) = run.odometry.scores().filter(|_| walked.is_scored) {
+        insert_scores(&mut fields, scores, walked.preset);
     }
     fields.into()
 }

@@ -10,6 +10,7 @@ use footplate_store::{TachometerBlock, TachometerNote, TachometerReader, TimeFau
 
 use super::STANDARD;
 use super::block_stream::each_block;
+use super::report::{MOST_POINTS, RunSeries};
 use super::results::Results;
 use crate::progress::with_progress;
 
@@ -38,6 +39,8 @@ pub(super) struct WalkedRun {
     /// What rows of results call it.
     pub(super) name: String,
     pub(super) odometry: OdometryRun,
+    /// What its charts show, if they are wanted.
+    pub(super) series: Option<RunSeries>,
 }
 
 impl OpenRecording {
@@ -50,13 +53,14 @@ impl OpenRecording {
         } else {
             TachometerReader::open(path)?
         };
-        let columns = reader.columns();
-        if score && !(columns.has_true_speed() || columns.has_true_distance()) {
+        let recording = Self { file, reader };
+        if score && !recording.has_truth() {
             bail!(
-                "{file}: --score needs the truth, and there is no column true_speed_m_s or true_distance_m"
+                "{}: --score needs the truth, and there is no column true_speed_m_s or true_distance_m",
+                recording.file
             );
         }
-        Ok(Self { file, reader })
+        Ok(recording)
     }
 
     /// Whether its rows say which run they belong to.
@@ -64,23 +68,31 @@ impl OpenRecording {
         self.reader.columns().has_run_ids()
     }
 
-    /// Walks it; what is odd in it is said on standard error as it is found.
+    /// Whether its rows say what is true.
+    pub(super) fn has_truth(&self) -> bool {
+        let columns = self.reader.columns();
+        columns.has_true_speed() || columns.has_true_distance()
+    }
+
+    /// Walks it; what is odd in it is said on standard error as it is found. The first `charts_left` runs are kept for
+    /// charts, and then so many fewer are left.
     pub(super) fn walk(
         self,
         context: &RunContext,
         mut results: Option<&mut Results<'_>>,
+        charts_left: &mut usize,
     ) -> anyhow::Result<WalkedRecording> {
         let has_run_ids = self.has_run_ids();
         let Self { file, reader } = self;
         let mut walked =
             WalkedRecording { file, runs: Vec::new(), notes: Vec::new(), time_faults: TimeFaults::default() };
         if !has_run_ids {
-            walked.add_run(None, context)?;
+            walked.add_run(None, context, charts_left)?;
         }
         let extent = reader.extent().and_then(|extent| usize::try_from(extent).ok());
         with_progress("estimating", extent.unwrap_or_default(), |done| {
             each_block(reader, |block| {
-                walked.take(block, context, results.as_deref_mut())?;
+                walked.take(block, context, results.as_deref_mut(), charts_left)?;
                 done.store(block.read_up_to, Ordering::Relaxed);
                 Ok(())
             })
@@ -90,12 +102,20 @@ impl OpenRecording {
 }
 
 impl WalkedRecording {
-    fn add_run(&mut self, id: Option<&str>, context: &RunContext) -> anyhow::Result<()> {
+    fn add_run(
+        &mut self,
+        id: Option<&str>,
+        context: &RunContext,
+        charts_left: &mut usize,
+    ) -> anyhow::Result<()> {
+        let has_charts = *charts_left > 0;
+        *charts_left -= usize::from(has_charts);
         let name = id.map_or_else(|| self.file.clone(), ToOwned::to_owned);
         self.runs.push(WalkedRun {
             id: id.map(ToOwned::to_owned),
             name,
             odometry: OdometryRun::new(context)?,
+            series: has_charts.then(|| RunSeries::new(&context.vehicle, MOST_POINTS)),
         });
         Ok(())
     }
@@ -105,9 +125,10 @@ impl WalkedRecording {
         block: &TachometerBlock,
         context: &RunContext,
         mut results: Option<&mut Results<'_>>,
+        charts_left: &mut usize,
     ) -> anyhow::Result<()> {
         for id in &block.new_runs {
-            self.add_run(Some(id), context)?;
+            self.add_run(Some(id), context, charts_left)?;
         }
         for note in &block.notes {
             eprintln!("{}, {note}", self.file);
@@ -116,7 +137,11 @@ impl WalkedRecording {
         self.time_faults = block.time_faults;
         for row in 0..block.len() {
             let Some(run) = self.runs.get_mut(block.run(row)) else { continue };
-            let estimate = run.odometry.step(&block.period(row), || block.truth(row));
+            let period = block.period(row);
+            let estimate = run.odometry.step(&period, || block.truth(row));
+            if let Some(series) = &mut run.series {
+                series.push(&period, &estimate, &block.truth(row));
+            }
             if let Some(results) = &mut results {
                 results.push(&run.name, &estimate)?;
             }

@@ -1,6 +1,6 @@
 //! What all recordings of one call come to, and whether that is good enough.
 
-use footplate_store::odometry::{Preset, RunScores};
+use footplate_store::odometry::{OdometryScore, Preset, RunScores};
 
 use super::recording::WalkedRecording;
 
@@ -14,11 +14,18 @@ pub(super) struct Walked {
     pub(super) vehicle: String,
     pub(super) preset: Preset,
     pub(super) recordings: Vec<WalkedRecording>,
+    /// Whether a score was asked for; a page has one wherever the truth is known.
+    pub(super) is_scored: bool,
 }
 
 impl Walked {
     /// The scores of all runs together, if that was asked for.
     pub(super) fn scores(&self) -> Option<RunScores> {
+        if self.is_scored { self.known_scores() } else { None }
+    }
+
+    /// The scores of all runs whose truth is known.
+    pub(super) fn known_scores(&self) -> Option<RunScores> {
         let runs = self.recordings.iter().flat_map(|recording| &recording.runs);
         let mut scores = runs.filter_map(|run| run.odometry.scores());
         let mut all = scores.next()?.clone();
@@ -30,10 +37,12 @@ impl Walked {
 
     /// Whether the truth left the intervals more often than they promise.
     pub(super) fn falls_short(&self) -> bool {
-        self.scores().is_some_and(|scores| {
-            let score = scores.preset(self.preset);
-            score.speed_inside_pct.is_some_and(|share| share < SPEED_INSIDE_PCT)
-                || score.distance_inside_pct.is_some_and(|share| share < 100.0)
-        })
+        self.scores().is_some_and(|scores| leaves_bounds(&scores.preset(self.preset)))
     }
+}
+
+/// Whether the truth left the intervals of speed and distance more often than they promise.
+pub(super) fn leaves_bounds(score: &OdometryScore) -> bool {
+    score.speed_inside_pct.is_some_and(|share| share < SPEED_INSIDE_PCT)
+        || score.distance_inside_pct.is_some_and(|share| share < 100.0)
 }

@@ -1,46 +1,28 @@
-//! The page: one HTML file with its styles, scripts and data inside.
-
-use std::fmt::Write;
+//! The page: an overview, a section a train, and the recordings.
 
 use super::data::{ReportData, TrainReport};
-use super::markup::{Table, json, text};
 use super::tables;
+use crate::commands::web_page::WebPage;
+use crate::commands::web_page::markup::{Table, text};
 
-const STYLE: &str = include_str!("../../../assets/report/report.css");
-const CHARTS: &str = include_str!("../../../assets/report/charts.js");
-const UPLOT_STYLE: &str = include_str!("../../../assets/vendor/uplot/uPlot.min.css");
-const UPLOT: &str = include_str!("../../../assets/vendor/uplot/uPlot.iife.min.js");
+const CHARTS: &str = include_str!("../../../assets/report/trains.js");
 
-/// What a browser may do for the page: nothing that leaves it.
-const POLICY: &str =
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
+const INTRODUCTION: &str = "<p>Values are given with one standard deviation. In charts, drag to zoom, double-click or \
+                            press Escape to see all again; arrow keys move along a chart that has the focus, plus and \
+                            minus zoom.</p>";
 
 pub(super) fn page(data: &ReportData) -> serde_json::Result<String> {
     let numbers: Vec<String> = data.trains.iter().map(|train| train.calibration.train.to_string()).collect();
     let title = format!("Trains {} on {}", numbers.join(", "), data.layout);
-    let title = text(&title);
-    let mut html = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-         <title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{UPLOT_STYLE}\n{STYLE}</style>\n</head>\n<body>\n\
-         <header><h1>{title}</h1>\n<p>Values are given with one standard deviation. In charts, drag to zoom, double-click \
-         or press Escape to see all again; arrow keys move along a chart that has the focus.</p></header>\n<main>\n"
-    );
-    html.push_str(&overview(data));
+    let mut main = overview(data);
     for train in &data.trains {
-        html.push_str(&section(train));
+        main.push_str(&section(train));
     }
-    html.push_str("<section aria-labelledby=\"recordings\"><h2 id=\"recordings\">Recordings</h2>\n");
-    html.push_str(&tables::polling(&data.polling));
-    html.push_str("</section>\n</main>\n");
-    let _ = write!(
-        html,
-        "<script type=\"application/json\" id=\"report\">{}</script>\n<script>{UPLOT}</script>\n\
-         <script type=\"module\">\n{CHARTS}</script>\n</body>\n</html>\n",
-        json(&serde_json::to_string(data)?)
-    );
-    Ok(html)
+    main.push_str("<section aria-labelledby=\"recordings\"><h2 id=\"recordings\">Recordings</h2>\n");
+    main.push_str(&tables::polling(&data.polling));
+    main.push_str("</section>\n");
+    let page = WebPage { title: &title, introduction: INTRODUCTION, main: &main, style: "", script: CHARTS };
+    page.html(data)
 }
 
 fn overview(data: &ReportData) -> String {

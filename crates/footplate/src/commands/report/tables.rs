@@ -5,7 +5,7 @@ use footplate_core::calibration::Direction;
 use footplate_store::{PollingForm, Quantity, StopForm, TrainForm};
 
 use super::data::{Check, Health};
-use super::markup::{Table, text};
+use crate::commands::web_page::markup::{Table, text};
 
 pub(super) fn health(health: &Health) -> String {
     let mut table = Table::new("How it fares", &["check", "found", "state", "meaning"], &[false; 4]);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 /// Text as it may stand in an element or a quoted attribute.
-pub(super) fn text(text: &str) -> String {
+pub(in crate::commands) fn text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -19,20 +19,20 @@ pub(super) fn text(text: &str) -> String {
 }
 
 /// JSON as it may stand in a script element: without a character that could end it or begin a comment.
-pub(super) fn json(json: &str) -> String {
+pub(in crate::commands) fn json(json: &str) -> String {
     // Outside its strings JSON has none of these, and inside an escape means the same.
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
 /// A table. The first column names its row, columns in `numbers` stand to the right.
-pub(super) struct Table {
+pub(in crate::commands) struct Table {
     html: String,
     numbers: &'static [bool],
 }
 
 impl Table {
     /// Begins a table with its caption and columns, each with whether it holds numbers.
-    pub(super) fn new(caption: &str, columns: &[&str], numbers: &'static [bool]) -> Self {
+    pub(in crate::commands) fn new(caption: &str, columns: &[&str], numbers: &'static [bool]) -> Self {
         let mut html = format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", text(caption));
         for (column, number) in columns.iter().zip(numbers) {
             let class = if *number { " class=\"number\"" } else { "" };
@@ -43,13 +43,13 @@ impl Table {
     }
 
     /// Adds a row of plain text.
-    pub(super) fn row(&mut self, cells: &[String]) {
+    pub(in crate::commands) fn row(&mut self, cells: &[String]) {
         let escaped: Vec<String> = cells.iter().map(|cell| text(cell)).collect();
         self.row_of_markup(&escaped);
     }
 
     /// Adds a row of cells that are markup already.
-    pub(super) fn row_of_markup(&mut self, cells: &[String]) {
+    pub(in crate::commands) fn row_of_markup(&mut self, cells: &[String]) {
         self.html.push_str("<tr>");
         for (place, (cell, number)) in cells.iter().zip(self.numbers).enumerate() {
             let class = if *number { " class=\"number\"" } else { "" };
@@ -62,7 +62,7 @@ impl Table {
         self.html.push_str("</tr>\n");
     }
 
-    pub(super) fn end(self) -> String {
+    pub(in crate::commands) fn end(self) -> String {
         self.html + "</tbody></table></div>\n"
     }
 }

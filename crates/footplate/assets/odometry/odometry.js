@@ -1,0 +1,256 @@
+// Draws the charts of a run of odometry from the data inside the page, with what chart.js offers.
+
+/** The run shown. */
+let run = report.runs[0];
+const SYNC = "odometry";
+/** Most rows of the table of marks: it is there to be read. */
+const LISTED = 200;
+/** Height of the strip of modes, as a part of the axis that shows 100 %. */
+const STRIP_OF = 0.09;
+
+const WORDS = {
+  spin: "slips", slide: "slides", excluded: "not believed",
+  one_slip: "one slips or slides", degraded: "degraded", correction: "correction", ambiguous: "ambiguous",
+};
+const PLACES = { wheel_1: "wheelset 1", wheel_2: "wheelset 2", mode: "mode" };
+
+const time = () => ({
+  label: "time since the first period (s)",
+  value: (_, value) => {
+    if (value == null) return "–";
+    return `${rounded(value, 2)} s${run.begin_s === 0 ? "" : ` (t_s ${rounded(run.begin_s + value, 2)})`}`;
+  },
+});
+
+/** What is marked at a time, if anything. */
+const markedAt = (place, at) => run.marks[place].find(([from, to]) => from < at && at <= to)?.[2];
+
+/** Shades stretches between two heights of a chart, 0 at its top and 1 at its foot, with a firm bar at their upper edge. */
+function shade(stretches, top, foot, alpha = 0.2) {
+  return (u) => {
+    const { ctx, bbox } = u;
+    const bar = 5 * devicePixelRatio;
+    const [y, height] = [bbox.top + top * bbox.height, (foot - top) * bbox.height];
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const [from, to, what] of stretches) {
+      const left = u.valToPos(from, "x", true);
+      // However short it is, it can be seen.
+      const width = Math.max(u.valToPos(to, "x", true) - left, 2 * devicePixelRatio);
+      ctx.fillStyle = colour(what);
+      ctx.globalAlpha = alpha;
+      ctx.fillRect(left, y, width, height);
+      ctx.globalAlpha = 1;
+      ctx.fillRect(left, y, width, Math.min(bar, height));
+    }
+    ctx.restore();
+  };
+}
+
+/** The key to the marks that there are. */
+function key(figure, places) {
+  const there = new Set(places.flatMap((place) => run.marks[place].map(([, , what]) => what)));
+  if (there.size === 0) return;
+  const list = document.createElement("ul");
+  list.className = "key";
+  list.setAttribute("aria-label", "Key to the marks");
+  for (const what of Object.keys(WORDS).filter((word) => there.has(word))) {
+    const swatch = document.createElement("span");
+    swatch.className = "swatch";
+    swatch.style.background = `var(--${what})`;
+    const item = document.createElement("li");
+    item.append(swatch, WORDS[what]);
+    list.append(item);
+  }
+  figure.append(list);
+}
+
+/** Says below a chart what it shows, for those who do not see it. */
+function say(figure, text) {
+  const said = document.createElement("p");
+  said.className = "said";
+  said.textContent = text;
+  figure.append(said);
+  for (const u of drawn.get(figure)) u.over.setAttribute("aria-description", text);
+}
+
+const known = (values) => (values ?? []).filter((value) => value != null);
+const least = (values) => known(values).reduce((one, other) => Math.min(one, other), Infinity);
+const greatest = (values) => known(values).reduce((one, other) => Math.max(one, other), -Infinity);
+const span = (values, unit, digits) => `${rounded(least(values), digits)} to ${rounded(greatest(values), digits)} ${unit}`;
+const bound = (label, unit, digits) => ({ ...line(label, "quiet", unit, digits), width: 1 });
+const dashed = (series) => ({ ...series, dash: [6, 4] });
+
+function speed(figure, { speed_m_s, speed_low_m_s, speed_high_m_s, true_speed_m_s }) {
+  chart(figure, {
+    name: "Speed with its bounds", x: time(), y: "speed (m/s)", sync: SYNC,
+    data: [run.time_s, speed_high_m_s, speed_low_m_s, speed_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
+    series: [
+      bound("at most", "m/s", 2), bound("at least", "m/s", 2), line("estimate", "first", "m/s", 2),
+      ...(true_speed_m_s ? [dashed(line("true", "truth", "m/s", 2))] : []),
+    ],
+    bands: [{ series: [1, 2], fill: colour("band") }],
+  });
+  const widest = greatest(speed_high_m_s.map((high, place) => high - speed_low_m_s[place]));
+  say(figure, `The estimate goes from ${span(speed_m_s, "m/s", 2)}; its bounds are at most ${rounded(widest, 2)} m/s apart.`);
+}
+
+function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
+  const wheel = (place, name) => ({
+    ...line(PLACES[place], name, "m/s", 2), spanGaps: false,
+    value: (u, value, _, index) => {
+      if (value == null) return "–";
+      const mark = markedAt(place, u.data[0][index]);
+      return `${rounded(value, 2)} m/s${mark ? ` (${WORDS[mark]})` : ""}`;
+    },
+  });
+  const none = run.time_s.map(() => null);
+  chart(figure, {
+    name: "Speed of each wheel", x: time(), y: "speed (m/s)", sync: SYNC,
+    below: [shade(run.marks.wheel_1, 0, 0.5), shade(run.marks.wheel_2, 0.5, 1)],
+    data: [run.time_s, wheel_1_m_s ?? none, wheel_2_m_s ?? none, speed_m_s],
+    series: [wheel("wheel_1", "second"), wheel("wheel_2", "third"), { ...line("estimate", "first", "m/s", 2), width: 1.5 }],
+  });
+  key(figure, ["wheel_1", "wheel_2"]);
+  const told = ["wheel_1", "wheel_2"].map((place) => `${PLACES[place]} ${stretchesOf(place)}`);
+  say(figure, `Marks: ${told.join("; ")}.`);
+}
+
+/** How often and how long something is marked, in words. */
+function stretchesOf(place) {
+  const marks = run.marks[place];
+  if (marks.length === 0) return place === "mode" ? "always normal" : "always rolls";
+  const kinds = [...new Set(marks.map(([, , what]) => what))];
+  return kinds.map((kind) => {
+    const own = marks.filter(([, , what]) => what === kind);
+    const lasts = own.reduce((sum, [from, to]) => sum + to - from, 0);
+    return `${WORDS[kind]} ${own.length === 1 ? "once" : `${own.length} times`}, for ${rounded(lasts, 1)} s`;
+  }).join(", ");
+}
+
+function shares(figure, { share_1, share_1_and_2 }) {
+  const per_cent = (values) => values.map((value) => (value == null ? null : 100 * value));
+  const [first, both] = [per_cent(share_1), per_cent(share_1_and_2)];
+  const part = (label, name, value) => ({
+    ...line(label, name, "%", 0), width: 1.5,
+    value: (_, __, ___, index) => {
+      const found = index == null ? null : value(index);
+      return found == null || Number.isNaN(found) ? "–" : `${rounded(found, 0)} %`;
+    },
+  });
+  const mode = (u, _, __, index) => WORDS[markedAt("mode", u.data[0][index ?? 0])] ?? "normal";
+  chart(figure, {
+    name: "Shares of the wheels and of the virtual sensor, and the mode", x: time(), y: "share (%)", sync: SYNC, height: STRIP + 30,
+    range: { y: { range: [0, 100 / (1 - STRIP_OF)] } },
+    below: [shade(run.marks.mode, 0, STRIP_OF - 0.02, 1)],
+    data: [run.time_s, run.time_s.map(() => 100), both, first, run.time_s.map(() => null)],
+    series: [
+      part("virtual sensor", "first", (index) => 100 - both[index]),
+      part("wheelset 2", "third", (index) => both[index] - first[index]),
+      { ...part("wheelset 1", "second", (index) => first[index]), fill: `color-mix(in srgb, ${colour("second")} 25%, transparent)` },
+      { ...line("mode", "quiet", "", 0), value: mode },
+    ],
+    bands: [["first", [1, 2]], ["third", [2, 3]]].map(([name, pair]) => (
+      { series: pair, fill: `color-mix(in srgb, ${colour(name)} 25%, transparent)` }
+    )),
+  });
+  key(figure, ["mode"]);
+  say(figure, `Mode: ${stretchesOf("mode")}.`);
+}
+
+function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m, under_m }) {
+  if (error_m) {
+    chart(figure, {
+      name: "Distance less the true distance, with its bounds", x: time(), y: "beyond the truth (m)", sync: SYNC, zero: true,
+      data: [run.time_s, error_high_m, error_low_m, error_m],
+      series: [bound("at most", "m", 2), bound("at least", "m", 2), line("estimate", "first", "m", 2)],
+      bands: [{ series: [1, 2], fill: colour("band") }],
+    });
+    say(figure, `The error goes from ${span(error_m, "m", 2)}; its bounds from ${rounded(least(error_low_m), 2)} to ${rounded(greatest(error_high_m), 2)} m.`);
+    return;
+  }
+  chart(figure, {
+    name: "Width of the interval of the distance, and amounts of over- and under-reading", x: time(), y: "distance (m)", sync: SYNC,
+    data: [run.time_s, width_m, over_m, under_m],
+    series: [line("width of the interval", "first", "m", 2), line("over-read by at most", "second", "m", 2), line("under-read by at most", "third", "m", 2)],
+  });
+  const last = (values) => rounded(known(values).at(-1) ?? 0, 2);
+  say(figure, `At the end the interval is ${last(width_m)} m wide; the distance is over-read by at most ${last(over_m)} m and under-read by at most ${last(under_m)} m.`);
+}
+
+function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
+  const measured = measured_accel_m_s2 && { ...line("accelerometer", "third", "m/s²", 2), width: 1, spanGaps: false };
+  chart(figure, {
+    name: "Acceleration", x: time(), y: "acceleration (m/s²)", sync: SYNC, height: STRIP + 30, zero: true,
+    data: [run.time_s, ...(measured ? [measured_accel_m_s2] : []), accel_m_s2],
+    series: [...(measured ? [measured] : []), line("estimate", "first", "m/s²", 2)],
+  });
+  if (effort) {
+    chart(figure, {
+      name: "Effort", x: time(), y: "effort (%)", sync: SYNC, height: STRIP - 30, zero: true,
+      range: { y: { range: [-105, 105] } },
+      data: [run.time_s, effort.map((part) => (part == null ? null : 100 * part))],
+      series: [line("effort", "second", "%", 0)],
+    });
+  }
+  const recorded = [measured && "an accelerometer", effort && "the command"].filter(Boolean).join(" and ");
+  say(figure, `The estimate goes from ${span(accel_m_s2, "m/s²", 2)}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`);
+}
+
+/** Every stretch that is marked, as a table. */
+function listMarks() {
+  const marks = Object.keys(PLACES).flatMap((place) => run.marks[place].map((mark) => [place, ...mark]));
+  marks.sort(([, one], [, other]) => one - other);
+  const holder = document.getElementById("marks");
+  holder.replaceChildren();
+  if (marks.length === 0) return;
+  const details = document.createElement("details");
+  const summary = document.createElement("summary");
+  const shown = marks.length > LISTED ? `, the first ${LISTED}` : "";
+  summary.textContent = `Marks of ${run.name} as a table (${marks.length}${shown})`;
+  const wide = document.createElement("div");
+  wide.className = "wide";
+  const table = document.createElement("table");
+  const row = (tag, cells) => {
+    const tr = document.createElement("tr");
+    cells.forEach((text, place) => {
+      const cell = document.createElement(tag);
+      cell.textContent = text;
+      if (tag === "th") cell.scope = "col";
+      if (place > 1) cell.className = "number";
+      tr.append(cell);
+    });
+    return tr;
+  };
+  table.createTHead().append(row("th", ["of", "what", "from s", "to s"]));
+  const body = table.createTBody();
+  for (const [place, from, to, what] of marks.slice(0, LISTED)) {
+    body.append(row("td", [PLACES[place], WORDS[what], rounded(from, 2), rounded(to, 2)]));
+  }
+  wide.append(table);
+  details.append(summary, wide);
+  holder.append(details);
+}
+
+function offerRuns() {
+  const pick = document.getElementById("pick");
+  const select = pick.querySelector("select");
+  report.runs.forEach(({ name }, place) => select.add(new Option(name, place)));
+  pick.hidden = report.runs.length < 2;
+  select.addEventListener("change", () => {
+    run = report.runs[select.value];
+    figures.forEach(redraw);
+    listMarks();
+  });
+}
+
+const KINDS = { speed, wheels, shares, distance, acceleration };
+
+offerRuns();
+listMarks();
+drawFigures((figure) => {
+  if (run.time_s.length > 0) KINDS[figure.dataset.chart](figure, run.lines);
+  else figure.append("The run has no period.");
+});

@@ -1,0 +1,76 @@
+//! What recordings come to, as one page with charts.
+
+mod decimated;
+mod run_series;
+mod tables;
+mod wheel_speeds;
+
+use std::ffi::OsStr;
+use std::io;
+use std::path::Path;
+
+use footplate_store::write_whole;
+use serde::Serialize;
+
+use super::walked::Walked;
+use crate::commands::web_page::WebPage;
+pub(super) use run_series::RunSeries;
+use run_series::SeriesForm;
+
+const CHARTS: &str = include_str!("../../../assets/odometry/odometry.js");
+const STYLE: &str = include_str!("../../../assets/odometry/odometry.css");
+
+/// Most points of a line (chosen: several a pixel of any screen, so that zooming in a few times shows more).
+pub(super) const MOST_POINTS: usize = 4000;
+/// Most runs with charts (chosen: as many as a person picks from a list).
+pub(super) const MOST_RUNS: usize = 32;
+/// Runs that have all points; more share the points of so many, so that the page stays below some ten megabytes.
+const WHOLE_RUNS: usize = 8;
+
+/// Everything that charts show.
+#[derive(Debug, Serialize)]
+struct PageForm {
+    runs: Vec<RunForm>,
+}
+
+/// A run as its charts show it.
+#[derive(Debug, Serialize)]
+struct RunForm {
+    name: String,
+    #[serde(flatten)]
+    series: SeriesForm,
+}
+
+/// Writes the page; whoever looks finds the old one or the new one.
+///
+/// # Errors
+/// What the system said.
+pub(super) fn write(path: &Path, walked: &Walked) -> io::Result<()> {
+    let runs = || walked.recordings.iter().flat_map(|recording| recording.runs.iter());
+    let charted = runs().filter(|run| run.series.is_some()).count();
+    let most = MOST_POINTS * WHOLE_RUNS / charted.max(WHOLE_RUNS);
+    let several = walked.recordings.len() > 1;
+    let of_recordings = walked.recordings.iter().flat_map(|recording| {
+        recording.runs.iter().filter_map(move |run| {
+            let name = tables::run_name(recording, run, several);
+            Some(RunForm { name, series: run.series.as_ref()?.form(most) })
+        })
+    });
+    let form = PageForm { runs: of_recordings.collect() };
+    let title = match walked.recordings.as_slice() {
+        [only] => {
+            // Where it was is no more than a nuisance to whoever gets the page.
+            let name = Path::new(&only.file).file_name();
+            format!("Odometry of {}", name.map_or(only.file.as_str().into(), OsStr::to_string_lossy))
+        }
+        several => format!("Odometry of {} recordings", several.len()),
+    };
+    let page = WebPage {
+        title: &title,
+        introduction: &tables::introduction(walked),
+        main: &tables::main(walked, charted),
+        style: STYLE,
+        script: CHARTS,
+    };
+    write_whole(path, page.html(&form)?.as_bytes())
+}
