@@ -6,7 +6,7 @@ use super::odometer::Odometer;
 use super::published::PeriodCount;
 use super::virtual_sensor::{Beginning, Envelope, Guides, LostWheel, VirtualSensor};
 use super::wheel_channel::WheelChannel;
-use crate::wheels::{Loss, larger};
+use crate::wheels::{Loss, Range, larger};
 
 /// Difference of speeds at which the wheel that seems to slip or slide loses half its share: three standard deviations
 /// of the difference of two wheels that roll (m/s), and what their diameters may differ by (part of the speed).
@@ -80,8 +80,10 @@ impl Odometer {
         self.blind = if first.is_read() || second.is_read() { 0.0 } else { self.blind + t };
         let Some(published) = &mut self.published else { return (0.0, [0.0, 0.0, 1.0]) };
         let fused = published.next(counts, stood_in, before, t);
-        self.train.set(fused.speed, fused.acceleration, fused.variance);
-        (0.5 * (before + fused.speed) * t, fused.shares)
+        let top = self.vehicle.max_speed.as_m_per_s();
+        let speed = Range { low: -top, high: top }.nearest(fused.speed);
+        self.train.set(speed, fused.acceleration, fused.variance);
+        (0.5 * (before + speed) * t, fused.shares)
     }
 
     /// Which wheels may correct the filter.
@@ -173,7 +175,8 @@ impl Odometer {
         });
         let locked = [a, b].iter().all(|wheel| !wheel.is_read() || wheel.tracker.silence() > LOCKED_S);
         let felt = self.inertia.as_ref().map(Inertia::acceleration);
-        let speed = sensor.next(wheels, Guides { commanded, felt, locked }, t);
+        let top = self.vehicle.max_speed.as_m_per_s();
+        let speed = sensor.next(wheels, Guides { commanded, felt, locked }, t).min(top);
         self.train.a = sensor.rate();
         self.train.v = speed;
         0.5 * (before + speed) * t

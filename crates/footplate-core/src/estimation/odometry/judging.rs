@@ -58,6 +58,8 @@ impl Odometer {
         let [first_sudden, second_sudden] = [first, second].map(|wheel| wheel.quality == Quality::Excluded);
         // What both say at once is no fault of either: the row was read late, or the train is not what it was taken for.
         let both = (first_beyond || first_sudden) && (second_beyond || second_sudden);
+        // Bounds take part in judging sensors only where they take part in judging wheels.
+        let proof = self.settings.proof;
         let train = self.train.v;
         for (((wheel, other), impossible), too_sudden) in self
             .wheels
@@ -76,7 +78,7 @@ impl Odometer {
                 other,
                 train,
                 may_differ: slides || slips,
-                impossible: impossible && !both,
+                impossible: impossible && !both && proof,
                 too_sudden: too_sudden && !both,
             };
             wheel.watch.look(&shown, t);
