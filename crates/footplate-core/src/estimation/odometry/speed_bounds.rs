@@ -21,6 +21,8 @@ use crate::wheels::{Axle, Loss, Range, Thresholds, larger, smaller};
 const LOOK_BACK_S: f64 = 0.8;
 /// How long two independent wheelsets have to keep up with each other ...
 const TOGETHER_S: f64 = 2.0;
+/// After both slid, for so long.
+const ROLL_AGAIN_S: f64 = 6.0;
 /// ... and how closely (m/s, part of the speed): what diameters and creep explain.
 const TOGETHER: (f64, f64) = (0.15, 0.006);
 /// Time over which their difference is smoothed (s): a followed speed is noisy by 0.1 m/s at 80 pulses a turn.
@@ -204,7 +206,9 @@ impl SpeedBounds {
             self.all_slid = true;
             return self.highest.largest();
         }
-        self.all_slid &= allowed.slide;
+        // Two slides are never alike: independent wheelsets that keep up with each other for so long roll again.
+        let roll_again = limits.independent && sliding == 0 && self.together_for >= ROLL_AGAIN_S;
+        self.all_slid &= allowed.slide && !roll_again;
         let by_command = self.speed.high + allowed.at_most_by_command * t;
         if self.all_slid {
             return smaller(free, by_command);
