@@ -7,12 +7,8 @@ use footplate_core::TimeSpan;
 use footplate_core::estimation::odometry::{
     MotionEstimate, Odometer, OdometrySettings, WheelState, distance_tolerance, speed_tolerance,
 };
-use footplate_core::wheels::{
-    Axle, BrakeCommand, Count, Direction, Period, Thresholds, Vehicle, WheelReading, Wheelset,
-};
-use footplate_sim::line::{
-    LineConditions, LineRun, LineSample, LineScenario, LineVehicle, Turned, WheelSample, WheelTruth,
-};
+use footplate_sim::line::{LineConditions, LineRun, LineScenario, WheelTruth};
+use footplate_store::odometry::{simulated_rows, simulated_vehicle};
 
 /// Seeds beyond those that anything was tried on.
 const SEEDS: std::ops::Range<u64> = 5001..5009;
@@ -34,65 +30,15 @@ struct Score {
     last: MotionEstimate,
 }
 
-fn vehicle(of: &LineVehicle) -> Vehicle {
-    let wheelsets = of.wheelsets.map(|wheelset| Wheelset {
-        teeth: wheelset.teeth,
-        diameter: wheelset.diameter,
-        diameter_tolerance: wheelset.diameter_tolerance,
-        axle: if wheelset.is_powered { Axle::Powered } else { Axle::Trailing },
-    });
-    let brake = of.brake_command;
-    Vehicle {
-        period: of.period,
-        max_speed: of.max_speed,
-        max_traction: of.max_traction,
-        max_brake: of.max_brake,
-        wheelsets,
-        independent: of.independent,
-        brake_command: BrakeCommand {
-            full: brake.full,
-            tolerance: brake.tolerance,
-            gradient: brake.gradient,
-            resistance: brake.resistance,
-            build_up: brake.build_up,
-        },
-        thresholds: Thresholds::derived(of.max_traction, of.max_brake),
-    }
-}
-
-fn reading(wheel: &WheelSample) -> WheelReading {
-    let count = match (wheel.pulses, wheel.counter) {
-        (Some(pulses), _) => Count::Pulses(pulses),
-        (None, Some(counter)) => Count::Counter(counter),
-        (None, None) => Count::Missing,
-    };
-    let direction = match wheel.turned {
-        Some(Turned::Forward) => Direction::Forward,
-        Some(Turned::Backward) => Direction::Backward,
-        None => Direction::Unknown,
-    };
-    WheelReading { count, direction, last_edge: wheel.last_edge }
-}
-
-fn period(sample: &LineSample) -> Period {
-    let [first, second] = &sample.wheels;
-    Period {
-        time: sample.time,
-        wheels: [reading(first), reading(second)],
-        effort: Some(sample.effort),
-        acceleration: sample.acceleration,
-        balise: sample.balise,
-    }
-}
-
 fn walk(run: &LineRun, settings: OdometrySettings) -> Score {
-    let mut odometer = Odometer::new(vehicle(&run.vehicle), settings).expect("a claimed vehicle");
+    let believed = simulated_vehicle(&run.vehicle).expect("a claimed vehicle");
+    let mut odometer = Odometer::new(believed.vehicle, settings).expect("a claimed vehicle");
     let (mut squares, mut worst, mut width) = (0.0, 0.0_f64, 0.0);
     let (mut outside, mut violations, mut false_flags) = ([0; 2], [0; 2], 0);
     let (mut onset, mut flagged) = (None, None);
     let mut last = None;
-    for (sample, truth) in run.samples.iter().zip(&run.truth) {
-        let estimate = odometer.step(&period(sample));
+    for ((period, _), truth) in simulated_rows(run).zip(&run.truth) {
+        let estimate = odometer.step(&period);
         let error = (estimate.speed - truth.speed).as_m_per_s();
         squares += error * error;
         worst = worst.max(error.abs());
@@ -106,8 +52,8 @@ fn walk(run: &LineRun, settings: OdometrySettings) -> Score {
         let lost = estimate.wheels.iter().any(|wheel| matches!(wheel, WheelState::Slide | WheelState::Spin));
         let really = truth.wheels.iter().any(|wheel| *wheel != WheelTruth::Rolling);
         false_flags += usize::from(lost && !really);
-        onset = onset.or(really.then_some(sample.time));
-        flagged = flagged.or((lost && onset.is_some()).then_some(sample.time));
+        onset = onset.or(really.then_some(period.time));
+        flagged = flagged.or((lost && onset.is_some()).then_some(period.time));
         last = Some((estimate, off, truth.distance));
     }
     let (last, off, way) = last.expect("a run has samples");
