@@ -58,6 +58,34 @@ pub struct Report {
     pub poll_interval: Option<TimeSpan>,
 }
 
+/// What a command station can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// Run a train at a throttle step; step 0 stops it by its own law.
+    Speed {
+        /// The train to tell.
+        train: TrainId,
+        /// The step.
+        step: SpeedStep,
+    },
+    /// Turn a train around. Only for a train at rest: one that runs is stopped dead.
+    Reverse {
+        /// The train to tell.
+        train: TrainId,
+    },
+    /// Throw a turnout.
+    Turnout {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// `true` for the diverging leg.
+        curved: bool,
+    },
+    /// Take the power from the whole track.
+    PowerOff,
+    /// Give power to the track.
+    PowerOn,
+}
+
 /// From which side a speed was reached; the same throttle step reached from above is faster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]

@@ -5,6 +5,7 @@
 //! or from its own folder (checked by `tests/architecture/`):
 //!
 //! ```text
+//! control        when to tell the trains what: calibration that plans itself, exact stops
 //! estimation     what the next report will be, learnt from the last
 //! calibration    speeds, laws of speed change, stops, edge lengths: numbers with uncertainty
 //! kinematics  latency  track  wheels
@@ -20,6 +21,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod calibration;
+pub mod control;
 mod estimate;
 pub mod estimation;
 mod event;
@@ -33,7 +35,7 @@ mod units;
 pub mod wheels;
 
 pub use estimate::Estimate;
-pub use event::{Approach, Event, EventKind, Report};
+pub use event::{Approach, Command, Event, EventKind, Report};
 pub use ids::{EdgeId, NodeId, RunId, SensorId, SpeedStep, StretchId, TrainId, TurnoutId};
 pub use time::{TimeSpan, Timestamp};
 pub use units::{Acceleration, Jerk, Length, Ratio, Speed};

@@ -9,6 +9,7 @@ mod joint_fit;
 mod law_family;
 mod law_fit;
 mod length_table;
+pub mod motion;
 mod passage;
 mod recent_extremes;
 mod run;

@@ -5,11 +5,16 @@
 //! (`belief`), what the step means ([`SpeedTable`](crate::calibration::SpeedTable)), how long the hop is,
 //! and how the train changes speed. Each forecast is a distribution ([`Forecast`]) whose intervals hold as
 //! often as they say.
+//!
+//! [`Locator`] follows a train that is driven: with a [`MotionModel`](crate::calibration::motion::MotionModel) it knows
+//! where the train is at any moment, and where it would come to rest if told to stop at another.
 
 mod belief;
 mod contact_scatter;
 mod forecast;
+mod ground;
 mod law_memory;
+mod locator;
 pub mod odometry;
 mod polls;
 mod predictor;
@@ -19,7 +24,9 @@ mod transition;
 mod way_memory;
 
 pub use forecast::{Forecast, Phase};
+pub use ground::Ground;
 pub use law_memory::{KnownLaw, LawMemory};
+pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint, place_of, way_to};
 pub use predictor::{Hit, Predictor, Verdict};
 pub use speed_watch::WatchedSpeed;
 pub use train_model::TrainModel;

@@ -10,7 +10,8 @@ const CORE_ROOT: &str = "crates/footplate-core/src/lib.rs";
 const SIMULATOR: &str = "crates/footplate-sim/src/";
 
 /// From top to bottom, as in the documentation of core's `lib.rs`.
-const ROWS: [&[&str]; 5] = [
+const ROWS: [&[&str]; 6] = [
+    &["control"],
     &["estimation"],
     &["calibration"],
     &["kinematics", "latency", "track", "wheels"],

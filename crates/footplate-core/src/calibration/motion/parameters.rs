@@ -1,0 +1,1 @@
+//! Which unknown is which among the numbers of a motion model.
