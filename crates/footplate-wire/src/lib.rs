@@ -1,6 +1,12 @@
 //! Bytes to reports, commands to bytes: one folder a command station, no sockets.
 //!
-//! A codec knows bytes and what they mean. Who asked what and when, and over which cable, is decided above.
+//! - A codec knows bytes and what they mean. A [`Session`] knows who asked what and when, and when to ask again. Over
+//!   which cable, is decided above.
 #![no_std]
 
+extern crate alloc;
+
 pub mod marklin_serial;
+mod session;
+
+pub use session::{Closing, CommandError, LinkNotice, Session, Transmit};

@@ -2,11 +2,27 @@
 //!
 //! Nothing is framed, checked or acknowledged, and the line carries commands and sensor replies in turn. So the
 //! first byte must never be lost: it alone says how many follow.
+//!
+//! - [`Message`] and [`ModuleState`] are bytes and their meaning.
+//! - [`Interface`] is the session: it knows what is on the line and what comes next.
 
 mod codec;
+mod exchange;
+mod farewell;
 mod line;
+mod pacing;
+mod polls;
+mod queue;
+mod readings;
 mod s88;
+mod session;
+mod settings;
+mod silence;
+mod solenoid;
 
 pub use codec::{EncodeError, Frame, Message};
 pub use line::{BYTE_TIME, REPLY_BYTE_SPACING, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST, time_on_line};
+pub use pacing::Pace;
 pub use s88::{CONTACTS_PER_MODULE, ModuleState, ReplyError, decode_reply};
+pub use session::Interface;
+pub use settings::Settings;

@@ -64,6 +64,25 @@ impl ModuleState {
         contacts.map(move |at| SensorId(first + at))
     }
 
+    /// A module on which nothing is closed.
+    pub(super) const fn all_open(module: u8) -> Self {
+        Self { module, closed: 0 }
+    }
+
+    pub(super) const fn is_open(self) -> bool {
+        self.closed == 0
+    }
+
+    /// What is closed and was not in the state before.
+    pub(super) const fn since(self, before: Self) -> Self {
+        Self { module: self.module, closed: self.closed & !before.closed }
+    }
+
+    /// What is closed in both states.
+    pub(super) const fn both(self, other: Self) -> Self {
+        Self { module: self.module, closed: self.closed & other.closed }
+    }
+
     fn bit_of(self, contact: SensorId) -> Option<u16> {
         let at = contact.0.checked_sub(self.first_contact()).filter(|at| *at < CONTACTS_PER_MODULE)?;
         Some(FIRST_CONTACT >> at)

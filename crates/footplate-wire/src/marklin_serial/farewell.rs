@@ -1,0 +1,78 @@
+//! Who has to be told to stand when the session ends, and how far that has come.
+
+use alloc::vec::Vec;
+
+use footplate_core::{Command, SpeedStep, TrainId};
+
+use crate::session::Closing;
+
+/// What there is to do at the end, and what of it was done.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Farewell {
+    /// Every train that was ever told a step, and whether step 0 was its last and has left.
+    driven: Vec<Driven>,
+    pub(super) begun: bool,
+    pub(super) released: bool,
+    /// How often power off was said.
+    power_off: u8,
+}
+
+/// The last word is said twice: the first may be swallowed as the second byte of something.
+const POWER_OFF_WORDS: u8 = 2;
+
+#[derive(Debug, Clone, Copy)]
+struct Driven {
+    train: TrainId,
+    stands: bool,
+}
+
+impl Farewell {
+    /// A step is waiting for the line. From now on the train may run: its bytes may be on the line at the end.
+    pub(super) fn will_tell(&mut self, train: TrainId, step: SpeedStep) {
+        let stood = self.driven.iter().any(|driven| driven.train == train && driven.stands);
+        self.mark(train, stood && step == SpeedStep::STAND);
+    }
+
+    /// A step has left.
+    pub(super) fn told(&mut self, train: TrainId, step: SpeedStep) {
+        self.mark(train, step == SpeedStep::STAND);
+    }
+
+    fn mark(&mut self, train: TrainId, stands: bool) {
+        match self.driven.iter_mut().find(|driven| driven.train == train) {
+            Some(driven) => driven.stands = stands,
+            None => self.driven.push(Driven { train, stands }),
+        }
+    }
+
+    /// The commands that stop them all, said or not.
+    pub(super) fn begin(&mut self) -> impl Iterator<Item = Command> {
+        self.begun = true;
+        self.driven.iter_mut().map(|driven| {
+            driven.stands = false;
+            Command::Speed { train: driven.train, step: SpeedStep::STAND }
+        })
+    }
+
+    pub(super) fn said_power_off(&mut self) {
+        self.power_off = self.power_off.saturating_add(1);
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.power_off >= POWER_OFF_WORDS
+    }
+
+    pub(super) fn statement(&self, hand_shaken: bool) -> Closing {
+        let trains = |stands| {
+            let driven = self.driven.iter().filter(move |driven| driven.stands == stands);
+            driven.map(|driven| driven.train).collect()
+        };
+        Closing {
+            told_to_stand: trains(true),
+            not_told: trains(false),
+            solenoids_released: self.released,
+            power_off: self.is_over(),
+            hand_shaken,
+        }
+    }
+}

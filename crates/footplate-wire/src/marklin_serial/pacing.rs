@@ -1,0 +1,157 @@
+//! When the next byte may be written: after CTS has gone down and up again, or after fixed gaps.
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::line::BYTE_TIME;
+
+/// How long after a byte CTS is believed to be up although it was never seen down: the interface may drop it too
+/// shortly for a slow computer to notice (after byte 192 it does), and it needs a moment to drop it at all, which
+/// published drivers give it 10 ms for.
+const CTS_GUARD: TimeSpan = TimeSpan::from_ms(10);
+
+/// How the program knows when the interface takes the next byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// By its CTS line: after each byte it goes down and up again.
+    Cts,
+    /// By the clock alone, where CTS is not wired.
+    Timed {
+        /// From the end of a byte to the beginning of the next.
+        byte_gap: TimeSpan,
+        /// From the end of a command to the beginning of what follows. After a whole reply nothing is waited for: the
+        /// interface has shown that it is done.
+        command_gap: TimeSpan,
+    },
+}
+
+impl Pace {
+    /// Gaps that every known interface keeps up with: 10 ms between bytes (Rocrail), 100 ms between commands (the
+    /// middle of what published programs wait).
+    pub const CAREFUL: Self =
+        Self::Timed { byte_gap: TimeSpan::from_ms(10), command_gap: TimeSpan::from_ms(100) };
+
+    /// No gaps, for an interface that keeps up with the line, as a simulated one does.
+    pub const FAST: Self = Self::Timed { byte_gap: TimeSpan::ZERO, command_gap: TimeSpan::ZERO };
+}
+
+/// Keeps the pace.
+#[derive(Debug, Clone)]
+pub(super) struct Pacing {
+    pace: Pace,
+    cts_up: bool,
+    /// Since when CTS is as it is.
+    cts_since: Timestamp,
+    written: Option<Written>,
+}
+
+/// The byte that was written last, until the interface is known to be done with it.
+#[derive(Debug, Clone, Copy)]
+struct Written {
+    at: Timestamp,
+    /// Whether CTS was seen down since.
+    lowered: bool,
+    ends_frame: bool,
+}
+
+impl Pacing {
+    pub(super) fn new(now: Timestamp, pace: Pace) -> Self {
+        Self { pace, cts_up: false, cts_since: now, written: None }
+    }
+
+    pub(super) fn cts(&mut self, now: Timestamp, up: bool) {
+        if up != self.cts_up {
+            self.cts_since = now;
+        }
+        self.cts_up = up;
+        if let Some(written) = &mut self.written
+            && !up
+        {
+            written.lowered = true;
+        }
+    }
+
+    pub(super) fn wrote(&mut self, now: Timestamp, ends_frame: bool) {
+        self.written = Some(Written { at: now, lowered: self.pace == Pace::Cts && !self.cts_up, ends_frame });
+    }
+
+    /// A whole reply has come, so the interface is done with what was written before.
+    pub(super) fn answered(&mut self) {
+        if self.pace != Pace::Cts {
+            self.written = None;
+        }
+    }
+
+    /// From when on the next byte may be written if CTS stays as it is; `None` while it is down.
+    pub(super) fn ready_at(&self) -> Option<Timestamp> {
+        let always = Timestamp::from_ns(i64::MIN);
+        let gone = |written: Written| written.at + BYTE_TIME;
+        match self.pace {
+            Pace::Cts if !self.cts_up => None,
+            Pace::Cts => Some(self.written.map_or(always, |written| {
+                gone(written) + if written.lowered { TimeSpan::ZERO } else { CTS_GUARD }
+            })),
+            Pace::Timed { byte_gap, command_gap } => Some(self.written.map_or(always, |written| {
+                gone(written) + if written.ends_frame { command_gap } else { byte_gap }
+            })),
+        }
+    }
+
+    pub(super) fn is_ready(&self, now: Timestamp) -> bool {
+        self.ready_at().is_some_and(|at| at <= now)
+    }
+
+    /// Since when CTS is down, where it matters.
+    pub(super) fn down_since(&self) -> Option<Timestamp> {
+        (self.pace == Pace::Cts && !self.cts_up).then_some(self.cts_since)
+    }
+
+    /// Whether taken bytes are confirmed at all.
+    pub(super) fn has_hand_shake(&self) -> bool {
+        self.pace == Pace::Cts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(ms: i64) -> Timestamp {
+        Timestamp::ZERO + TimeSpan::from_ms(ms)
+    }
+
+    #[test]
+    fn a_byte_waits_until_cts_has_gone_down_and_up_again() {
+        let mut pacing = Pacing::new(ms(0), Pace::Cts);
+        assert!(!pacing.is_ready(ms(0)), "nothing is known of CTS yet");
+        pacing.cts(ms(0), true);
+        assert!(pacing.is_ready(ms(0)));
+
+        pacing.wrote(ms(0), false);
+        assert!(!pacing.is_ready(ms(7)), "CTS is still up from before: the interface had no time to drop it");
+        pacing.cts(ms(8), false);
+        assert!(!pacing.is_ready(ms(1000)), "however long it takes");
+        pacing.cts(ms(9), true);
+        assert!(pacing.is_ready(ms(9)));
+    }
+
+    #[test]
+    fn an_edge_too_short_to_be_seen_costs_a_guard_time() {
+        let mut pacing = Pacing::new(ms(0), Pace::Cts);
+        pacing.cts(ms(0), true);
+        pacing.wrote(ms(0), true);
+        assert!(!pacing.is_ready(ms(14)));
+        assert!(pacing.is_ready(ms(15)), "a byte of 4.6 ms and 10 ms of guard");
+    }
+
+    #[test]
+    fn without_cts_the_clock_decides() {
+        let mut pacing = Pacing::new(ms(0), Pace::CAREFUL);
+        assert!(pacing.is_ready(ms(0)));
+        pacing.wrote(ms(0), false);
+        assert_eq!((pacing.is_ready(ms(14)), pacing.is_ready(ms(15))), (false, true));
+        pacing.wrote(ms(20), true);
+        assert_eq!((pacing.is_ready(ms(124)), pacing.is_ready(ms(125))), (false, true));
+        pacing.answered();
+        assert!(pacing.is_ready(ms(30)));
+    }
+}

@@ -1,0 +1,80 @@
+//! Which modules are asked next, and whether there is time for it.
+
+use footplate_core::{SensorId, TimeSpan, Timestamp};
+
+use super::codec::Message;
+use super::exchange::{REPLY_ALLOWANCE, SILENCE, longest_poll};
+use super::line::time_on_line;
+use super::readings::Readings;
+use super::s88::CONTACTS_PER_MODULE;
+use super::solenoid::Solenoid;
+
+/// While one module is watched, all are asked this often: a contact elsewhere is kept by its module and so not
+/// missed, only less well dated, and a poll of five modules takes 60 ms, an eighth of the line's time.
+const ALL_EVERY: TimeSpan = TimeSpan::from_ms(500);
+
+/// How long the line stays held after the time at which the command was to leave; then it is not expected any more.
+const HOLD_GRACE: TimeSpan = TimeSpan::from_ms(10);
+
+/// Bytes of the longest command: the line is kept free for the whole of it, up to its last bit.
+const COMMAND_BYTES: u32 = 2;
+
+/// What is asked for, and when it last was.
+#[derive(Debug, Clone)]
+pub(super) struct Polls {
+    modules: u8,
+    watched: Option<u8>,
+    held_until: Option<Timestamp>,
+    asked_all: Option<Timestamp>,
+}
+
+impl Polls {
+    pub(super) fn new(modules: u8) -> Self {
+        Self { modules, watched: None, held_until: None, asked_all: None }
+    }
+
+    pub(super) fn hold(&mut self, until: Option<Timestamp>) {
+        self.held_until = until;
+    }
+
+    pub(super) fn watch(&mut self, sensor: Option<SensorId>) {
+        let module = sensor.and_then(|sensor| u8::try_from(sensor.0 / CONTACTS_PER_MODULE + 1).ok());
+        self.watched = module.filter(|module| *module <= self.modules);
+    }
+
+    pub(super) fn asked(&mut self, at: Timestamp, request: Message) {
+        if matches!(request, Message::ReadModules { .. }) {
+            self.asked_all = Some(at);
+        }
+    }
+
+    /// When the hold ends by itself.
+    pub(super) fn hold_lapses(&self) -> Option<Timestamp> {
+        self.held_until.map(|until| until + HOLD_GRACE)
+    }
+
+    /// The request for now, unless the line is wanted for something else before it could end.
+    pub(super) fn next(
+        &mut self,
+        now: Timestamp,
+        readings: &Readings,
+        solenoid: &Solenoid,
+        allowance: TimeSpan,
+    ) -> Option<Message> {
+        if self.hold_lapses().is_some_and(|lapses| now >= lapses) {
+            self.held_until = None;
+        }
+        let free_until = self.held_until.map(|until| until - time_on_line(COMMAND_BYTES));
+        let latest_release = solenoid.latest();
+        let fits = |request: &Message| {
+            free_until.is_none_or(|until| now + longest_poll(*request, REPLY_ALLOWANCE) <= until)
+                // A coil bears no lost reply either.
+                && latest_release.is_none_or(|latest| now + longest_poll(*request, allowance) + SILENCE <= latest)
+        };
+        let all = Message::ReadModules { count: self.modules };
+        let all_due = self.asked_all.is_none_or(|asked| now - asked >= ALL_EVERY);
+        let one = self.watched.unwrap_or_else(|| readings.oldest());
+        let first = if self.watched.is_none() || all_due { Some(all) } else { None };
+        first.into_iter().chain([Message::ReadModule { module: one }]).find(fits)
+    }
+}

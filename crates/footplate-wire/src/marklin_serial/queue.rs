@@ -1,0 +1,187 @@
+//! Commands that wait for the line: what stops goes first, what is outdated goes not at all.
+
+use alloc::collections::VecDeque;
+
+use footplate_core::{Command, SpeedStep, TrainId};
+
+/// More than this is no plan but a mistake: at 9 ms each it is more than two seconds of nothing but commands.
+const LONGEST: usize = 256;
+
+/// The commands that wait, in the order in which they go.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Queue {
+    /// Power off and speed 0.
+    urgent: VecDeque<Command>,
+    usual: VecDeque<Command>,
+}
+
+impl Queue {
+    /// Puts a command where it belongs; refuses it with the number of those that wait if there are too many.
+    pub(super) fn push(&mut self, command: Command) -> Result<(), usize> {
+        match command {
+            Command::PowerOff => {
+                self.usual.retain(|waiting| *waiting != Command::PowerOn);
+                self.urgent.retain(|waiting| *waiting != Command::PowerOff);
+                self.urgent.push_front(command);
+            }
+            Command::Speed { train, step: SpeedStep::STAND } => {
+                self.usual.retain(|waiting| !is_speed_of(waiting, train));
+                if !self.urgent.contains(&command) {
+                    self.urgent.push_back(command);
+                }
+            }
+            Command::Speed { train, .. } => {
+                let last = self.usual.iter_mut().rfind(|waiting| concerns(waiting, train));
+                match last {
+                    Some(waiting) if is_speed_of(waiting, train) => *waiting = command,
+                    // What comes before the turn keeps its place before the turn.
+                    Some(_) => self.push_usual(command)?,
+                    None => {
+                        self.push_usual(command)?;
+                        self.urgent.retain(|waiting| !is_speed_of(waiting, train));
+                    }
+                }
+            }
+            Command::Turnout { turnout, .. } => {
+                self.usual.retain(
+                    |waiting| !matches!(waiting, Command::Turnout { turnout: other, .. } if *other == turnout),
+                );
+                self.push_usual(command)?;
+            }
+            Command::PowerOn => {
+                self.usual.retain(|waiting| *waiting != Command::PowerOn);
+                self.push_usual(command)?;
+            }
+            Command::Reverse { .. } => self.push_usual(command)?,
+        }
+        Ok(())
+    }
+
+    fn push_usual(&mut self, command: Command) -> Result<(), usize> {
+        if self.usual.len() >= LONGEST {
+            return Err(self.usual.len());
+        }
+        self.usual.push_back(command);
+        Ok(())
+    }
+
+    /// What was said already and goes again, unless something newer waits.
+    pub(super) fn push_again(&mut self, command: Command) -> bool {
+        let outdated = self.urgent.iter().chain(&self.usual).any(|waiting| match (command, waiting) {
+            (Command::Speed { train, .. }, waiting) => concerns(waiting, train),
+            (Command::Turnout { turnout, .. }, Command::Turnout { turnout: other, .. }) => turnout == *other,
+            _ => false,
+        });
+        !outdated && self.push(command).is_ok()
+    }
+
+    pub(super) fn next_urgent(&mut self) -> Option<Command> {
+        self.urgent.pop_front()
+    }
+
+    /// The next of the rest; turnouts wait in their order while one is powered.
+    pub(super) fn next_usual(&mut self, solenoid_powered: bool) -> Option<Command> {
+        let may_go = |waiting: &Command| !(solenoid_powered && matches!(waiting, Command::Turnout { .. }));
+        let at = self.usual.iter().position(may_go)?;
+        self.usual.remove(at)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.urgent.is_empty() && self.usual.is_empty()
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.urgent.clear();
+        self.usual.clear();
+    }
+}
+
+fn is_speed_of(command: &Command, of: TrainId) -> bool {
+    matches!(command, Command::Speed { train, .. } if *train == of)
+}
+
+fn concerns(command: &Command, of: TrainId) -> bool {
+    is_speed_of(command, of) || *command == Command::Reverse { train: of }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use footplate_core::TurnoutId;
+
+    use super::*;
+
+    const T24: TrainId = TrainId(24);
+    const REVERSE: Command = Command::Reverse { train: T24 };
+
+    fn speed(train: TrainId, step: u8) -> Command {
+        Command::Speed { train, step: SpeedStep::new(step).expect("a step") }
+    }
+
+    fn turnout(number: u16) -> Command {
+        Command::Turnout { turnout: TurnoutId(number), curved: true }
+    }
+
+    fn order(commands: &[Command]) -> Vec<Command> {
+        let mut queue = Queue::default();
+        for command in commands {
+            queue.push(*command).expect("few commands");
+        }
+        core::iter::from_fn(|| queue.next_urgent().or_else(|| queue.next_usual(false))).collect()
+    }
+
+    #[test]
+    fn what_stops_goes_first() {
+        let said = [turnout(3), speed(T24, 8), speed(TrainId(58), 0), Command::PowerOff];
+        assert_eq!(order(&said), [Command::PowerOff, speed(TrainId(58), 0), turnout(3), speed(T24, 8)]);
+    }
+
+    #[test]
+    fn a_newer_step_replaces_the_one_that_waits() {
+        assert_eq!(order(&[speed(T24, 8), turnout(3), speed(T24, 9)]), [speed(T24, 9), turnout(3)]);
+        assert_eq!(order(&[speed(T24, 8), speed(T24, 0)]), [speed(T24, 0)]);
+        assert_eq!(order(&[speed(T24, 0), speed(T24, 8)]), [speed(T24, 8)]);
+    }
+
+    #[test]
+    fn steps_never_pass_a_turn() {
+        assert_eq!(order(&[speed(T24, 0), REVERSE, speed(T24, 8)]), [speed(T24, 0), REVERSE, speed(T24, 8)]);
+        assert_eq!(
+            order(&[speed(T24, 3), REVERSE, speed(T24, 8), speed(T24, 9)]),
+            [speed(T24, 3), REVERSE, speed(T24, 9)]
+        );
+        // But a stop is a stop: no step that waited comes after it.
+        assert_eq!(order(&[REVERSE, speed(T24, 8), speed(T24, 0)]), [speed(T24, 0), REVERSE]);
+    }
+
+    #[test]
+    fn turnouts_wait_for_the_coil_and_steps_do_not() {
+        let mut queue = Queue::default();
+        for command in [turnout(3), turnout(4), speed(T24, 8)] {
+            queue.push(command).expect("few commands");
+        }
+        assert_eq!(queue.next_usual(true), Some(speed(T24, 8)));
+        assert_eq!(queue.next_usual(true), None);
+        assert_eq!(queue.next_usual(false), Some(turnout(3)));
+    }
+
+    #[test]
+    fn what_is_said_again_never_overrides_what_is_newer() {
+        let mut queue = Queue::default();
+        queue.push(speed(T24, 0)).expect("few commands");
+        assert!(!queue.push_again(speed(T24, 8)));
+        assert!(queue.push_again(speed(TrainId(58), 8)));
+    }
+
+    #[test]
+    fn a_flood_is_refused() {
+        let mut queue = Queue::default();
+        for train in 0..LONGEST {
+            let train = TrainId(u16::try_from(train).expect("few trains"));
+            assert_eq!(queue.push(Command::Reverse { train }), Ok(()));
+        }
+        assert_eq!(queue.push(REVERSE), Err(LONGEST));
+        assert_eq!(queue.push(speed(T24, 0)), Ok(()), "a stop is always taken");
+    }
+}

@@ -1,0 +1,365 @@
+//! Speaks with the interface: commands before polls, one poll at a time, and every solenoid released.
+
+mod hearing;
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+
+use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
+
+use super::codec::{EncodeError, Message};
+use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, Sending};
+use super::farewell::Farewell;
+use super::pacing::Pacing;
+use super::polls::Polls;
+use super::queue::Queue;
+use super::readings::Readings;
+use super::settings::Settings;
+use super::silence::Silence;
+use super::solenoid::Solenoid;
+use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
+
+/// How long CTS may be down before a person should know: no message and no reply takes so long.
+const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
+
+/// Commands since the last reply that are said again if the next is lost; older ones were long acted on.
+const SAID_AGAIN: usize = 16;
+
+/// The program's side of the line to a 6050 or 6051.
+///
+/// It opens with what brings an interface into step that waits for a second byte: power on twice (the first may be
+/// swallowed), solenoid off, reset mode on.
+#[derive(Debug, Clone)]
+pub struct Interface {
+    settings: Settings,
+    now: Timestamp,
+    pacing: Pacing,
+    exchange: Exchange,
+    reply: Reply,
+    waiting: Queue,
+    solenoid: Solenoid,
+    readings: Readings,
+    polls: Polls,
+    silence: Silence,
+    /// What still has to be said to bring the interface into step.
+    recovery: VecDeque<Message>,
+    /// What was told since the last whole reply.
+    unanswered: Vec<Command>,
+    farewell: Farewell,
+    /// Whether the track is meant to have power.
+    power: bool,
+    /// Bytes that nobody asked for, since it was last said.
+    stray: usize,
+    /// Whether the line has to fall silent before the next poll.
+    disturbed: bool,
+    said_not_ready: bool,
+    output: VecDeque<Transmit>,
+}
+
+impl Interface {
+    /// A session over a line that has just been opened.
+    ///
+    /// # Errors
+    ///
+    /// When no bus has so many modules, or none.
+    pub fn new(now: Timestamp, settings: Settings) -> Result<Self, EncodeError> {
+        Message::ReadModules { count: settings.modules }.encode()?;
+        let mut interface = Self {
+            settings,
+            now,
+            pacing: Pacing::new(now, settings.pace),
+            exchange: Exchange::Free,
+            reply: Reply::empty(),
+            waiting: Queue::default(),
+            solenoid: Solenoid::default(),
+            readings: Readings::new(settings.modules),
+            polls: Polls::new(settings.modules),
+            silence: Silence::default(),
+            recovery: VecDeque::new(),
+            unanswered: Vec::new(),
+            farewell: Farewell::default(),
+            power: true,
+            stray: 0,
+            disturbed: false,
+            said_not_ready: false,
+            output: VecDeque::new(),
+        };
+        interface.recover();
+        Ok(interface)
+    }
+
+    /// Queues what brings the interface into step. The first byte may be swallowed as the second of something.
+    fn recover(&mut self) {
+        let power = if self.power { Message::Go } else { Message::Stop };
+        self.recovery.clear();
+        self.recovery.extend([power, power]);
+        if !self.solenoid.is_powered() {
+            // The swallowed byte may have thrown a turnout.
+            self.recovery.push_back(Message::SolenoidOff);
+        }
+        self.recovery.push_back(Message::ResetMode { on: true });
+    }
+
+    /// Goes on as far as the clock allows.
+    fn go_on(&mut self, now: Timestamp) {
+        self.now = now;
+        self.watch_hand_shake(now);
+        while match self.exchange {
+            Exchange::Free => self.begin(now),
+            Exchange::Sending(sending) => self.send(now, sending),
+            Exchange::Awaiting(awaited) => now >= awaited.until && self.lose(now, awaited),
+            Exchange::Settling(awaited) => now >= awaited.until && self.accept(awaited),
+            Exchange::Quiet(quiet) => self.keep_quiet(now, quiet),
+        } {}
+    }
+
+    fn watch_hand_shake(&mut self, now: Timestamp) {
+        match self.pacing.down_since() {
+            Some(since) if now - since >= NOT_READY_AFTER && !self.said_not_ready => {
+                self.said_not_ready = true;
+                self.notify(LinkNotice::NotReady { since: now - since });
+            }
+            None => self.said_not_ready = false,
+            Some(_) => {}
+        }
+    }
+
+    /// Begins what is next, if the line may be used; returns whether it did.
+    fn begin(&mut self, now: Timestamp) -> bool {
+        if !self.pacing.is_ready(now) {
+            return false;
+        }
+        let next = self.next_purpose(now);
+        if let Some((message, purpose)) = next
+            && let Ok(frame) = message.encode()
+        {
+            self.exchange = Exchange::Sending(Sending { frame, purpose, sent: 0, written: now });
+            self.write(now);
+            return true;
+        }
+        matches!(self.exchange, Exchange::Quiet(_))
+    }
+
+    fn next_purpose(&mut self, now: Timestamp) -> Option<(Message, Purpose)> {
+        if let Some(message) = self.recovery.pop_front() {
+            return Some((message, Purpose::Recovery));
+        }
+        if self.solenoid.hurries(now) {
+            return Some((Message::SolenoidOff, Purpose::Release));
+        }
+        if let Some(command) = self.waiting.next_urgent() {
+            return Some((self.message(command), Purpose::Told(command)));
+        }
+        if self.farewell.begun {
+            return self.next_of_closing(now);
+        }
+        if self.solenoid.due().is_some_and(|due| now >= due) {
+            return Some((Message::SolenoidOff, Purpose::Release));
+        }
+        if let Some(command) = self.waiting.next_usual(self.solenoid.is_powered()) {
+            return Some((self.message(command), Purpose::Told(command)));
+        }
+        if core::mem::take(&mut self.disturbed) {
+            self.recover();
+            self.exchange = Exchange::Quiet(Quiet::begin(now, false));
+            return None;
+        }
+        let request = self.polls.next(now, &self.readings, &self.solenoid, self.settings.reply_allowance)?;
+        Some((request, Purpose::Poll(request)))
+    }
+
+    fn next_of_closing(&self, now: Timestamp) -> Option<(Message, Purpose)> {
+        if !self.farewell.released {
+            let may_release = self.solenoid.earliest().is_none_or(|earliest| now >= earliest);
+            return may_release.then_some((Message::SolenoidOff, Purpose::Release));
+        }
+        (!self.farewell.is_over()).then_some((Message::Stop, Purpose::PowerAtClose))
+    }
+
+    fn message(&self, command: Command) -> Message {
+        let light = self.settings.light;
+        match command {
+            Command::Speed { train, step } => Message::Drive { train, step, light },
+            Command::Reverse { train } => Message::Reverse { train, light },
+            Command::Turnout { turnout, curved } => Message::Turnout { turnout, curved },
+            Command::PowerOff => Message::Stop,
+            Command::PowerOn => Message::Go,
+        }
+    }
+
+    /// Writes the next byte of the frame on its way, if there is one.
+    fn write(&mut self, now: Timestamp) {
+        if let Exchange::Sending(sending) = &mut self.exchange
+            && let Some(byte) = sending.next_byte()
+        {
+            sending.sent += 1;
+            sending.written = now;
+            let ends_frame = sending.next_byte().is_none();
+            self.pacing.wrote(now, ends_frame);
+            self.output.push_back(Transmit::Byte(byte));
+        }
+    }
+
+    /// Goes on with a frame; returns whether something has changed.
+    fn send(&mut self, now: Timestamp, sending: Sending) -> bool {
+        if now < sending.gone() {
+            return false;
+        }
+        if sending.next_byte().is_none() {
+            self.left(sending);
+            return true;
+        }
+        let ready = self.pacing.is_ready(now);
+        if ready {
+            self.write(now);
+        }
+        ready
+    }
+
+    /// The last bit of a frame has left.
+    fn left(&mut self, sending: Sending) {
+        let at = sending.gone();
+        self.exchange = Exchange::Free;
+        match sending.purpose {
+            Purpose::Recovery => {}
+            Purpose::Release => {
+                if let Some((turnout, held)) = self.solenoid.release(at) {
+                    self.notify(LinkNotice::SolenoidLate { turnout, held });
+                }
+                self.farewell.released = self.farewell.begun;
+            }
+            Purpose::Told(command) => self.told(at, command),
+            Purpose::Poll(request) => {
+                self.reply.clear();
+                self.silence.asked(at);
+                self.polls.asked(at, request);
+                self.exchange = Exchange::Awaiting(Awaited::new(request, at, self.settings.reply_allowance));
+            }
+            Purpose::PowerAtClose => {
+                self.farewell.said_power_off();
+                if self.farewell.is_over() {
+                    let closing = self.closing();
+                    self.notify(LinkNotice::Closed(closing));
+                }
+            }
+        }
+    }
+
+    fn told(&mut self, at: Timestamp, command: Command) {
+        let kind = match command {
+            Command::Speed { train, step } => {
+                self.farewell.told(train, step);
+                Some(EventKind::Speed { train, step })
+            }
+            Command::Reverse { train } => Some(EventKind::Reverse { train }),
+            Command::Turnout { turnout, curved } => {
+                self.solenoid.power(turnout, at);
+                Some(EventKind::Turnout { turnout, curved })
+            }
+            Command::PowerOff | Command::PowerOn => {
+                self.power = command == Command::PowerOn && !self.farewell.begun;
+                None
+            }
+        };
+        if self.unanswered.len() >= SAID_AGAIN {
+            self.unanswered.remove(0);
+        }
+        self.unanswered.push(command);
+        self.output.extend(kind.map(|kind| Transmit::Event(Event { time: at, kind })));
+    }
+
+    fn notify(&mut self, notice: LinkNotice) {
+        self.output.push_back(Transmit::Notice(notice));
+    }
+
+    /// The time at which there may be something to do while the line is free.
+    fn free_timeout(&self) -> Option<Timestamp> {
+        if let Some(ready) = self.pacing.ready_at().filter(|ready| *ready > self.now) {
+            return Some(ready);
+        }
+        match &self.farewell {
+            farewell if farewell.is_over() => None,
+            farewell if farewell.begun => self.solenoid.earliest(),
+            _ => [self.polls.hold_lapses(), self.solenoid.due()].into_iter().flatten().min(),
+        }
+    }
+}
+
+impl Session for Interface {
+    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
+        if let Exchange::Sending(sending) = self.exchange
+            && sending.next_byte().is_none()
+            && now >= sending.gone()
+        {
+            // The reply may come before the clock was looked at.
+            self.left(sending);
+        }
+        for byte in bytes {
+            self.hear(now, *byte);
+        }
+        self.go_on(now);
+    }
+
+    fn handle_cts(&mut self, now: Timestamp, up: bool) {
+        self.pacing.cts(now, up);
+        self.go_on(now);
+    }
+
+    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        if self.farewell.begun {
+            return Err(CommandError::Closed);
+        }
+        self.message(command).encode()?;
+        if let Command::Speed { train, step } = command {
+            self.farewell.will_tell(train, step);
+        }
+        self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
+        self.go_on(now);
+        Ok(())
+    }
+
+    fn hold_line(&mut self, until: Option<Timestamp>) {
+        self.polls.hold(until);
+    }
+
+    fn watch(&mut self, sensor: Option<SensorId>) {
+        self.polls.watch(sensor);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.go_on(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Transmit> {
+        self.output.pop_front()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        let next = match &self.exchange {
+            Exchange::Free => self.free_timeout(),
+            Exchange::Sending(sending) if self.now < sending.gone() => Some(sending.gone()),
+            Exchange::Sending(_) => self.pacing.ready_at(),
+            Exchange::Awaiting(awaited) | Exchange::Settling(awaited) => Some(awaited.until),
+            Exchange::Quiet(quiet) => Some(quiet.until),
+        };
+        let alarm = self.pacing.down_since().filter(|_| !self.said_not_ready);
+        let alarm = alarm.map(|since| since + NOT_READY_AFTER);
+        next.into_iter().chain(alarm).filter(|at| *at > self.now).min()
+    }
+
+    fn close(&mut self, now: Timestamp) {
+        if !self.farewell.begun {
+            self.waiting.clear();
+            self.power = false;
+            for stop in self.farewell.begin() {
+                // Stops are always taken.
+                let _ = self.waiting.push(stop);
+            }
+        }
+        self.go_on(now);
+    }
+
+    fn closing(&self) -> Closing {
+        self.farewell.statement(self.pacing.has_hand_shake())
+    }
+}

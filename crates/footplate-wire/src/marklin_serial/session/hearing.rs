@@ -1,0 +1,123 @@
+//! What becomes of the bytes that come: whole replies are read, all others dropped and the line brought into step.
+
+use footplate_core::{Command, Timestamp};
+
+use super::super::exchange::{Awaited, Exchange, Quiet, reply_bytes};
+use super::super::readings::Read;
+use super::super::s88::decode_reply;
+use super::Interface;
+use crate::session::{LinkNotice, Transmit};
+
+impl Interface {
+    /// A reply did not come whole in time.
+    pub(super) fn lose(&mut self, now: Timestamp, awaited: Awaited) -> bool {
+        let found = self.reply.as_bytes().len();
+        self.notify(LinkNotice::ReplyLost { expected: reply_bytes(awaited.request), found });
+        self.silence.heard_stray(found);
+        self.disturbed = false;
+        let silent = self.silence.lost(now);
+        self.output.extend(silent.map(Transmit::Notice));
+        self.exchange = Exchange::Quiet(Quiet::begin(now, true));
+        self.recover();
+        self.say_again();
+        true
+    }
+
+    /// What the interface may have missed before the lost reply.
+    fn say_again(&mut self) {
+        for command in core::mem::take(&mut self.unanswered) {
+            match command {
+                Command::Reverse { train } => self.notify(LinkNotice::ReverseInDoubt { train }),
+                // Said by the recovery.
+                Command::PowerOff | Command::PowerOn => {}
+                Command::Speed { .. } | Command::Turnout { .. } if self.farewell.begun => {}
+                Command::Speed { .. } | Command::Turnout { .. } => {
+                    if self.waiting.push_again(command) {
+                        self.notify(LinkNotice::Repeated { command });
+                    }
+                }
+            }
+        }
+    }
+
+    /// A reply came whole and nothing more with it.
+    pub(super) fn accept(&mut self, awaited: Awaited) -> bool {
+        if let Ok(states) = decode_reply(awaited.request, self.reply.as_bytes()) {
+            for state in states {
+                self.readings.take(awaited.asked, state, |read| {
+                    self.output.push_back(match read {
+                        Read::Closed(event) => Transmit::Event(event),
+                        Read::Held(sensor) => Transmit::Notice(LinkNotice::HeldClosed { sensor }),
+                    });
+                });
+            }
+        }
+        let answers = self.silence.answered();
+        self.output.extend(answers.map(Transmit::Notice));
+        self.unanswered.clear();
+        self.pacing.answered();
+        self.exchange = Exchange::Free;
+        true
+    }
+
+    pub(super) fn keep_quiet(&mut self, now: Timestamp, quiet: Quiet) -> bool {
+        let is_over = now >= quiet.until;
+        let interrupted = !quiet.in_doubt && (self.farewell.begun || !self.waiting.is_empty());
+        if is_over {
+            self.complain();
+        } else if interrupted {
+            // The interface is in step; only what it answers was disturbed. The silence begins anew after this.
+            self.recovery.clear();
+            self.disturbed = true;
+        }
+        if is_over || interrupted {
+            self.exchange = Exchange::Free;
+        }
+        is_over || interrupted
+    }
+
+    fn complain(&mut self) {
+        if self.stray > 0 {
+            self.notify(LinkNotice::UnexpectedBytes { count: self.stray });
+            self.stray = 0;
+        }
+    }
+
+    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+        match &mut self.exchange {
+            Exchange::Awaiting(awaited) => {
+                let awaited = *awaited;
+                self.reply.push(byte);
+                if self.reply.as_bytes().len() == reply_bytes(awaited.request) {
+                    self.heard_all(now, awaited);
+                }
+            }
+            Exchange::Settling(awaited) => {
+                let expected = reply_bytes(awaited.request);
+                self.notify(LinkNotice::ReplyLost { expected, found: expected + 1 });
+                self.exchange = Exchange::Quiet(Quiet::begin(now, false));
+                self.recover();
+            }
+            Exchange::Quiet(quiet) => {
+                quiet.disturb(now);
+                self.stray += 1;
+                self.silence.heard_stray(1);
+            }
+            Exchange::Free | Exchange::Sending(_) => {
+                self.disturbed = true;
+                self.stray += 1;
+                self.silence.heard_stray(1);
+            }
+        }
+    }
+
+    fn heard_all(&mut self, now: Timestamp, awaited: Awaited) {
+        let states = decode_reply(awaited.request, self.reply.as_bytes());
+        let news = states.is_ok_and(|mut states| states.any(|state| self.readings.shows_new(state)));
+        if news {
+            self.exchange = Exchange::Settling(awaited.settling(now));
+        } else {
+            self.accept(awaited);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Whether the station answers at all, and since when it does not.
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use crate::session::LinkNotice;
+
+/// After so long without a whole reply a person should know. Long enough for a handful of polls to be lost by chance
+/// and asked again, short enough to act while trains still run.
+const SILENT_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
+
+/// Fewer lost polls than this are no silence, however far apart they were.
+const LOST_AT_LEAST: u32 = 3;
+
+/// The watch over the station's answers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Silence {
+    /// The first request that was not answered since the last that was.
+    since: Option<Timestamp>,
+    lost: u32,
+    bytes: usize,
+    /// What was said of it last.
+    said: Option<Said>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Said {
+    Answers,
+    Silent,
+}
+
+impl Silence {
+    pub(super) fn asked(&mut self, at: Timestamp) {
+        self.since.get_or_insert(at);
+    }
+
+    pub(super) fn heard_stray(&mut self, bytes: usize) {
+        self.bytes = self.bytes.saturating_add(bytes);
+    }
+
+    /// A whole reply has come; says so when that is news.
+    pub(super) fn answered(&mut self) -> Option<LinkNotice> {
+        (self.since, self.lost, self.bytes) = (None, 0, 0);
+        let news = self.said != Some(Said::Answers);
+        self.said = Some(Said::Answers);
+        news.then_some(LinkNotice::Answers)
+    }
+
+    /// A reply was lost; says so when it is the last straw.
+    pub(super) fn lost(&mut self, now: Timestamp) -> Option<LinkNotice> {
+        self.lost = self.lost.saturating_add(1);
+        let since = now - self.since?;
+        let silent = since >= SILENT_AFTER && self.lost >= LOST_AT_LEAST && self.said != Some(Said::Silent);
+        if !silent {
+            return None;
+        }
+        self.said = Some(Said::Silent);
+        Some(LinkNotice::Silent { since, bytes: self.bytes })
+    }
+}

@@ -1,0 +1,61 @@
+//! The one coil that may be powered at a time, and when it has to be released.
+
+use footplate_core::{TimeSpan, Timestamp, TurnoutId};
+
+use super::line::{BYTE_TIME, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST};
+
+/// How long a solenoid is powered where the line allows it: Märklin's text says about 150 ms.
+const HOLD: TimeSpan = TimeSpan::from_ms(150);
+
+/// From here on a release goes before everything, emergency stops too: as many of them as there are trains would take
+/// longer than the coil bears, and one byte delays them by 5 ms.
+const HURRY_AFTER: TimeSpan = TimeSpan::from_ms(300);
+
+/// The solenoid that is powered, if one is.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Solenoid {
+    powered: Option<(TurnoutId, Timestamp)>,
+}
+
+impl Solenoid {
+    /// The last bit of its turnout's command has left.
+    pub(super) fn power(&mut self, turnout: TurnoutId, at: Timestamp) {
+        self.powered = Some((turnout, at));
+    }
+
+    /// It was released; returns what was powered for longer than it bears.
+    pub(super) fn release(&mut self, at: Timestamp) -> Option<(TurnoutId, TimeSpan)> {
+        let (turnout, since) = self.powered.take()?;
+        let held = at - since;
+        (held > SOLENOID_HOLD_LONGEST).then_some((turnout, held))
+    }
+
+    pub(super) fn is_powered(&self) -> bool {
+        self.powered.is_some()
+    }
+
+    fn since(&self) -> Option<Timestamp> {
+        self.powered.map(|(_, since)| since)
+    }
+
+    /// When to write its release.
+    pub(super) fn due(&self) -> Option<Timestamp> {
+        Some(self.since()? + HOLD)
+    }
+
+    /// The same where nothing else is to come any more: as soon as the turnout is sure to have moved. The byte is on
+    /// the line for a while more.
+    pub(super) fn earliest(&self) -> Option<Timestamp> {
+        Some(self.since()? + SOLENOID_HOLD_SHORTEST)
+    }
+
+    pub(super) fn hurries(&self, now: Timestamp) -> bool {
+        self.since().is_some_and(|since| now - since >= HURRY_AFTER)
+    }
+
+    /// When the line has to be free for its release at the latest: a whole command may be under way by then.
+    pub(super) fn latest(&self) -> Option<Timestamp> {
+        const ROOM: i64 = 4;
+        Some(self.since()? + SOLENOID_HOLD_LONGEST - TimeSpan::from_ns(BYTE_TIME.as_ns() * ROOM))
+    }
+}

@@ -1,0 +1,279 @@
+//! A command station spoken to without a socket: bytes and commands in, bytes and entries of the recording out.
+
+use alloc::vec::Vec;
+use core::fmt::{Display, Formatter, Result as FmtResult};
+
+use footplate_core::{Command, Event, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
+
+use crate::marklin_serial::EncodeError;
+
+/// What the loop around a command station's line hands over and asks for.
+///
+/// Every `handle_…` may make outputs: take them with [`poll_output`](Self::poll_output) until there are none, at
+/// once, because a byte counts as written at the `now` of the call before. Then wait for whatever comes first, a byte,
+/// the hand-shake or [`next_timeout`](Self::next_timeout).
+pub trait Session {
+    /// Bytes have come from the station.
+    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]);
+
+    /// The station's hand-shake line is `up` (bytes may come) now; also said once at the beginning.
+    fn handle_cts(&mut self, now: Timestamp, up: bool);
+
+    /// Say this to the station as soon as the line is free.
+    ///
+    /// # Errors
+    ///
+    /// When the station has no bytes for it, too much is waiting already, or the session is being closed. Nothing is
+    /// said then.
+    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
+
+    /// A command is expected to leave at this time: begin no poll that could still occupy the line then. A later
+    /// word replaces an earlier one; `None` takes it back.
+    fn hold_line(&mut self, until: Option<Timestamp>);
+
+    /// Ask for the module of this contact often, for others now and then. `None`: for all alike.
+    fn watch(&mut self, sensor: Option<SensorId>);
+
+    /// The time has come that was asked for, or it is a good moment to look at the clock anyway.
+    fn handle_timeout(&mut self, now: Timestamp);
+
+    /// The next thing to do, until `None`.
+    fn poll_output(&mut self) -> Option<Transmit>;
+
+    /// When it wants to be asked again; later than the last `now` once all outputs are taken. `None`: only when
+    /// something comes.
+    fn next_timeout(&self) -> Option<Timestamp>;
+
+    /// Stop every train that was ever told a step, release what is powered, take the power from the track, and ask
+    /// for nothing more. What was waiting is dropped. [`LinkNotice::Closed`] says when it is done.
+    fn close(&mut self, now: Timestamp);
+
+    /// How far the closing has come; all that was not told yet if [`close`](Self::close) was never called.
+    fn closing(&self) -> Closing;
+}
+
+/// What a session asks of the loop around it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Transmit {
+    /// Write this byte now.
+    Byte(u8),
+    /// An entry of the recording: a contact was reported, a command has left.
+    Event(Event),
+    /// For people to know.
+    Notice(LinkNotice),
+}
+
+/// What a person should know about the line.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum LinkNotice {
+    /// The station has answered for the first time, or again after a silence.
+    Answers,
+    /// A reply did not come whole; it was dropped, and the station is asked again.
+    ReplyLost {
+        /// Bytes that were asked for.
+        expected: usize,
+        /// Bytes that came.
+        found: usize,
+    },
+    /// Bytes came that nobody asked for; what came with them was dropped, and the line is brought back into step.
+    UnexpectedBytes {
+        /// How many since the last such notice.
+        count: usize,
+    },
+    /// Nothing that was asked has been answered for a while.
+    Silent {
+        /// For how long.
+        since: TimeSpan,
+        /// Bytes that came in that time; none of them made a whole reply.
+        bytes: usize,
+    },
+    /// The station has kept its hand-shake line down, and nothing may be written.
+    NotReady {
+        /// For how long.
+        since: TimeSpan,
+    },
+    /// A command went out shortly before a reply was lost, and was said again.
+    Repeated {
+        /// The command.
+        command: Command,
+    },
+    /// A train was told to turn around shortly before a reply was lost. It is not said again, because a second time
+    /// would turn it back, and cannot be read back: see which way it faces.
+    ReverseInDoubt {
+        /// The train.
+        train: TrainId,
+    },
+    /// This contact was closed when the line was opened and still is: a train stands on it, or it is stuck.
+    /// It is reported when it has been open and closes again.
+    HeldClosed {
+        /// The contact.
+        sensor: SensorId,
+    },
+    /// The solenoid of a turnout has been powered for longer than it bears.
+    SolenoidLate {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// How long it was powered.
+        held: TimeSpan,
+    },
+    /// The session is closed; nothing more will be written.
+    Closed(Closing),
+}
+
+/// What the station was told at the end, and whether anything says that it heard.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Closing {
+    /// Trains that were told to stand.
+    pub told_to_stand: Vec<TrainId>,
+    /// Trains that run or may run and were not told to stand.
+    pub not_told: Vec<TrainId>,
+    /// Whether the solenoids were released.
+    pub solenoids_released: bool,
+    /// Whether the power was taken from the track.
+    pub power_off: bool,
+    /// Whether the station took the bytes by its hand-shake; more than that, this line never confirms.
+    pub hand_shaken: bool,
+}
+
+impl Closing {
+    /// Whether everything was said that had to be.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.not_told.is_empty() && self.solenoids_released && self.power_off
+    }
+}
+
+/// Why a command was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CommandError {
+    /// The station has no bytes for it.
+    Encode(EncodeError),
+    /// This many commands wait already; the line is stuck or is told more than it can carry.
+    TooManyWaiting(usize),
+    /// The session is closed or being closed.
+    Closed,
+}
+
+impl From<EncodeError> for CommandError {
+    fn from(error: EncodeError) -> Self {
+        Self::Encode(error)
+    }
+}
+
+impl Display for CommandError {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        match self {
+            Self::Encode(error) => error.fmt(f),
+            Self::TooManyWaiting(count) => {
+                write!(f, "{count} commands wait for the line already; wait until some of them have left")
+            }
+            Self::Closed => f.write_str("the link is being closed; open it again to command trains"),
+        }
+    }
+}
+
+impl core::error::Error for CommandError {}
+
+impl Display for LinkNotice {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        let ms = |span: TimeSpan| span.as_ms();
+        match self {
+            Self::Answers => f.write_str("the station answers"),
+            Self::ReplyLost { expected, found } => {
+                write!(f, "a sensor reply of {found} bytes instead of {expected}; dropped, asked again")
+            }
+            Self::UnexpectedBytes { count } => write!(
+                f,
+                "{count} bytes came that nobody asked for; dropped, and the line is brought back into step"
+            ),
+            Self::Silent { since, bytes: 0 } => write!(
+                f,
+                "the station has answered nothing for {:.1} s; check its power, the cable and the port",
+                since.as_s()
+            ),
+            Self::Silent { since, bytes } => write!(
+                f,
+                "no whole reply for {:.1} s, only {bytes} stray bytes; check the line's speed (2400 baud, 8 data \
+                 bits, no parity, 2 stop bits) and the number of sensor modules",
+                since.as_s()
+            ),
+            Self::NotReady { since } => write!(
+                f,
+                "the station has not been ready for {:.1} s (CTS is down); check its power and the cable, or try \
+                 the timed mode if the adapter has no CTS",
+                since.as_s()
+            ),
+            Self::Repeated { command } => {
+                write!(f, "said again, because a reply was lost after it: {}", Said(*command))
+            }
+            Self::ReverseInDoubt { train } => write!(
+                f,
+                "train {train} was told to turn around just before a reply was lost; it may face either way"
+            ),
+            Self::HeldClosed { sensor } => {
+                write!(f, "contact {sensor} is closed from the start: a train stands on it, or it is stuck")
+            }
+            Self::SolenoidLate { turnout, held } => write!(
+                f,
+                "turnout {turnout} was powered for {:.0} ms; feel whether its coil is hot",
+                ms(*held)
+            ),
+            Self::Closed(closing) => closing.fmt(f),
+        }
+    }
+}
+
+/// A command in words.
+struct Said(Command);
+
+impl Display for Said {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        match self.0 {
+            Command::Speed { train, step } => write!(f, "train {train} step {step}"),
+            Command::Reverse { train } => write!(f, "train {train} reverse"),
+            Command::Turnout { turnout, curved } => {
+                write!(f, "turnout {turnout} {}", if curved { "curved" } else { "straight" })
+            }
+            Command::PowerOff => f.write_str("power off"),
+            Command::PowerOn => f.write_str("power on"),
+        }
+    }
+}
+
+/// Trains as `24, 58`.
+struct Listed<'l>(&'l [TrainId]);
+
+impl Display for Listed<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        for (at, train) in self.0.iter().enumerate() {
+            let comma = if at == 0 { "" } else { ", " };
+            write!(f, "{comma}{train}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for Closing {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        let told = |said| if said { "" } else { "not " };
+        if !self.told_to_stand.is_empty() {
+            write!(f, "told to stand: {}; ", Listed(&self.told_to_stand))?;
+        }
+        if !self.not_told.is_empty() {
+            write!(f, "NOT told to stand and possibly running: {}; ", Listed(&self.not_told))?;
+        }
+        write!(
+            f,
+            "solenoids {}released, track power {}switched off; ",
+            told(self.solenoids_released),
+            told(self.power_off)
+        )?;
+        f.write_str(if self.hand_shaken {
+            "the station took the bytes, and this line confirms no more than that"
+        } else {
+            "nothing on this line confirms that the station heard it: see that the trains stand"
+        })
+    }
+}
