@@ -90,6 +90,14 @@ impl UniformNormal {
         x
     }
 
+    /// The value below which a share `part` of all values lies: the inverse of [`cdf`](Self::cdf).
+    /// `part` is clamped to 1e-12/2 … 1 − 1e-12/2.
+    #[must_use]
+    pub fn quantile(self, part: f64) -> f64 {
+        let from_middle = 2.0 * part - 1.0;
+        libm::copysign(self.half_width(libm::fabs(from_middle)), from_middle)
+    }
+
     /// The variance of the sum: s² + w²/12.
     #[must_use]
     pub fn variance(self) -> f64 {
@@ -108,6 +116,17 @@ mod tests {
         let normal = UniformNormal { deviation: 2.0, width: 0.0 };
         // 1.644 854 σ: the table value of the central 90 %.
         assert!((normal.half_width(0.9) - 2.0 * 1.644_853_627).abs() < 1e-6);
+    }
+
+    #[test]
+    fn quantiles_of_the_normal_are_those_of_the_tables() {
+        let normal = UniformNormal { deviation: 1.0, width: 0.0 };
+        // Abramowitz and Stegun, 1964, table 26.5.
+        for (part, z) in
+            [(0.5, 0.0), (0.95, 1.644_854), (0.99, 2.326_348), (0.999, 3.090_232), (0.05, -1.644_854)]
+        {
+            assert!((normal.quantile(part) - z).abs() < 1e-6, "{part}: {}", normal.quantile(part));
+        }
     }
 
     #[test]

@@ -1,0 +1,131 @@
+//! From which step a train at rest should come to a stop elsewhere.
+
+use alloc::vec::Vec;
+
+use crate::calibration::motion::StepUse;
+use crate::estimation::{Ground, Located, WayPoint};
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Speed};
+
+use super::command_time::{CommandTime, command_time, spread};
+use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::felt_way::contacts_until;
+use super::refusal::Refusal;
+use super::task::Destination;
+
+/// A stop follows a start by at least this: two commands and the poll between them.
+const SHORTEST_RUN: TimeSpan = TimeSpan::from_ms(80);
+/// A move that takes longer than this is not worth its last millimetre.
+const MOVE_LIMIT: TimeSpan = TimeSpan::from_s(30.0);
+/// A report changes a plan within this long (a missed poll, the next, and the command).
+const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
+/// A train that is looked for runs about as fast as this, slow enough to be stopped anywhere.
+const FINDING_SPEED: Speed = Speed::from_mm_per_s(150.0);
+/// Stops before this many standard deviations of the stopping distance leave a margin for the settled stretch.
+const STOP_MARGIN: f64 = 3.0;
+
+impl DrivenTrain {
+    /// The steps that move the train; all that were not found wanting where none is known to.
+    fn usable_steps(&self) -> Vec<SpeedStep> {
+        let steps = || (1..=self.model.highest().get()).filter_map(SpeedStep::new);
+        let known: Vec<SpeedStep> = steps().filter(|step| self.model.uses(*step) == StepUse::Moves).collect();
+        if known.is_empty() {
+            steps().filter(|step| self.model.uses(*step) != StepUse::Unreliable).collect()
+        } else {
+            known
+        }
+    }
+
+    /// The step at which a lost train looks for a contact.
+    pub(super) fn finding_step(&self) -> SpeedStep {
+        let steps = self.usable_steps();
+        let fast_enough =
+            steps.iter().find(|step| self.model.speed(**step, Approach::Below).value >= FINDING_SPEED);
+        fast_enough.or(steps.last()).copied().unwrap_or(self.model.highest())
+    }
+
+    /// The step from which a train at rest comes to rest at a place: the fastest at which it is settled before a
+    /// contact that is passed in time before the command; on shorter ways the one whose rest is surest.
+    pub(super) fn approach_step(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        located: &Located,
+        destination: &Destination,
+    ) -> Result<SpeedStep, Refusal> {
+        let out_of_reach = || Refusal::OutOfReach { target: alloc::string::String::new() };
+        let at = destination.at.ok_or_else(out_of_reach)?;
+        if let Some(step) = destination.step {
+            return match self.short_run(ground, now, at, step, destination) {
+                CommandTime::At(..) => Ok(step),
+                CommandTime::TooLate(_, beyond) => Err(self.too_near(ground, at, beyond, destination)),
+                CommandTime::Never => Err(self.no_way(ground, at.node, destination)),
+            };
+        }
+        let steps = self.usable_steps();
+        let settled = steps.iter().rev().find(|step| self.settles_before(ground, located, at, **step));
+        if let Some(step) = settled {
+            return Ok(*step);
+        }
+        let mut surest: Option<(SpeedStep, Length)> = None;
+        let mut slowest: Option<(SpeedStep, TimeSpan)> = None;
+        let mut nearest: Option<Length> = None;
+        for step in steps {
+            match self.short_run(ground, now, at, step, destination) {
+                CommandTime::At(_, rest) if rest.time - now <= MOVE_LIMIT => {
+                    if surest.is_none_or(|(_, least)| spread(&rest) < least) {
+                        surest = Some((step, spread(&rest)));
+                    }
+                }
+                CommandTime::At(_, rest) => {
+                    let takes = rest.time - now;
+                    if slowest.is_none_or(|(_, least)| takes < least) {
+                        slowest = Some((step, takes));
+                    }
+                }
+                CommandTime::TooLate(_, beyond) => {
+                    nearest = Some(nearest.map_or(beyond, |least| least.min(beyond)));
+                }
+                CommandTime::Never => {}
+            }
+        }
+        if let Some((step, _)) = surest {
+            return Ok(step);
+        }
+        if let Some((step, _)) = slowest {
+            return Ok(step);
+        }
+        Err(match nearest {
+            Some(beyond) => self.too_near(ground, at, beyond, destination),
+            None => self.no_way(ground, at.node, destination),
+        })
+    }
+
+    /// Whether a contact is passed at a settled speed, in time before the command to stop.
+    fn settles_before(&self, ground: Ground<'_>, located: &Located, at: WayPoint, step: SpeedStep) -> bool {
+        let speed = self.model.speed(step, Approach::Below).value;
+        let stop = self.model.stop(step, Approach::Below);
+        // No start is faster than its final speed.
+        let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
+        let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * REPORT_TIME;
+        at.node == located.at.node
+            && contacts_until(ground, &self.model, at.node, last).any(|(_, way)| way > settled)
+    }
+
+    fn short_run(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        at: WayPoint,
+        step: SpeedStep,
+        destination: &Destination,
+    ) -> CommandTime {
+        let start = now + LINE_TIME;
+        command_time(start + SHORTEST_RUN, |stop| {
+            let rest = self.locator.rest_after_move(ground, &self.model, start, step, stop)?;
+            Some((rest, self.aimed_beyond(ground, &rest, at, destination.aim)?))
+        })
+    }
+}

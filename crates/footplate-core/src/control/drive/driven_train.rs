@@ -1,0 +1,380 @@
+//! One train: where it is, how it moves, what it was told and what it is busy with.
+
+use crate::calibration::motion::MotionModel;
+use crate::estimation::{DueContact, Ground, Located, Locator, PassedContact, WayPoint};
+use crate::event::{Command, Event, EventKind};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::time::{TimeSpan, Timestamp};
+
+use super::felt_way::{counted_from, landmark_at};
+use super::notice::{Achieved, DriveNotice, Finished, Promise};
+use super::order::OrderId;
+use super::outputs::Outputs;
+use super::refusal::Refusal;
+use super::task::{Destination, Goal, Phase, Task};
+use super::turning::turned;
+
+/// A command of two bytes takes this long on a line of 2400 baud with eleven bits a byte (Märklin 6050).
+pub(super) const LINE_TIME: TimeSpan = TimeSpan::from_us(9_167);
+/// Beyond the time to rest that is foreseen: decoders creep at the end, and nothing is in a hurry then.
+const REST_MARGIN: TimeSpan = TimeSpan::from_ms(300);
+/// Where no time to rest is foreseen: longer than any train of the published tables takes (up to 5 s).
+const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
+/// A command is written within two polls of a few dozen bytes; after this long the line is not what it was.
+const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
+/// A contact is overdue this long after the last of 99.7 % of cases.
+const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
+/// And the train is lost when at least this long has passed, or twice the way there: contacts are missed now and then.
+const LOST: TimeSpan = TimeSpan::from_s(10.0);
+/// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
+const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
+
+/// A train that is driven.
+#[derive(Debug, Clone)]
+pub(super) struct DrivenTrain {
+    pub(super) locator: Locator,
+    pub(super) model: MotionModel,
+    pub(super) task: Option<Task>,
+    /// The step it was told last, whether or not that has left yet.
+    pub(super) told: SpeedStep,
+    /// What has not left yet, and since when it waits.
+    unsent: Option<(Command, Timestamp)>,
+    /// The next contact as it was expected when something was last known.
+    due: Option<DueContact>,
+    since: Timestamp,
+    overdue_said: bool,
+}
+
+impl DrivenTrain {
+    pub(super) fn new(model: MotionModel, locator: Locator) -> Self {
+        Self {
+            locator,
+            model,
+            task: None,
+            told: SpeedStep::STAND,
+            unsent: None,
+            due: None,
+            since: Timestamp::ZERO,
+            overdue_said: false,
+        }
+    }
+
+    pub(super) const fn id(&self) -> TrainId {
+        self.model.train()
+    }
+
+    pub(super) fn located(&self, ground: Ground<'_>, now: Timestamp) -> Option<Located> {
+        self.locator.locate(ground, &self.model, now)
+    }
+
+    /// As far as is known; a train that nobody can find stands if it was told to and nobody waits for it to.
+    pub(super) fn stands(&self, ground: Ground<'_>, now: Timestamp) -> bool {
+        let told_to = self.told == SpeedStep::STAND && self.unsent.is_none();
+        told_to
+            && self.located(ground, now).map_or_else(
+                || self.task.is_none() || matches!(self.goal(), Some(Goal::Run)),
+                |located| located.at_rest,
+            )
+    }
+
+    /// Whether it runs, or may.
+    pub(super) fn may_move(&self, ground: Ground<'_>, now: Timestamp) -> bool {
+        !self.stands(ground, now)
+    }
+
+    /// Whether a contact should have reported it long ago.
+    pub(super) const fn is_overdue(&self) -> bool {
+        self.overdue_said
+    }
+
+    pub(super) const fn is_told(&self) -> bool {
+        self.unsent.is_none()
+    }
+
+    pub(super) fn goal(&self) -> Option<Goal> {
+        self.task.map(|task| task.goal)
+    }
+
+    /// Begins something else.
+    pub(super) fn take(&mut self, task: Task, out: &mut Outputs) {
+        if let Some(before) = self.task.replace(task) {
+            out.say(DriveNotice::Replaced { order: before.order, train: self.id() });
+        }
+    }
+
+    pub(super) fn tell_step(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+        self.told = step;
+        self.tell(now, Command::Speed { train: self.id(), step }, out);
+    }
+
+    fn tell(&mut self, now: Timestamp, command: Command, out: &mut Outputs) {
+        self.unsent = Some((command, now));
+        out.command(command);
+    }
+
+    /// Runs at a step, or comes to rest if that is 0.
+    pub(super) fn run(&mut self, now: Timestamp, order: OrderId, step: SpeedStep, out: &mut Outputs) {
+        let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
+        self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
+        self.tell_step(now, step, out);
+    }
+
+    /// Comes to rest if it does not, and turns around.
+    pub(super) fn reverse(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        then: SpeedStep,
+        out: &mut Outputs,
+    ) {
+        let goal = Goal::Reverse(then);
+        if self.stands(ground, now) {
+            self.take(Task { order, goal, phase: Phase::Turning }, out);
+            self.tell(now, Command::Reverse { train: self.id() }, out);
+        } else {
+            self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
+            self.tell_step(now, SpeedStep::STAND, out);
+        }
+    }
+
+    /// A command to this train has left the line.
+    pub(super) fn command_left(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        event: &Event,
+        out: &mut Outputs,
+    ) {
+        match event.kind {
+            EventKind::Speed { step, .. } => {
+                self.locator.handle_command(ground, &self.model, event);
+                let train = self.id();
+                let waits_for = self.unsent.map(|(command, _)| command);
+                if waits_for == Some(Command::Speed { train, step }) {
+                    self.unsent = None;
+                } else if waits_for.is_none() {
+                    self.told = step;
+                }
+                self.expect_next(ground, now);
+                self.step_left(ground, now, step, out);
+            }
+            EventKind::Reverse { .. } => {
+                let stood = self.stands_at(ground, event.time);
+                self.locator.handle_command(ground, &self.model, event);
+                if matches!(self.unsent, Some((Command::Reverse { .. }, _))) {
+                    self.unsent = None;
+                }
+                match stood.and_then(|located| turned(ground, &self.model, located)) {
+                    Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
+                    None => self.locator.lose(),
+                }
+                self.expect_next(ground, now);
+                if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
+                    if then > SpeedStep::STAND {
+                        self.task =
+                            Some(Task { order, goal: Goal::Run, phase: Phase::Telling { promise: None } });
+                        self.tell_step(now, then, out);
+                    } else {
+                        self.finish(ground, now, order, None, None, out);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn stands_at(&self, ground: Ground<'_>, time: Timestamp) -> Option<Located> {
+        self.located(ground, time).filter(|located| located.at_rest)
+    }
+
+    fn step_left(&mut self, ground: Ground<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+        let Some(task) = self.task else { return };
+        match (task.phase, task.goal) {
+            (Phase::Telling { .. }, Goal::Run) if step > SpeedStep::STAND => {
+                self.finish(ground, now, task.order, None, None, out);
+            }
+            (Phase::Telling { .. } | Phase::Running { .. }, _) if step == SpeedStep::STAND => {
+                let rest = self.locator.rest_if_stopped(ground, &self.model, now);
+                let promise = match task.goal {
+                    Goal::RestAt(Destination { at: Some(at), .. }) => {
+                        rest.and_then(|rest| self.promise(ground, &rest, at))
+                    }
+                    _ => None,
+                };
+                let promise = promise.or(match task.phase {
+                    Phase::Telling { promise } => promise,
+                    _ => None,
+                });
+                let until = rest.map_or(now + REST_UNFORESEEN, |rest| rest.time.max(now) + REST_MARGIN);
+                self.task = Some(Task { phase: Phase::Settling { promise, until }, ..task });
+            }
+            (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(ground, now, out),
+            _ => {}
+        }
+    }
+
+    /// A contact was judged to have been closed by this train.
+    pub(super) fn passed(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        node: NodeId,
+        passed: PassedContact,
+        out: &mut Outputs,
+    ) {
+        self.expect_next(ground, now);
+        out.say(DriveNotice::Passed { train: self.id(), passed, next: self.due });
+        let Some(task) = self.task else { return };
+        let Goal::RestAt(destination) = task.goal else { return };
+        match (task.phase, destination.at) {
+            (Phase::Finding { .. }, _) => self.set_out(ground, now, task.order, destination, out),
+            (_, Some(at)) => {
+                let shifted = counted_from(ground, &self.model, at, node);
+                let at = shifted.or_else(|| self.waypoint_again(ground, node, &destination));
+                match at {
+                    Some(at) => {
+                        let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
+                        self.task = Some(Task { goal, ..task });
+                        self.plan(ground, now, out);
+                    }
+                    None => self.give_up(now, self.no_way(ground, node, &destination), out),
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// When it wants to look at the clock.
+    pub(super) fn next_timeout(&self) -> Option<Timestamp> {
+        let phase = match self.task.map(|task| task.phase) {
+            Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - LINE_TIME),
+            Some(Phase::Settling { until, .. }) => Some(until),
+            Some(Phase::Finding { since }) => Some(since + FIND_LIMIT),
+            _ => None,
+        };
+        let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
+        [phase, unsent, self.next_doubt()].into_iter().flatten().min()
+    }
+
+    /// When a contact that does not come is overdue, and after that when the train is lost.
+    fn next_doubt(&self) -> Option<Timestamp> {
+        let due = self.due.filter(|_| self.told > SpeedStep::STAND)?;
+        let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
+        let way = due.time - self.since;
+        let lost = LOST.max(way + way);
+        Some(latest + if self.overdue_said { lost } else { OVERDUE })
+    }
+
+    pub(super) fn handle_timeout(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+        if let Some((command, _)) = self.unsent.filter(|(_, since)| now - *since >= UNCONFIRMED) {
+            out.say(DriveNotice::Unconfirmed { command });
+            self.unsent = None;
+            if matches!(command, Command::Speed { step: SpeedStep::STAND, .. }) {
+                self.tell(now, command, out);
+            }
+        }
+        let Some(task) = self.task else { return self.doubt(now, out) };
+        match task.phase {
+            Phase::Running { plan: Some(plan) } if plan.leaves - LINE_TIME <= now => {
+                self.stop_now(now, task, Some(plan.promise), out);
+            }
+            Phase::Finding { since } if now - since >= FIND_LIMIT => {
+                let why = Refusal::NotFound { train: self.id(), within: FIND_LIMIT };
+                self.give_up(now, why, out);
+            }
+            Phase::Settling { promise, until } if until <= now => {
+                self.rested(ground, now, task, promise, out);
+            }
+            _ => {}
+        }
+        self.doubt(now, out);
+    }
+
+    fn doubt(&mut self, now: Timestamp, out: &mut Outputs) {
+        let (Some(at), Some(due)) = (self.next_doubt(), self.due) else { return };
+        if now < at {
+            return;
+        }
+        if self.overdue_said {
+            self.locator.lose();
+            self.due = None;
+            let train = self.id();
+            out.say(DriveNotice::Lost { train });
+            self.give_up(now, Refusal::Lost { train }, out);
+        } else {
+            self.overdue_said = true;
+            out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+        }
+    }
+
+    pub(super) fn stop_now(
+        &mut self,
+        now: Timestamp,
+        task: Task,
+        promise: Option<Promise>,
+        out: &mut Outputs,
+    ) {
+        self.task = Some(Task { phase: Phase::Telling { promise }, ..task });
+        self.tell_step(now, SpeedStep::STAND, out);
+    }
+
+    /// Ends what cannot be done, and the run with it.
+    pub(super) fn give_up(&mut self, now: Timestamp, why: Refusal, out: &mut Outputs) {
+        if let Some(task) = self.task.take() {
+            out.say(DriveNotice::GivenUp { order: task.order, train: self.id(), why });
+        }
+        if self.told > SpeedStep::STAND {
+            self.tell_step(now, SpeedStep::STAND, out);
+        }
+    }
+
+    fn rested(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        task: Task,
+        promise: Option<Promise>,
+        out: &mut Outputs,
+    ) {
+        match task.goal {
+            Goal::Reverse(_) => {
+                self.task = Some(Task { phase: Phase::Turning, ..task });
+                self.tell(now, Command::Reverse { train: self.id() }, out);
+            }
+            Goal::RestAt(Destination { at, .. }) => self.finish(ground, now, task.order, at, promise, out),
+            Goal::Rest | Goal::Run => self.finish(ground, now, task.order, None, None, out),
+        }
+    }
+
+    /// The order has been carried out.
+    pub(super) fn finish(
+        &mut self,
+        ground: Ground<'_>,
+        time: Timestamp,
+        order: OrderId,
+        target: Option<WayPoint>,
+        promise: Option<Promise>,
+        out: &mut Outputs,
+    ) {
+        let achieved = self.located(ground, time).map(|located| Achieved {
+            at: landmark_at(ground, &self.model, located.at),
+            uncertainty: located.uncertainty,
+            error: target.and_then(|target| self.beyond(ground, located.at, target)),
+        });
+        self.task = None;
+        out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise }));
+    }
+
+    /// The next contact and when it is due.
+    pub(super) fn due(&self) -> Option<(SensorId, Timestamp)> {
+        self.due.map(|due| (due.sensor, due.time))
+    }
+
+    /// Looks ahead to the next contact.
+    pub(super) fn expect_next(&mut self, ground: Ground<'_>, now: Timestamp) {
+        self.due = self.locator.next_contact(ground, &self.model, now);
+        self.since = now;
+        self.overdue_said = false;
+    }
+}

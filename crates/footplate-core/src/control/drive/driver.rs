@@ -1,0 +1,328 @@
+//! Drives trains to where they are ordered, report by report.
+
+use alloc::collections::BTreeMap;
+
+use crate::calibration::motion::{MotionModel, StepUse};
+use crate::control::{Machine, Output};
+use crate::estimation::{Located, Locator, WayPoint};
+use crate::event::{Command, Event, EventKind, Report};
+use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
+use crate::latency::ContactWindow;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Landmark, Layout, Leg, TurnoutStates};
+use crate::units::Length;
+
+use super::attribution::{Explanation, explain};
+use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::felt_way::landmark_at;
+use super::known_track::KnownTrack;
+use super::notice::DriveNotice;
+use super::order::{Aim, Order, OrderId, StopOrder};
+use super::outputs::Outputs;
+use super::refusal::Refusal;
+use super::task::Phase;
+use super::turnout_guard::train_on;
+
+/// The poll interval where a report does not carry one: the longest measured on this line (70 ms).
+const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
+/// A contact that is seen closed again within this long was never open: wheels bounce, and no train follows so soon.
+const HELD: TimeSpan = TimeSpan::from_ms(300);
+/// The line is watched for one contact only this long before its report decides a stop.
+const WATCHED: TimeSpan = TimeSpan::from_s(6.0);
+/// What an aim may leave beyond the target: more is no promise, less no stop can keep.
+const SHARES: [f64; 2] = [1e-6, 0.5];
+/// The longest move that is believed to be meant: a hundred metres, as long as no layout is.
+const LONGEST_MOVE: Length = Length::from_m(100.0);
+
+/// Knows where the trains are, and tells them when to do what.
+#[derive(Debug, Clone)]
+pub struct Driver {
+    track: KnownTrack,
+    trains: BTreeMap<TrainId, DrivenTrain>,
+    outputs: Outputs,
+    /// When each contact was last seen closed.
+    closed: BTreeMap<SensorId, Timestamp>,
+    /// Turnouts that were told how to lie and have not been yet, by which order.
+    throwing: BTreeMap<TurnoutId, OrderId>,
+    orders: u32,
+}
+
+impl Driver {
+    /// Nothing to drive yet. How the turnouts lie, as far as is known.
+    #[must_use]
+    pub fn new(layout: Layout, turnouts: TurnoutStates) -> Self {
+        Self {
+            track: KnownTrack::new(layout, turnouts),
+            trains: BTreeMap::new(),
+            outputs: Outputs::default(),
+            closed: BTreeMap::new(),
+            throwing: BTreeMap::new(),
+            orders: 0,
+        }
+    }
+
+    /// Drives a train that moves like this, and of which nobody knows where it stands. Replaces what was known of it.
+    pub fn add_train(&mut self, model: MotionModel) {
+        let locator = Locator::new(model.train());
+        self.add_located(model, locator);
+    }
+
+    /// Drives a train that somebody else has followed until now.
+    pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
+        self.trains.insert(model.train(), DrivenTrain::new(model, locator));
+    }
+
+    /// What is known of how a train moves.
+    #[must_use]
+    pub fn model(&self, train: TrainId) -> Option<&MotionModel> {
+        self.trains.get(&train).map(|train| &train.model)
+    }
+
+    /// Puts something better in its place.
+    pub fn set_model(&mut self, model: MotionModel) {
+        if let Some(train) = self.trains.get_mut(&model.train()) {
+            train.model = model;
+        }
+    }
+
+    /// The trains that are driven.
+    pub fn trains(&self) -> impl Iterator<Item = TrainId> {
+        self.trains.keys().copied()
+    }
+
+    /// The layout.
+    #[must_use]
+    pub const fn layout(&self) -> &Layout {
+        &self.track.layout
+    }
+
+    /// How the turnouts lie.
+    #[must_use]
+    pub const fn turnouts(&self) -> &TurnoutStates {
+        &self.track.turnouts
+    }
+
+    /// Where a train is at a time not before the last entry; `None` if nobody knows.
+    #[must_use]
+    pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {
+        self.trains.get(&train)?.located(self.track.ground(), now)
+    }
+
+    /// A point of a train's way as people name it.
+    #[must_use]
+    pub fn landmark(&self, train: TrainId, at: WayPoint) -> Option<Landmark> {
+        Some(landmark_at(self.track.ground(), &self.trains.get(&train)?.model, at))
+    }
+
+    /// Whether a train stands, as far as is known.
+    #[must_use]
+    pub fn stands(&self, train: TrainId, now: Timestamp) -> bool {
+        self.trains.get(&train).is_some_and(|train| train.stands(self.track.ground(), now))
+    }
+
+    /// The order that a train is busy with.
+    #[must_use]
+    pub fn busy(&self, train: TrainId) -> Option<OrderId> {
+        Some(self.trains.get(&train)?.task?.order)
+    }
+
+    /// A person put a train there, or read off where it stands.
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.locator.place(now, at, uncertainty);
+            train.expect_next(self.track.ground(), now);
+        }
+    }
+
+    /// Begins to carry out an order. What the train was busy with ends.
+    ///
+    /// # Errors
+    /// Why it cannot be carried out; nothing has changed then.
+    pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        self.check(&order)?;
+        let id = OrderId(self.orders);
+        let ground = self.track.ground();
+        let out = &mut self.outputs;
+        let train = order.train().and_then(|train| self.trains.get_mut(&train));
+        match (order, train) {
+            (Order::Speed { step, .. }, Some(train)) => train.run(now, id, step, out),
+            (Order::Reverse { then, .. }, Some(train)) => train.reverse(ground, now, id, then, out),
+            (Order::Stop(stop), Some(train)) => train.stop_at(ground, now, id, &stop, out)?,
+            (Order::Move { distance, .. }, Some(train)) => train.move_on(ground, now, id, distance, out)?,
+            (Order::Turnout { turnout, curved }, _) => self.throw(now, id, turnout, curved)?,
+            _ => {}
+        }
+        self.orders = self.orders.wrapping_add(1);
+        self.wish();
+        Ok(id)
+    }
+
+    /// Whether an order makes sense at all.
+    fn check(&self, order: &Order) -> Result<(), Refusal> {
+        let Some(id) = order.train() else { return Ok(()) };
+        let train = self.trains.get(&id).ok_or(Refusal::UnknownTrain { train: id })?;
+        let highest = train.model.highest();
+        let is_step = |step: SpeedStep| {
+            if step > highest { Err(Refusal::StepTooHigh { step, highest }) } else { Ok(()) }
+        };
+        match *order {
+            Order::Speed { step, .. } | Order::Reverse { then: step, .. } => is_step(step),
+            Order::Stop(StopOrder { step, aim, .. }) => {
+                if let Aim::NotBeyond(found) = aim
+                    && !(SHARES[0]..=SHARES[1]).contains(&found.as_parts())
+                {
+                    return Err(Refusal::IllegalProbability { found });
+                }
+                let Some(step) = step else { return Ok(()) };
+                is_step(step)?;
+                if step == SpeedStep::STAND || train.model.uses(step) == StepUse::Unreliable {
+                    return Err(Refusal::StepDoesNotMove { step });
+                }
+                Ok(())
+            }
+            Order::Move { distance, .. } if !(distance > Length::ZERO && distance <= LONGEST_MOVE) => {
+                Err(Refusal::IllegalDistance { found: distance })
+            }
+            Order::Move { .. } | Order::Turnout { .. } => Ok(()),
+        }
+    }
+
+    /// Throws a turnout unless a train is on it; the other one in its place goes straight first.
+    fn throw(
+        &mut self,
+        now: Timestamp,
+        order: OrderId,
+        turnout: TurnoutId,
+        curved: bool,
+    ) -> Result<(), Refusal> {
+        let ground = self.track.ground();
+        if ground.layout.branch(turnout).is_none() {
+            return Err(Refusal::UnknownTurnout { turnout });
+        }
+        let lies = ground.turnouts.get(turnout) == Some(Leg::from_curved(curved));
+        let on_it = train_on(&self.trains, ground, now, turnout);
+        if let Some(train) = on_it.filter(|_| !lies) {
+            return Err(Refusal::TurnoutOccupied { turnout, train });
+        }
+        let partner = ground
+            .layout
+            .never_curved_with(turnout)
+            .filter(|partner| curved && ground.turnouts.get(*partner) != Some(Leg::Straight));
+        if let Some(partner) = partner {
+            if let Some(train) = train_on(&self.trains, ground, now, partner) {
+                return Err(Refusal::PartnerOccupied { turnout, partner, train });
+            }
+            self.outputs.command(Command::Turnout { turnout: partner, curved: false });
+        }
+        self.throwing.insert(turnout, order);
+        self.outputs.command(Command::Turnout { turnout, curved });
+        Ok(())
+    }
+
+    fn turnout_left(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
+        self.track.turnouts.set(turnout, Leg::from_curved(curved));
+        let order = self.throwing.remove(&turnout);
+        self.outputs.say(DriveNotice::Thrown { order, turnout, curved });
+        self.ways_changed(now);
+    }
+
+    fn ways_changed(&mut self, now: Timestamp) {
+        let ground = self.track.ground();
+        for train in self.trains.values_mut() {
+            train.way_changed(ground, now, &mut self.outputs);
+        }
+    }
+
+    fn report(&mut self, now: Timestamp, time: Timestamp, report: Report) {
+        let sensor = report.sensor;
+        let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs();
+        let window = ContactWindow { after: time - interval, until: time };
+        let before = self.closed.insert(sensor, time);
+        if before.is_some_and(|before| time - before <= HELD.max(interval)) {
+            return;
+        }
+        let ground = self.track.ground();
+        let explained = ground
+            .node_of(sensor)
+            .and_then(|node| Some((node, explain(&self.trains, ground, now, sensor, window)?)));
+        let Some((node, explanation)) = explained else {
+            self.outputs.say(DriveNotice::Unexplained { sensor, time });
+            return;
+        };
+        let id = match explanation {
+            Explanation::Train(train) | Explanation::Strayed(train) => train,
+            Explanation::Turnout { train, turnout, leg } => {
+                self.track.turnouts.set(turnout, leg);
+                let curved = leg.is_curved();
+                self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
+                train
+            }
+        };
+        let ground = self.track.ground();
+        if let Some(train) = self.trains.get_mut(&id) {
+            if matches!(explanation, Explanation::Strayed(_)) {
+                train.locator.lose();
+            }
+            let passed = train.locator.pass(ground, &train.model, sensor, window);
+            train.passed(ground, now, node, passed, &mut self.outputs);
+        }
+        if matches!(explanation, Explanation::Turnout { .. }) {
+            self.ways_changed(now);
+        }
+    }
+
+    /// Says of the line what the plans want of it.
+    fn wish(&mut self) {
+        let plans = || {
+            self.trains.values().filter_map(|train| match train.task?.phase {
+                Phase::Running { plan } => plan,
+                _ => None,
+            })
+        };
+        let next = plans().min_by_key(|plan| plan.leaves);
+        let due = self.trains.values().filter_map(DrivenTrain::due);
+        let triggers = || plans().flat_map(|plan| plan.triggers).flatten();
+        let watched = due
+            .filter(|(_, time)| next.is_some_and(|plan| plan.leaves - *time <= WATCHED))
+            .map(|(sensor, _)| sensor)
+            .find(|sensor| triggers().any(|trigger| trigger == *sensor));
+        let hold = next.map(|plan| plan.leaves - LINE_TIME);
+        self.outputs.hold_line(hold);
+        self.outputs.watch(watched);
+    }
+}
+
+impl Machine for Driver {
+    type Notice = DriveNotice;
+
+    fn handle_event(&mut self, now: Timestamp, event: &Event) {
+        let ground = self.track.ground();
+        match event.kind {
+            EventKind::Sensor(report) => self.report(now, event.time, report),
+            EventKind::Speed { train, .. } | EventKind::Reverse { train } => {
+                if let Some(train) = self.trains.get_mut(&train) {
+                    train.command_left(ground, now, event, &mut self.outputs);
+                }
+            }
+            EventKind::Turnout { turnout, curved } => self.turnout_left(now, turnout, curved),
+            EventKind::Stopped { .. } => {}
+        }
+        self.wish();
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        let ground = self.track.ground();
+        for train in self.trains.values_mut() {
+            train.handle_timeout(ground, now, &mut self.outputs);
+        }
+        self.wish();
+    }
+
+    fn poll_output(&mut self) -> Option<Output<DriveNotice>> {
+        self.outputs.next()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        self.trains.values().filter_map(DrivenTrain::next_timeout).min()
+    }
+}

@@ -1,0 +1,100 @@
+//! Ways along the hops as the turnouts lie, in lengths as a train feels them.
+
+use crate::calibration::motion::MotionModel;
+use crate::estimation::{Ground, WayPoint};
+use crate::ids::{NodeId, SensorId, TurnoutId};
+use crate::track::{Hop, Landmark, NodeKind};
+use crate::units::Length;
+
+/// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after
+/// as many hops as there are nodes, which is more than one lap of any circuit.
+fn felt_hops<'g>(
+    ground: Ground<'g>,
+    model: &MotionModel,
+    from: NodeId,
+) -> impl Iterator<Item = (Hop<'g>, [Length; 2])> {
+    let mut end = Length::ZERO;
+    ground.hops_ahead(from).take(ground.layout.nodes().len()).map(move |hop| {
+        let begin = end;
+        end += model.length(ground.sections, &hop)[0];
+        (hop, [begin, end])
+    })
+}
+
+/// The way from one node to another that is ahead of it.
+pub(super) fn way_between(
+    ground: Ground<'_>,
+    model: &MotionModel,
+    from: NodeId,
+    to: NodeId,
+) -> Option<Length> {
+    if from == to {
+        return Some(Length::ZERO);
+    }
+    felt_hops(ground, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
+}
+
+/// The way once round from a node to itself, on a circuit.
+pub(super) fn lap(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
+    let (_, [_, end]) = felt_hops(ground, model, node).find(|(hop, _)| hop.to == node)?;
+    (end > Length::ZERO).then_some(end)
+}
+
+/// The same point counted from another node, which the train came to since: ahead of the one before.
+pub(super) fn counted_from(
+    ground: Ground<'_>,
+    model: &MotionModel,
+    point: WayPoint,
+    node: NodeId,
+) -> Option<WayPoint> {
+    let between = way_between(ground, model, point.node, node)?;
+    Some(WayPoint { node, way: point.way - between })
+}
+
+/// The contacts ahead of a node up to a way, with their ways.
+pub(super) fn contacts_until<'g>(
+    ground: Ground<'g>,
+    model: &MotionModel,
+    from: NodeId,
+    until: Length,
+) -> impl Iterator<Item = (SensorId, Length)> {
+    felt_hops(ground, model, from)
+        .take_while(move |(_, [_, end])| *end <= until)
+        .filter_map(|(hop, [_, end])| Some((hop.sensor?, end)))
+}
+
+/// A point of the way as people name it: from the last contact before it, in surveyed lengths.
+pub(super) fn landmark_at(ground: Ground<'_>, model: &MotionModel, point: WayPoint) -> Landmark {
+    let mut landmark = Landmark { node: point.node, offset: point.way };
+    // On long ways round and round: whole laps make no difference to the place.
+    let whole_laps = lap(ground, model, point.node)
+        .map_or(Length::ZERO, |lap| libm::floor((point.way / lap).max(0.0)) * lap);
+    let way = point.way - whole_laps;
+    for (hop, [begin, end]) in felt_hops(ground, model, point.node) {
+        let felt = end - begin;
+        if way < begin {
+            break;
+        }
+        let part = if felt > Length::ZERO { hop.length / felt } else { 1.0 };
+        landmark = Landmark { node: hop.from, offset: (way - begin) * part };
+        if way < end {
+            break;
+        }
+    }
+    landmark
+}
+
+/// The first turnout ahead of a node at which the way forks and nobody knows where it leads.
+pub(super) fn unknown_turnout(ground: Ground<'_>, from: NodeId) -> Option<TurnoutId> {
+    let last = ground.hops_ahead(from).take(ground.layout.nodes().len()).last().map_or(from, |hop| hop.to);
+    let hop = ground.layout.open_hops_from(last, ground.turnouts).next()?;
+    let fork = hop.needs.iter().find(|need| need.facing && ground.turnouts.get(need.turnout).is_none())?;
+    Some(fork.turnout)
+}
+
+/// The nodes of a turnout: met at its toe, and from its legs.
+pub(super) fn nodes_of_turnout(ground: Ground<'_>, turnout: TurnoutId) -> Option<[NodeId; 2]> {
+    let branch = ground.layout.branch(turnout)?;
+    debug_assert!(ground.layout.node(branch).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))));
+    Some([branch, branch.reverse()])
+}

@@ -1,0 +1,24 @@
+//! The layout as it lies, owned by who drives on it.
+
+use crate::calibration::SectionIndex;
+use crate::estimation::Ground;
+use crate::track::{Layout, TurnoutStates};
+
+/// What [`Ground`] points to.
+#[derive(Debug, Clone)]
+pub(super) struct KnownTrack {
+    pub(super) layout: Layout,
+    pub(super) sections: SectionIndex,
+    pub(super) turnouts: TurnoutStates,
+}
+
+impl KnownTrack {
+    pub(super) fn new(layout: Layout, turnouts: TurnoutStates) -> Self {
+        let sections = SectionIndex::of(&layout);
+        Self { layout, sections, turnouts }
+    }
+
+    pub(super) const fn ground(&self) -> Ground<'_> {
+        Ground { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts }
+    }
+}

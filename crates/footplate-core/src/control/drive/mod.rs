@@ -1,0 +1,26 @@
+//! Driving: from an order to a train at rest within millimetres of where it should be.
+//!
+//! A [`Driver`] takes [`Order`]s and says with [`DriveNotice`]s what comes of them. It follows every train between
+//! contacts, plans each stop anew at every report, and commands it at the planned time by the clock, whatever is or is
+//! not reported until then.
+
+mod approach;
+mod attribution;
+mod command_time;
+mod driven_train;
+mod driver;
+mod felt_way;
+mod known_track;
+mod notice;
+mod order;
+mod outputs;
+mod refusal;
+mod stop_planning;
+mod task;
+mod turning;
+mod turnout_guard;
+
+pub use driver::Driver;
+pub use notice::{Achieved, DriveNotice, Finished, PlannedStop, Promise};
+pub use order::{Aim, Order, OrderId, StopOrder};
+pub use refusal::Refusal;

@@ -1,0 +1,152 @@
+//! What a driver has to say while it drives.
+
+use crate::estimation::{DueContact, PassedContact};
+use crate::event::Command;
+use crate::ids::{SensorId, TrainId, TurnoutId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Landmark;
+use crate::units::Length;
+
+use super::order::OrderId;
+use super::refusal::Refusal;
+
+/// What happened, and what is going to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DriveNotice {
+    /// A train passed a contact.
+    Passed {
+        /// The train.
+        train: TrainId,
+        /// What was reported, beside what had been expected.
+        passed: PassedContact,
+        /// What comes next.
+        next: Option<DueContact>,
+    },
+    /// When a train told to stop will be told so, for the first time or again because something was learnt.
+    Planned(PlannedStop),
+    /// It was too late for the target: the train was told to stop at once, and will come to rest beyond.
+    Overshoots {
+        /// The order.
+        order: OrderId,
+        /// The train.
+        train: TrainId,
+        /// By how much, in the middle of what may be.
+        by: Length,
+    },
+    /// An order has been carried out.
+    Done(Finished),
+    /// An order was given up on the way; the train has been told to stop.
+    GivenUp {
+        /// The order.
+        order: OrderId,
+        /// The train.
+        train: TrainId,
+        /// Why.
+        why: Refusal,
+    },
+    /// Another order took its place.
+    Replaced {
+        /// The order.
+        order: OrderId,
+        /// The train.
+        train: TrainId,
+    },
+    /// A turnout has been told how to lie.
+    Thrown {
+        /// The order; `None` if nobody here asked for it.
+        order: Option<OrderId>,
+        /// The turnout.
+        turnout: TurnoutId,
+        /// `true` for the diverging leg.
+        curved: bool,
+    },
+    /// A train took the other leg: the turnout did not lie as it was told.
+    TurnoutLiesOtherwise {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// How it lies, as the train showed.
+        curved: bool,
+        /// The train.
+        train: TrainId,
+    },
+    /// A contact should have reported a train by now and did not.
+    Overdue {
+        /// The train.
+        train: TrainId,
+        /// The contact.
+        sensor: SensorId,
+        /// By how much.
+        by: TimeSpan,
+    },
+    /// Nobody knows any more where a train is. It has been told to stop.
+    Lost {
+        /// The train.
+        train: TrainId,
+    },
+    /// A contact that no train can have closed.
+    Unexplained {
+        /// The contact.
+        sensor: SensorId,
+        /// When it was seen closed.
+        time: Timestamp,
+    },
+    /// A command has not left for a long time. It will be said again if it is a stop.
+    Unconfirmed {
+        /// The command.
+        command: Command,
+    },
+}
+
+/// How a stop is going to be made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedStop {
+    /// The order.
+    pub order: OrderId,
+    /// The train.
+    pub train: TrainId,
+    /// When the last bit of the command shall have left.
+    pub leaves: Timestamp,
+    /// The last contact that the train passes while the command can still be moved.
+    pub trigger: Option<SensorId>,
+    /// How long after that contact the command leaves.
+    pub after_trigger: Option<TimeSpan>,
+    /// Where it will come to rest against the target.
+    pub promise: Promise,
+}
+
+/// Where a train comes to rest, counted from the target, negative short of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Promise {
+    /// The middle.
+    pub median: Length,
+    /// 2.5 % of stops end before.
+    pub low: Length,
+    /// 2.5 % of stops end beyond.
+    pub high: Length,
+}
+
+/// An order carried out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finished {
+    /// The order.
+    pub order: OrderId,
+    /// The train.
+    pub train: TrainId,
+    /// When.
+    pub time: Timestamp,
+    /// Where the train is as far as is known; `None` if that is not known.
+    pub achieved: Option<Achieved>,
+    /// What was promised when the stop was commanded; only if there was a target.
+    pub promise: Option<Promise>,
+}
+
+/// Where a train came to rest, as is believed without having measured it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Achieved {
+    /// The place.
+    pub at: Landmark,
+    /// One standard deviation of it.
+    pub uncertainty: Length,
+    /// How far beyond the target that is, negative short of it; only if there was a target.
+    pub error: Option<Length>,
+}

@@ -1,0 +1,181 @@
+//! Why an order is not carried out, and what could be asked instead.
+
+use alloc::string::String;
+use core::fmt;
+
+use crate::ids::{SpeedStep, TrainId, TurnoutId};
+use crate::time::TimeSpan;
+use crate::track::WayError;
+use crate::units::{Length, Ratio};
+
+/// Why an order was refused, or given up on the way. Places are named so that `Layout::landmark` reads them.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// No such train is driven here.
+    UnknownTrain {
+        /// The train.
+        train: TrainId,
+    },
+    /// The layout has no such turnout.
+    UnknownTurnout {
+        /// The turnout.
+        turnout: TurnoutId,
+    },
+    /// The decoder has no such step.
+    StepTooHigh {
+        /// The step asked for.
+        step: SpeedStep,
+        /// The highest of this train.
+        highest: SpeedStep,
+    },
+    /// The train does not move at this step, or not reliably.
+    StepDoesNotMove {
+        /// The step asked for.
+        step: SpeedStep,
+    },
+    /// A probability that is none, or that no stop can keep.
+    IllegalProbability {
+        /// What was asked for.
+        found: Ratio,
+    },
+    /// A distance to move that is not ahead.
+    IllegalDistance {
+        /// What was asked for.
+        found: Length,
+    },
+    /// The place cannot be found on the track as the turnouts lie.
+    Place(WayError),
+    /// No way leads there as the turnouts lie.
+    NoWay {
+        /// The target.
+        target: String,
+        /// The contact from which a way was looked for.
+        from: String,
+        /// A turnout ahead of which nobody knows how it lies.
+        unknown: Option<TurnoutId>,
+    },
+    /// The train cannot come to rest so soon.
+    TooNear {
+        /// The target.
+        target: String,
+        /// The first place at which it can.
+        nearest: String,
+        /// How far beyond the target that is.
+        beyond: Length,
+        /// The way round: the same place can be reached on the next round.
+        round: Option<Length>,
+    },
+    /// So short a move cannot be made.
+    MoveTooShort {
+        /// The shortest that can.
+        shortest: Length,
+    },
+    /// The train would have to run before it can be told how far it is.
+    OutOfReach {
+        /// The target.
+        target: String,
+    },
+    /// Nobody knows where the train is.
+    Lost {
+        /// The train.
+        train: TrainId,
+    },
+    /// The train still moves, and this is for a train at rest.
+    StillMoves {
+        /// The train.
+        train: TrainId,
+    },
+    /// A train is on the turnout, or will be before it has been thrown.
+    TurnoutOccupied {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The train.
+        train: TrainId,
+    },
+    /// The other turnout in the same place lies curved, and a train is on it.
+    PartnerOccupied {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The one that would have to lie straight first.
+        partner: TurnoutId,
+        /// The train on that.
+        train: TrainId,
+    },
+    /// No contact reported the train within the time in which one should have.
+    NotFound {
+        /// The train.
+        train: TrainId,
+        /// How long it was looked for.
+        within: TimeSpan,
+    },
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownTrain { train } => write!(f, "train {train} is not driven here"),
+            Self::UnknownTurnout { turnout } => write!(f, "the layout has no turnout {turnout}"),
+            Self::StepTooHigh { step, highest } => {
+                write!(f, "step {step} is beyond {highest}, the highest of this train")
+            }
+            Self::StepDoesNotMove { step } => {
+                write!(f, "step {step} does not move this train reliably: name a higher one")
+            }
+            Self::IllegalProbability { found } => {
+                write!(f, "{} % is no probability between 0.0001 % and 50 %", found.as_percent())
+            }
+            Self::IllegalDistance { found } => {
+                write!(f, "{} mm is no way ahead: name 1 mm to 100000 mm", found.as_mm())
+            }
+            Self::Place(error) => error.fmt(f),
+            Self::NoWay { target, from, unknown: Some(turnout) } => write!(
+                f,
+                "no way is known from `{from}` to `{target}`: nobody knows how turnout {turnout} lies, so set \
+                 it first"
+            ),
+            Self::NoWay { target, from, unknown: None } => {
+                write!(f, "no way leads from `{from}` to `{target}` as the turnouts lie")
+            }
+            Self::TooNear { target, nearest, beyond, round } => {
+                write!(
+                    f,
+                    "`{target}` is nearer than the train can stop: the nearest place is `{nearest}`, {:.0} mm \
+                     beyond it",
+                    beyond.as_mm()
+                )?;
+                round.map_or(Ok(()), |round| {
+                    write!(f, "; the next time round comes after {:.1} m", round.as_m())
+                })
+            }
+            Self::MoveTooShort { shortest } => {
+                write!(f, "the shortest move this train can make is {:.0} mm", shortest.as_mm())
+            }
+            Self::OutOfReach { target } => {
+                write!(f, "the train does not come as far as `{target}` at this step")
+            }
+            Self::Lost { train } => write!(
+                f,
+                "nobody knows where train {train} is: let it run over a contact, as with `speed {train} 6`"
+            ),
+            Self::StillMoves { train } => {
+                write!(f, "train {train} still moves: wait until it is at rest")
+            }
+            Self::TurnoutOccupied { turnout, train } => {
+                write!(f, "train {train} is on turnout {turnout} or about to be: wait, or stop it first")
+            }
+            Self::PartnerOccupied { turnout, partner, train } => write!(
+                f,
+                "turnout {turnout} may lie curved only while turnout {partner} lies straight, and train {train} \
+                 is on that: wait, or stop it first"
+            ),
+            Self::NotFound { train, within } => write!(
+                f,
+                "no contact reported train {train} within {:.0} s: does it run, and is it on this layout?",
+                within.as_s()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}

@@ -1,0 +1,364 @@
+//! Stops at a place: whether one can be made, from which step, and when the command has to leave.
+
+use alloc::string::{String, ToString};
+
+use crate::estimation::{Ground, Located, Rest, WayPoint, way_to};
+use crate::ids::{NodeId, SpeedStep};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::Length;
+
+use super::command_time::{CommandTime, command_time, spread};
+use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::felt_way::{contacts_until, landmark_at, lap, unknown_turnout, way_between};
+use super::notice::{DriveNotice, PlannedStop, Promise};
+use super::order::{Aim, OrderId, StopOrder};
+use super::outputs::Outputs;
+use super::refusal::Refusal;
+use super::task::{Destination, Goal, Phase, Plan, Task};
+
+/// An order can only be kept if the command may wait for a poll that is on the line: eleven bytes of 4.583 ms, the
+/// command's own two, and a tenth more.
+const SOONEST: TimeSpan = TimeSpan::from_ms(66);
+/// From when a contact closes until what it says has changed a plan: a poll that just missed it, the next one, and the
+/// command's own bytes.
+const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
+/// 95 % of a normal distribution lie within so many standard deviations.
+const PROMISED: f64 = 1.959_964;
+/// A plan that moved by less is no news.
+const NEWS: TimeSpan = TimeSpan::from_ms(1);
+/// An overshoot that is less than any stop scatters is no news either.
+const OVERSHOOT: Length = Length::from_mm(5.0);
+/// A train that stands this near to where it should is there.
+const THERE: Length = Length::from_mm(1.0);
+
+impl DrivenTrain {
+    /// Takes an order to stop somewhere.
+    pub(super) fn stop_at(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        stop: &StopOrder,
+        out: &mut Outputs,
+    ) -> Result<(), Refusal> {
+        let mut destination = Destination {
+            named: Some(stop.target),
+            at: None,
+            aim: stop.aim,
+            step: stop.step,
+            next_round: stop.next_round,
+        };
+        ground.layout.locate(stop.target, ground.turnouts).map_err(Refusal::Place)?;
+        let stands = self.stands(ground, now);
+        if !stands && self.told == SpeedStep::STAND {
+            return Err(Refusal::StillMoves { train: self.id() });
+        }
+        let Some(located) = self.located(ground, now) else {
+            self.take(
+                Task { order, goal: Goal::RestAt(destination), phase: Phase::Finding { since: now } },
+                out,
+            );
+            if stands {
+                let step = stop.step.unwrap_or_else(|| self.finding_step());
+                self.tell_step(now, step, out);
+            }
+            return Ok(());
+        };
+        destination.at = Some(self.waypoint(ground, now, &located, &destination, stands)?);
+        self.head_for(ground, now, order, &located, destination, stands, out)
+    }
+
+    /// A train that was looked for has been found: goes on to where it should. What is too near is passed once more.
+    pub(super) fn set_out(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        mut destination: Destination,
+        out: &mut Outputs,
+    ) {
+        let Some(located) = self.located(ground, now) else { return };
+        let mut at = self.waypoint(ground, now, &located, &destination, false);
+        if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
+            destination.next_round = true;
+            at = self.waypoint(ground, now, &located, &destination, false);
+        }
+        let headed = at.and_then(|at| {
+            destination.at = Some(at);
+            self.task = None;
+            self.head_for(ground, now, order, &located, destination, false, out)
+        });
+        if let Err(why) = headed {
+            self.task =
+                Some(Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } });
+            self.give_up(now, why, out);
+        }
+    }
+
+    /// Takes an order to move on.
+    pub(super) fn move_on(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        distance: Length,
+        out: &mut Outputs,
+    ) -> Result<(), Refusal> {
+        let located = self.located(ground, now).ok_or(Refusal::Lost { train: self.id() })?;
+        if !self.stands(ground, now) {
+            return Err(Refusal::StillMoves { train: self.id() });
+        }
+        let at = WayPoint { way: located.at.way + distance, ..located.at };
+        let destination =
+            Destination { named: None, at: Some(at), aim: Aim::Median, step: None, next_round: false };
+        self.head_for(ground, now, order, &located, destination, true, out)
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the last step of two orders, which know all of it")]
+    fn head_for(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        located: &Located,
+        destination: Destination,
+        stands: bool,
+        out: &mut Outputs,
+    ) -> Result<(), Refusal> {
+        let task = Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } };
+        if stands {
+            let there = destination.at.is_some_and(|at| {
+                self.beyond(ground, located.at, at).is_some_and(|beyond| beyond.abs() <= THERE)
+            });
+            if there {
+                self.take(task, out);
+                self.finish(ground, now, order, destination.at, None, out);
+                return Ok(());
+            }
+            let step = self.approach_step(ground, now, located, &destination)?;
+            self.take(task, out);
+            self.tell_step(now, step, out);
+        } else {
+            self.take(task, out);
+            match destination.step.filter(|step| *step != self.told) {
+                Some(step) => self.tell_step(now, step, out),
+                None => self.plan(ground, now, out),
+            }
+        }
+        Ok(())
+    }
+
+    /// The target on the way of a train, the first time it comes there and can rest there.
+    fn waypoint(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        located: &Located,
+        destination: &Destination,
+        stands: bool,
+    ) -> Result<WayPoint, Refusal> {
+        let node = located.at.node;
+        let no_way = || self.no_way(ground, node, destination);
+        let named = destination.named.ok_or_else(no_way)?;
+        let position = ground.layout.locate(named, ground.turnouts).map_err(Refusal::Place)?;
+        let mut way = way_to(ground, &self.model, node, position).ok_or_else(no_way)?;
+        let lap = lap(ground, &self.model, node);
+        let behind = |way: Length| way < located.at.way - THERE;
+        if behind(way) {
+            way += lap.filter(|lap| !behind(way + *lap)).ok_or_else(no_way)?;
+        }
+        if destination.next_round {
+            way += lap.ok_or_else(no_way)?;
+        }
+        let at = WayPoint { node, way };
+        if !stands {
+            let soonest = self.locator.rest_if_stopped(ground, &self.model, now + SOONEST);
+            let reached =
+                soonest.and_then(|rest| Some((rest, self.aimed_beyond(ground, &rest, at, destination.aim)?)));
+            if let Some((_, beyond)) = reached.filter(|(_, beyond)| *beyond > Length::ZERO) {
+                return Err(self.too_near(ground, at, beyond, destination));
+            }
+        }
+        Ok(at)
+    }
+
+    pub(super) fn too_near(
+        &self,
+        ground: Ground<'_>,
+        at: WayPoint,
+        beyond: Length,
+        destination: &Destination,
+    ) -> Refusal {
+        if destination.named.is_none() {
+            return Refusal::MoveTooShort { shortest: beyond };
+        }
+        let nearest = landmark_at(ground, &self.model, WayPoint { way: at.way + beyond, ..at });
+        let nearest = crate::track::Landmark {
+            offset: Length::from_mm(libm::round(nearest.offset.as_mm())),
+            ..nearest
+        };
+        Refusal::TooNear {
+            target: name(ground, destination),
+            nearest: ground.layout.display(nearest).to_string(),
+            beyond,
+            round: lap(ground, &self.model, at.node),
+        }
+    }
+
+    pub(super) fn no_way(&self, ground: Ground<'_>, from: NodeId, destination: &Destination) -> Refusal {
+        Refusal::NoWay {
+            target: name(ground, destination),
+            from: ground.layout.node_name(from).to_string(),
+            unknown: unknown_turnout(ground, from),
+        }
+    }
+
+    /// The target counted from a contact that the way as it was known did not lead to.
+    pub(super) fn waypoint_again(
+        &self,
+        ground: Ground<'_>,
+        node: NodeId,
+        destination: &Destination,
+    ) -> Option<WayPoint> {
+        let position = ground.layout.locate(destination.named?, ground.turnouts).ok()?;
+        Some(WayPoint { node, way: way_to(ground, &self.model, node, position)? })
+    }
+
+    /// The turnouts lie otherwise: is the target still where it was?
+    pub(super) fn way_changed(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+        self.expect_next(ground, now);
+        let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { .. }, .. }) = self.task
+        else {
+            return;
+        };
+        let Some(at) = destination.at else { return };
+        if destination.named.is_some() {
+            let again = self.waypoint_again(ground, at.node, &destination);
+            let round = lap(ground, &self.model, at.node);
+            let Some(again) = again else {
+                return self.give_up(now, self.no_way(ground, at.node, &destination), out);
+            };
+            // As many rounds from now as before.
+            let rounds = round.map_or(0.0, |round| libm::round((at.way - again.way) / round).max(0.0));
+            let way = again.way + round.unwrap_or(Length::ZERO) * rounds;
+            if let Some(task) = &mut self.task {
+                task.goal = Goal::RestAt(Destination { at: Some(WayPoint { way, ..at }), ..destination });
+            }
+        }
+        self.plan(ground, now, out);
+    }
+
+    /// Plans the stop anew with what is known now. A stop for which it is too late is made at once.
+    pub(super) fn plan(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+        let Some(task) = self.task.filter(|_| self.is_told()) else { return };
+        let (Goal::RestAt(Destination { at: Some(at), aim, .. }), Phase::Running { plan: before }) =
+            (task.goal, task.phase)
+        else {
+            return;
+        };
+        let found = command_time(now + LINE_TIME, |leaves| {
+            let rest = self.locator.rest_if_stopped(ground, &self.model, leaves)?;
+            Some((rest, self.aimed_beyond(ground, &rest, at, aim)?))
+        });
+        match found {
+            CommandTime::At(leaves, rest) => {
+                let Some(promise) = self.promise(ground, &rest, at) else { return };
+                let triggers = self.triggers(ground, now, leaves);
+                let plan = Plan { leaves, triggers, promise };
+                self.task = Some(Task { phase: Phase::Running { plan: Some(plan) }, ..task });
+                let is_news = before.is_none_or(|before| {
+                    (before.leaves - leaves).abs() >= NEWS || before.triggers[0] != triggers[0]
+                });
+                if is_news {
+                    out.say(DriveNotice::Planned(self.planned(ground, task.order, plan)));
+                }
+            }
+            CommandTime::TooLate(rest, beyond) => {
+                if beyond > OVERSHOOT {
+                    out.say(DriveNotice::Overshoots { order: task.order, train: self.id(), by: beyond });
+                }
+                self.stop_now(now, task, self.promise(ground, &rest, at), out);
+            }
+            // What was planned before is kept by the clock.
+            CommandTime::Never if before.is_some() => {}
+            CommandTime::Never => {
+                let target = match task.goal {
+                    Goal::RestAt(destination) => name(ground, &destination),
+                    _ => String::new(),
+                };
+                self.give_up(now, Refusal::OutOfReach { target }, out);
+            }
+        }
+    }
+
+    fn planned(&self, ground: Ground<'_>, order: OrderId, plan: Plan) -> PlannedStop {
+        let [trigger, _] = plan.triggers;
+        let passes = trigger.and_then(|sensor| {
+            let node = ground.node_of(sensor)?;
+            let located = self.located(ground, plan.leaves)?;
+            let since = located.at.way - way_between(ground, &self.model, located.at.node, node)?;
+            (located.speed.as_m_per_s() > 0.0).then(|| since / located.speed)
+        });
+        PlannedStop {
+            order,
+            train: self.id(),
+            leaves: plan.leaves,
+            trigger,
+            after_trigger: passes,
+            promise: plan.promise,
+        }
+    }
+
+    /// The last two contacts whose reports come in time to move a command that leaves then.
+    fn triggers(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        leaves: Timestamp,
+    ) -> [Option<crate::ids::SensorId>; 2] {
+        let (Some(here), Some(there)) = (self.located(ground, now), self.located(ground, leaves)) else {
+            return [None; 2];
+        };
+        let last = there.at.way - there.speed * REPORT_TIME;
+        let mut triggers = [None; 2];
+        for (sensor, way) in contacts_until(ground, &self.model, here.at.node, last) {
+            if way > here.at.way {
+                triggers = [Some(sensor), triggers[0]];
+            }
+        }
+        triggers
+    }
+
+    /// Where a rest lies against the target.
+    pub(super) fn promise(&self, ground: Ground<'_>, rest: &Rest, at: WayPoint) -> Option<Promise> {
+        let median = self.beyond(ground, rest.at, at)?;
+        let half = spread(rest) * PROMISED;
+        Some(Promise { median, low: median - half, high: median + half })
+    }
+
+    /// How far beyond the target the part of a rest lies that is aimed with.
+    pub(super) fn aimed_beyond(
+        &self,
+        ground: Ground<'_>,
+        rest: &Rest,
+        at: WayPoint,
+        aim: Aim,
+    ) -> Option<Length> {
+        Some(self.beyond(ground, rest.at, at)? + spread(rest) * aim.margin())
+    }
+
+    /// How far one point of the way lies beyond another.
+    pub(super) fn beyond(&self, ground: Ground<'_>, point: WayPoint, target: WayPoint) -> Option<Length> {
+        if let Some(between) = way_between(ground, &self.model, target.node, point.node) {
+            return Some(between + point.way - target.way);
+        }
+        let between = way_between(ground, &self.model, point.node, target.node)?;
+        Some(point.way - between - target.way)
+    }
+}
+
+fn name(ground: Ground<'_>, destination: &Destination) -> String {
+    destination
+        .named
+        .map_or_else(|| "the end of the move".into(), |named| ground.layout.display(named).to_string())
+}

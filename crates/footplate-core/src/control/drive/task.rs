@@ -1,0 +1,68 @@
+//! What a train is busy with, and how far it is with it.
+
+use crate::estimation::WayPoint;
+use crate::ids::{SensorId, SpeedStep};
+use crate::time::Timestamp;
+use crate::track::Landmark;
+
+use super::notice::Promise;
+use super::order::{Aim, OrderId};
+
+/// An order being carried out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Task {
+    pub(super) order: OrderId,
+    pub(super) goal: Goal,
+    pub(super) phase: Phase,
+}
+
+/// What comes of it in the end.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Goal {
+    /// Run at the step it is told.
+    Run,
+    /// Rest, wherever that is.
+    Rest,
+    /// Rest at a place.
+    RestAt(Destination),
+    /// Rest, then the other direction, then this step.
+    Reverse(SpeedStep),
+}
+
+/// The place to come to rest at, and how.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Destination {
+    /// As it was named; a move has no name for it.
+    pub(super) named: Option<Landmark>,
+    /// On the way, counted from the last contact passed; `None` until the train has been found.
+    pub(super) at: Option<WayPoint>,
+    pub(super) aim: Aim,
+    /// The step to stop from, if it was named.
+    pub(super) step: Option<SpeedStep>,
+    pub(super) next_round: bool,
+}
+
+/// How far a task is.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Phase {
+    /// The train runs until a contact says where it is.
+    Finding { since: Timestamp },
+    /// The train runs, and the stop is being planned.
+    Running { plan: Option<Plan> },
+    /// A step has been asked for, mostly 0, and has not left yet.
+    Telling { promise: Option<Promise> },
+    /// Step 0 has left, and the train comes to rest by this time.
+    Settling { promise: Option<Promise>, until: Timestamp },
+    /// It has been told to turn around.
+    Turning,
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plan {
+    /// When the last bit of the command shall have left.
+    pub(super) leaves: Timestamp,
+    /// Contacts that come before it, the last one and the one before that.
+    pub(super) triggers: [Option<SensorId>; 2],
+    pub(super) promise: Promise,
+}
