@@ -6,7 +6,7 @@ use footplate_core::latency::{PollTiming, PollTimingEstimator};
 use footplate_core::track::Layout;
 use footplate_core::{Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use crate::recording::{Recording, Run};
+use crate::recording::{Recording, Run, TrainAtStart};
 use crate::store::{Store, StoreError};
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
@@ -63,6 +63,19 @@ pub struct Batch {
     pub sections: SectionIndex,
     /// The fit of all of it.
     pub calibration: Calibration,
+    /// Runs of live sessions in which several trains moved, whose contacts nobody has told apart.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A run of which nothing was used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The recording it is of.
+    pub recording: String,
+    /// Its number there.
+    pub run: RunId,
+    /// The trains that moved in it.
+    pub trains: Vec<TrainId>,
 }
 
 /// Why recordings make no calibration.
@@ -118,7 +131,7 @@ impl Batch {
                 runs.extend(batch_run(&recording.name, run, events.collect(), train)?);
             }
         }
-        Self::of_runs(layout, runs)
+        Self::of_runs(layout, runs, Vec::new())
     }
 
     /// Calibrates from everything a store held at a date of one layout, less what was excluded at that date.
@@ -128,7 +141,7 @@ impl Batch {
         as_of: Timestamp,
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
-        let mut runs = Vec::new();
+        let (mut runs, mut left_out) = (Vec::new(), Vec::new());
         for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
             for stored in store.runs(recording.key, as_of)? {
                 let events = stored.events.iter().map(|event| BatchEvent {
@@ -137,14 +150,21 @@ impl Batch {
                     stored_as: Some(event.key.0),
                     excluded: event.is_excluded(),
                 });
-                let events = events.collect();
-                runs.extend(batch_run(&recording.name, &stored.accepted(), events, train)?);
+                match batch_run(&recording.name, &stored.accepted(), events.collect(), train) {
+                    // A person who records trains one by one wants to know; a session goes as it goes.
+                    Err(BatchError::SeveralTrains { recording: name, run, trains })
+                        if recording.is_live() =>
+                    {
+                        left_out.push(LeftOut { recording: name, run, trains });
+                    }
+                    run => runs.extend(run?),
+                }
             }
         }
-        Self::of_runs(layout, runs)
+        Self::of_runs(layout, runs, left_out)
     }
 
-    fn of_runs(layout: &Layout, runs: Vec<BatchRun>) -> Result<Self, BatchError> {
+    fn of_runs(layout: &Layout, runs: Vec<BatchRun>, left_out: Vec<LeftOut>) -> Result<Self, BatchError> {
         let sections = SectionIndex::of(layout);
         let mut polling: Vec<Polling> = Vec::new();
         let mut passages: Vec<RunPassages> = Vec::new();
@@ -163,7 +183,7 @@ impl Batch {
                 runs: runs.len(),
                 passages: passages.iter().map(|run| run.passages.len()).sum(),
             })?;
-        Ok(Self { runs, passages, polling, sections, calibration })
+        Ok(Self { runs, passages, polling, sections, calibration, left_out })
     }
 
     /// The event that a calibration means by run and entry.
@@ -193,12 +213,16 @@ fn batch_run(
     events: Vec<BatchEvent>,
     wanted: Option<TrainId>,
 ) -> Result<Option<BatchRun>, BatchError> {
-    let Some(only) = run.only_train() else {
-        return Err(BatchError::SeveralTrains {
-            recording: recording.to_owned(),
-            run: run.id,
-            trains: run.trains.iter().map(|at_start| at_start.train).collect(),
-        });
+    let only = match (run.only_train(), moving(run).as_slice()) {
+        (Some(only), _) | (None, [only]) => *only,
+        (None, []) => return Ok(None),
+        (None, several) => {
+            return Err(BatchError::SeveralTrains {
+                recording: recording.to_owned(),
+                run: run.id,
+                trains: several.iter().map(|at_start| at_start.train).collect(),
+            });
+        }
     };
     Ok(wanted.is_none_or(|wanted| wanted == only.train).then(|| BatchRun {
         recording: recording.to_owned(),
@@ -208,6 +232,21 @@ fn batch_run(
         step: only.step,
         events,
     }))
+}
+
+/// The trains that move in a run, and what they did when it began: those that stand all the time close no contact.
+fn moving(run: &Run) -> Vec<TrainAtStart> {
+    let mut moving: Vec<TrainAtStart> =
+        run.trains.iter().copied().filter(|at_start| at_start.step != SpeedStep::STAND).collect();
+    for raw in &run.events {
+        if let EventKind::Speed { train, step } = raw.event.kind
+            && step != SpeedStep::STAND
+            && moving.iter().all(|known| known.train != train)
+        {
+            moving.push(TrainAtStart { train, step: SpeedStep::STAND });
+        }
+    }
+    moving
 }
 
 /// The rhythm of a recording's link, from all its reports: an excluded report still shows when polls were.

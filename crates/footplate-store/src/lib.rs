@@ -28,7 +28,7 @@ mod vehicle_file;
 mod whole_file;
 mod written_table;
 
-pub use batch::{Batch, BatchError, BatchEvent, BatchRun, Polling};
+pub use batch::{Batch, BatchError, BatchEvent, BatchRun, LeftOut, Polling};
 pub use calibration_file::{
     CalibrationFile, CalibrationFileError, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION,
     PollingForm, Quantity, SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm,
@@ -53,8 +53,9 @@ pub use sensor_log::{
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
 pub use store::{
-    Calibration, Change, EventKey, Import, Mark, MarkKind, NewCalibration, RecordingKey, RunKey, Salvaged,
-    SalvagedTable, Store, StoreError, StoredEvent, StoredRecording, StoredRun, salvage,
+    Calibration, CalibrationKind, Change, EventKey, Import, Journal, Mark, MarkKind, NewCalibration,
+    RecordingKey, RunKey, Salvaged, SalvagedTable, Store, StoreError, StoredEvent, StoredRecording,
+    StoredRun, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

@@ -6,7 +6,7 @@ use rusqlite::{Connection, Row};
 use super::error::StoreError;
 use super::file::Store;
 use super::marks::{Mark, MarkKind};
-use super::recordings::{EventKey, RecordingKey};
+use super::recordings::{EventKey, LIVE, RecordingKey, RunKey};
 use super::row;
 use crate::recording::{GatePass, RawEvent, Run, TrainAtStart};
 
@@ -31,9 +31,19 @@ pub struct StoredRecording {
     pub excluded: u64,
 }
 
+impl StoredRecording {
+    /// Whether it is of a live session, not of a file.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        self.form == LIVE
+    }
+}
+
 /// A run as it was at a date.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredRun {
+    /// Its number in the store.
+    pub key: RunKey,
     /// Its number in the recording.
     pub id: RunId,
     /// When its clock stood at zero, since the Unix epoch, where that is known.
@@ -195,7 +205,7 @@ impl Store {
                 Ok(GatePass { line: row::line(row, 0)?, gate: row.get(1)?, time })
             },
         )?;
-        Ok(StoredRun { id, began_at, trains, events, gates })
+        Ok(StoredRun { key: RunKey(key), id, began_at, trains, events, gates })
     }
 
     /// What changed after one date and until another, in order: why numbers of the two differ.

@@ -7,6 +7,7 @@
 //! ```text
 //! file          opening, creating, migrating; who may write
 //! recordings    importing a recording, appending the events of a live session
+//! journal       a live session from its beginning to its end
 //! history       reading back what was there at a date, and what changed between two
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
@@ -17,15 +18,17 @@ mod calibrations;
 mod error;
 mod file;
 mod history;
+mod journal;
 mod marks;
 mod recordings;
 mod row;
 mod salvage;
 
-pub use calibrations::{Calibration, NewCalibration};
+pub use calibrations::{Calibration, CalibrationKind, NewCalibration};
 pub use error::StoreError;
 pub use file::Store;
 pub use history::{Change, StoredEvent, StoredRecording, StoredRun};
+pub use journal::Journal;
 pub use marks::{Mark, MarkKind};
 pub use recordings::{EventKey, Import, RecordingKey, RunKey};
 pub use salvage::{Salvaged, SalvagedTable, salvage};

@@ -40,7 +40,7 @@ key!(
 );
 
 /// The form of a recording that no file was read for.
-const LIVE: &str = "live";
+pub(super) const LIVE: &str = "live";
 
 /// What an import did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

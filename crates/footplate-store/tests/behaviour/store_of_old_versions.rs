@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use footplate_core::TrainId;
-use footplate_store::{Run, StoredRun};
+use footplate_store::{CalibrationKind, Run, StoredRun};
 
 use crate::recordings::{ALL, real};
 use crate::stores::{Shelf, minute};
@@ -27,6 +27,9 @@ fn every_old_store_opens_with_all_it_had() {
         assert_eq!(counts, [(91, 1), (580, 0)], "{file}");
         let light_gates = store.runs(recordings[1].key, late).unwrap();
         assert_eq!(light_gates.iter().map(StoredRun::accepted).collect::<Vec<Run>>(), real(ALL[8]).runs);
-        assert_eq!(store.calibration(TrainId(24), late).unwrap().unwrap().body, r#"{"train":24}"#);
+        assert_eq!(
+            store.calibration(CalibrationKind::Recordings, TrainId(24), late).unwrap().unwrap().body,
+            r#"{"train":24}"#
+        );
     }
 }

@@ -11,8 +11,8 @@ use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 use footplate_store::{
-    Batch, CalibrationFile, Import, MODEL_VERSION, NewCalibration, Recording, Store, layout_named,
-    write_whole,
+    Batch, CalibrationFile, CalibrationKind, Import, MODEL_VERSION, NewCalibration, Recording, Store,
+    layout_named, write_whole,
 };
 
 use super::Outcome;
@@ -104,7 +104,13 @@ impl Arguments {
 fn keep(file: &CalibrationFile, store: &mut Store, as_of: Timestamp) -> anyhow::Result<()> {
     for form in &file.trains {
         let body = serde_json::to_string(&file.of_one(form.train))?;
-        let new = NewCalibration { train: form.train, as_of, model_version: MODEL_VERSION, body: &body };
+        let new = NewCalibration {
+            kind: CalibrationKind::Recordings,
+            train: form.train,
+            as_of,
+            model_version: MODEL_VERSION,
+            body: &body,
+        };
         store.keep_calibration(new, now())?;
     }
     Ok(())

@@ -1,0 +1,96 @@
+//! The journal of a live session: what a railway reports and is told, on the disk as it happens.
+//!
+//! A session is a recording, and a stretch of it in which the clock is continuous and no train is lifted is a run. An
+//! event is acknowledged once it is on the disk (write-ahead journal, `synchronous = FULL`: one wait for the disk a call),
+//! and what was acknowledged outlives whatever happens to the process or the power. What came together is handed over
+//! together; nobody waits here for more to come.
+
+use footplate_core::{Event, RunId, Timestamp};
+
+use super::error::StoreError;
+use super::file::Store;
+use super::recordings::{RecordingKey, RunKey};
+use crate::recording::TrainAtStart;
+
+/// A live session that is being written down.
+#[derive(Debug)]
+pub struct Journal {
+    store: Store,
+    recording: RecordingKey,
+    run: RunKey,
+    number: u32,
+    acknowledged: u64,
+}
+
+impl Journal {
+    /// Begins a session on `layout` with its first run, whose clock stood at zero at `began_at`. `now` since the Unix
+    /// epoch, as everywhere in a store.
+    ///
+    /// # Errors
+    /// The store cannot be written: better known before the first train moves.
+    pub fn begin(
+        mut store: Store,
+        name: &str,
+        layout: &str,
+        began_at: Option<Timestamp>,
+        trains: &[TrainAtStart],
+        now: Timestamp,
+    ) -> Result<Self, StoreError> {
+        let recording = store.begin_recording(name, layout, now)?;
+        let run = store.begin_run(recording, RunId(1), began_at, trains)?;
+        Ok(Self { store, recording, run, number: 1, acknowledged: 0 })
+    }
+
+    /// Begins the next run: the clock has jumped, a train was lifted, or other trains take part. `began_at` as above, and
+    /// what the trains do now.
+    ///
+    /// # Errors
+    /// The store cannot be written; the run before goes on.
+    pub fn begin_run(
+        &mut self,
+        began_at: Option<Timestamp>,
+        trains: &[TrainAtStart],
+    ) -> Result<(), StoreError> {
+        let next = self.number + 1;
+        self.run = self.store.begin_run(self.recording, RunId(next), began_at, trains)?;
+        self.number = next;
+        Ok(())
+    }
+
+    /// Writes events down, in their order. When this returns they are on the disk, all of them; it says how many of the
+    /// session are by now.
+    ///
+    /// # Errors
+    /// None of these events was acknowledged. They can be handed over again: nothing is written down twice.
+    pub fn append(&mut self, events: &[Event], now: Timestamp) -> Result<u64, StoreError> {
+        if !events.is_empty() {
+            self.store.append(self.run, events, now)?;
+            self.acknowledged += events.len() as u64;
+        }
+        Ok(self.acknowledged)
+    }
+
+    /// How many events of the session are on the disk.
+    #[must_use]
+    pub const fn acknowledged(&self) -> u64 {
+        self.acknowledged
+    }
+
+    /// The session's number among the recordings.
+    #[must_use]
+    pub const fn recording(&self) -> RecordingKey {
+        self.recording
+    }
+
+    /// The store in which it is.
+    #[must_use]
+    pub const fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// Ends the session, which changes nothing: all that was acknowledged is there already.
+    #[must_use]
+    pub fn end(self) -> Store {
+        self.store
+    }
+}
