@@ -213,8 +213,10 @@ fn batch_run(
     events: Vec<BatchEvent>,
     wanted: Option<TrainId>,
 ) -> Result<Option<BatchRun>, BatchError> {
-    let only = match (run.only_train(), moving(run).as_slice()) {
-        (Some(only), _) | (None, [only]) => *only,
+    let moving = moving(run);
+    let only = match (run.only_train(), moving.as_slice()) {
+        (Some(only), _) => only,
+        (None, [only]) => *only,
         (None, []) => return Ok(None),
         (None, several) => {
             return Err(BatchError::SeveralTrains {

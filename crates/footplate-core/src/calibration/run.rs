@@ -10,14 +10,14 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::Layout;
 use crate::units::Length;
 
-/// Where a run came to rest, measured by hand.
+/// Where a train came to rest in a run, measured by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredStop {
     /// When the command to stand was sent.
     pub commanded: Timestamp,
     /// The step before it.
     pub from: SpeedStep,
-    /// When a person saw the train stand.
+    /// When a person saw the train stand, or read the tape.
     pub seen: Timestamp,
     /// The contact from which the tape was laid, and how far past it the train stood.
     pub landmark: SensorId,
@@ -36,8 +36,8 @@ pub struct RunPassages {
     pub run: usize,
     /// Its passages.
     pub passages: Vec<Passage>,
-    /// Where it was measured to stand at the end.
-    pub stop: Option<MeasuredStop>,
+    /// Where it was measured to stand; of a place that was measured twice, the later reading.
+    pub stops: Vec<MeasuredStop>,
 }
 
 impl RunPassages {
@@ -56,7 +56,7 @@ impl RunPassages {
         let mut timing = timing.clone();
         timing.restart();
         let mut tracker = PassageTracker::new(train, step, timing);
-        let mut read = Self { train, run, passages: Vec::new(), stop: None };
+        let mut read = Self { train, run, passages: Vec::new(), stops: Vec::new() };
         let mut standing: Option<(Timestamp, SpeedStep)> = None;
         for (entry, (event, excluded)) in events.enumerate() {
             if excluded {
@@ -74,8 +74,9 @@ impl RunPassages {
                 }
                 EventKind::Stopped { train: told, landmark, offset } if told == train => {
                     if let Some((commanded, from)) = standing {
-                        read.stop =
-                            Some(MeasuredStop { commanded, from, seen: event.time, landmark, offset, entry });
+                        read.stops.retain(|stop| stop.commanded != commanded);
+                        let seen = event.time;
+                        read.stops.push(MeasuredStop { commanded, from, seen, landmark, offset, entry });
                     }
                 }
                 _ => {}

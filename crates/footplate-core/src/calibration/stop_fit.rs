@@ -26,6 +26,9 @@ const TAPE_M: f64 = 0.005;
 /// A person presses the key this long after the train stands (0.2 to 0.5 s), and how that varies (s).
 const HUMAN_DELAY_S: f64 = 0.35;
 const HUMAN_SPREAD_S: f64 = 0.1;
+/// Who says later than this after the command where a train stands has read a tape and not a watch: no published
+/// model train takes half as long to stop.
+const WATCHED: TimeSpan = TimeSpan::from_ms(15_000);
 /// Stops of one train from one speed scatter by 4 mm at mid speed and 21 mm at top speed (published): by this
 /// part of the distance, until a train has shown its own.
 const STOP_SCATTER: f64 = 0.015;
@@ -52,8 +55,9 @@ pub struct StopMeasurement {
     pub distance: StoppingDistance<FromCommand>,
     /// One standard deviation of it.
     pub uncertainty: Length,
-    /// Time from the command until the train stood, the delay of the person who saw it taken off.
-    pub time: TimeSpan,
+    /// Time from the command until the train stood, the delay of the person who saw it taken off; `None` where only a
+    /// tape was read, some time later.
+    pub time: Option<TimeSpan>,
 }
 
 /// The stops of one train.
@@ -74,8 +78,8 @@ pub struct StopEntry {
     pub speed: Speed,
     /// Mean distance from the command; the uncertainty is of the mean.
     pub distance: Estimate<Length>,
-    /// Mean time from the command; the uncertainty is of the mean.
-    pub time: Estimate<TimeSpan>,
+    /// Mean time from the command; the uncertainty is of the mean. `None` where nobody watched.
+    pub time: Option<Estimate<TimeSpan>>,
     /// Scatter of single stops, measured where there are several.
     pub scatter: Option<Length>,
     /// What the two-term law says too little (positive) or too much here.
@@ -103,11 +107,11 @@ pub(super) fn stop_tables(
 ) -> BTreeMap<TrainId, StopTable> {
     let mut by_train: BTreeMap<TrainId, Vec<StopMeasurement>> = BTreeMap::new();
     for run in runs {
-        if let Some(measured) = run.stop.and_then(|stop| measurement(layout, sections, run, &stop, fit)) {
-            by_train.entry(run.train).or_default().push(measured);
-        }
+        let measured = run.stops.iter().filter_map(|stop| measurement(layout, sections, run, stop, fit));
+        by_train.entry(run.train).or_default().extend(measured);
     }
-    by_train.into_iter().map(|(train, measurements)| (train, table(measurements))).collect()
+    let measured = by_train.into_iter().filter(|(_, measurements)| !measurements.is_empty());
+    measured.map(|(train, measurements)| (train, table(measurements))).collect()
 }
 
 fn measurement(
@@ -151,7 +155,8 @@ fn measurement(
         speed: [Speed::from_m_per_s(speed), Speed::from_m_per_s(speed * part)],
         distance: StoppingDistance::new(Length::from_m(distance)),
         uncertainty: Length::from_m(libm::sqrt(variance)),
-        time: stop.seen - stop.commanded - TimeSpan::from_s(HUMAN_DELAY_S),
+        time: (stop.seen - stop.commanded <= WATCHED)
+            .then(|| stop.seen - stop.commanded - TimeSpan::from_s(HUMAN_DELAY_S)),
     })
 }
 
@@ -186,7 +191,6 @@ fn entry(stops: &[StopMeasurement]) -> StopEntry {
     let n = stops.len() as f64;
     let mean = |value: &dyn Fn(&StopMeasurement) -> f64| stops.iter().map(value).sum::<f64>() / n;
     let distance = mean(&|stop| stop.distance.length().as_m());
-    let time = mean(&|stop| stop.time.as_s());
     let squares = |value: &dyn Fn(&StopMeasurement) -> f64, middle: f64| {
         stops.iter().map(|stop| (value(stop) - middle) * (value(stop) - middle)).sum::<f64>()
     };
@@ -197,8 +201,6 @@ fn entry(stops: &[StopMeasurement]) -> StopEntry {
     let reading = mean(&|stop| stop.uncertainty.as_m() * stop.uncertainty.as_m());
     let expected = STOP_SCATTER * distance;
     let single = libm::sqrt(reading + expected * expected).max(scatter.unwrap_or(0.0));
-    let time_spread = if stops.len() > 1 { squares(&|stop| stop.time.as_s(), time) / (n - 1.0) } else { 0.0 };
-    let time_single = libm::sqrt(time_spread.max(HUMAN_SPREAD_S * HUMAN_SPREAD_S));
     let count = stops.len() as u32;
     // Stops are dated by their run's clock, as everything of a recording is.
     let date = Timestamp::ZERO;
@@ -210,15 +212,29 @@ fn entry(stops: &[StopMeasurement]) -> StopEntry {
             count,
             date,
         },
-        time: Estimate {
-            value: TimeSpan::from_s(time),
-            uncertainty: TimeSpan::from_s(time_single / libm::sqrt(n)),
-            count,
-            date,
-        },
+        time: mean_time(stops),
         scatter: scatter.map(Length::from_m),
         residual: None,
     }
+}
+
+/// Mean time to rest of the stops that somebody watched.
+fn mean_time(stops: &[StopMeasurement]) -> Option<Estimate<TimeSpan>> {
+    let times: Vec<f64> = stops.iter().filter_map(|stop| Some(stop.time?.as_s())).collect();
+    if times.is_empty() {
+        return None;
+    }
+    let n = times.len() as f64;
+    let mean = times.iter().sum::<f64>() / n;
+    let squares: f64 = times.iter().map(|time| (time - mean) * (time - mean)).sum();
+    let spread = if times.len() > 1 { squares / (n - 1.0) } else { 0.0 };
+    let single = libm::sqrt(spread.max(HUMAN_SPREAD_S * HUMAN_SPREAD_S));
+    Some(Estimate {
+        value: TimeSpan::from_s(mean),
+        uncertainty: TimeSpan::from_s(single / libm::sqrt(n)),
+        count: times.len() as u32,
+        date: Timestamp::ZERO,
+    })
 }
 
 fn two_terms(steps: &BTreeMap<SpeedStep, StopEntry>) -> Option<TwoTermLaw> {
@@ -289,7 +305,7 @@ mod tests {
                 speed: [Speed::from_m_per_s(*v), Speed::ZERO],
                 distance: StoppingDistance::new(Length::from_m(d)),
                 uncertainty: Length::from_mm(3.0),
-                time: TimeSpan::from_s(2.0),
+                time: Some(TimeSpan::from_s(2.0)),
             }
         });
         let table = table(stops.collect());

@@ -209,7 +209,7 @@ fn stops(table: &StopTable) -> StopForm {
         step: *step,
         speed_mm_per_s: entry.speed.as_mm_per_s(),
         distance: Quantity::length(entry.distance),
-        time: Quantity::seconds(entry.time),
+        time: entry.time.map(Quantity::seconds),
         scatter_mm: entry.scatter.map(Length::as_mm),
         residual_mm: entry.residual.map(Length::as_mm),
     });

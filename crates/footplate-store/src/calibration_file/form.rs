@@ -176,8 +176,9 @@ pub struct StopStepForm {
     pub speed_mm_per_s: f64,
     /// Mean distance from the command (mm).
     pub distance: Quantity,
-    /// Mean time from the command (s).
-    pub time: Quantity,
+    /// Mean time from the command (s), where somebody watched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<Quantity>,
     /// Scatter of single stops (mm), where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter_mm: Option<f64>,

@@ -2,7 +2,9 @@
 
 use std::io::Write;
 
-use super::{calibrate, compare, completions, convert, layout, odometry, predict, report, simulate, store};
+use super::{
+    calibrate, compare, completions, convert, layout, measure, odometry, predict, report, simulate, store,
+};
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -33,6 +35,7 @@ verbs! {
     Completions: completions,
     Convert: convert,
     Layout: layout,
+    Measure: measure,
     Odometry: odometry,
     Predict: predict,
     Report: report,

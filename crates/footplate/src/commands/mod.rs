@@ -11,6 +11,7 @@ mod completions;
 mod convert;
 mod layout;
 mod log_file;
+mod measure;
 mod odometry;
 mod predict;
 mod report;

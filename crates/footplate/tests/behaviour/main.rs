@@ -7,6 +7,7 @@ mod compare;
 mod forecasts_hold;
 mod inertial_slides;
 mod layout;
+mod measure;
 mod odometer_on_scenarios;
 mod odometry;
 mod odometry_report;

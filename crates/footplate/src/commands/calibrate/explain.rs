@@ -218,7 +218,7 @@ fn stops(batch: &Batch, step: SpeedStep) -> Vec<Listing> {
                         rounded(stop.speed[0].as_mm_per_s(), 1),
                         rounded(stop.distance.length().as_mm(), 0),
                         rounded(stop.uncertainty.as_mm(), 0),
-                        rounded(stop.time.as_s(), 2),
+                        stop.time.map_or(Value::Null, |time| rounded(time.as_s(), 2)),
                         place(batch, stop.run, stop.entry),
                     ]
                 })

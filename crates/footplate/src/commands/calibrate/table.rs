@@ -139,13 +139,15 @@ fn write_stops(stops: &StopForm, output: &mut dyn Write) -> io::Result<()> {
             |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.0}"));
         writeln!(
             output,
-            "  {:>4}  {:>9.0} {:>11.0} ± {:<6.0} {:>5.2} ± {:<5.2} {:>4} {:>11} {:>15}",
+            "  {:>4}  {:>9.0} {:>11.0} ± {:<6.0} {:>13} {:>4} {:>11} {:>15}",
             step.step,
             step.speed_mm_per_s,
             step.distance.value,
             step.distance.uncertainty,
-            step.time.value,
-            step.time.uncertainty,
+            step.time.as_ref().map_or_else(
+                || "–".to_owned(),
+                |time| format!("{:>5.2} ± {:<5.2}", time.value, time.uncertainty)
+            ),
             step.distance.measurements,
             or_dash(step.scatter_mm),
             or_dash(step.residual_mm)

@@ -73,7 +73,7 @@ pub(super) fn stops(stops: &StopForm) -> String {
             step.step.to_string(),
             format!("{:.0} mm/s", step.speed_mm_per_s),
             quantity(&step.distance),
-            quantity(&step.time),
+            step.time.as_ref().map_or_else(|| "–".to_owned(), quantity),
             step.distance.measurements.to_string(),
             step.residual_mm.map_or_else(|| "–".to_owned(), |residual| format!("{} mm", signed(residual, 0))),
         ]);

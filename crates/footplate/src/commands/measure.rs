@@ -1,0 +1,31 @@
+//! `footplate measure`: what only a person can measure, as a measurement like any other.
+
+mod stop;
+mod stopped_run;
+
+use std::io::Write;
+
+use clap::{Args, Subcommand};
+
+use super::Outcome;
+
+/// Add what was measured by hand, such as where a train stands by the tape.
+#[derive(Args)]
+#[command(after_help = "Example: footplate measure stop --store railway.db --train 24 --at C13+120mm")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    Stop(stop::Arguments),
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        match self.what {
+            What::Stop(arguments) => arguments.run(output),
+        }
+    }
+}

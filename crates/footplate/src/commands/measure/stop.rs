@@ -1,0 +1,215 @@
+//! `footplate measure stop`: where a train stands by the tape, and what that changes.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use footplate_core::calibration::{StopEntry, StopMeasurement};
+use footplate_core::track::Layout;
+use footplate_core::{SpeedStep, TimeSpan, TrainId};
+use footplate_store::{Batch, EventKey, RecordingKey, Store, layout_named};
+use serde_json::{Value, json};
+
+use super::stopped_run::StoppedRun;
+use crate::clock::now;
+use crate::commands::Outcome;
+
+/// Beyond this many standard deviations from the other stops a reading is pointed out: one in 300 by chance.
+const REMARKABLE: f64 = 3.0;
+
+/// Add where a train stands, measured from the contact it passed last to its pickup shoe.
+///
+/// The measurement belongs to the last stop of the train in the store. It is an event like any other: `footplate
+/// store exclude` takes it out again.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  footplate measure stop --store railway.db --train 24 --at C13+120mm
+  footplate measure stop --store railway.db --train 24 --at E12+1310mm --took 3.4s")]
+pub(super) struct Arguments {
+    /// The store of the session, or of the recordings that were imported.
+    #[arg(long, value_name = "FILE")]
+    store: PathBuf,
+    /// The train.
+    #[arg(long, value_name = "N")]
+    train: u16,
+    /// The contact it passed last, and how far past it the leading end of its pickup shoe stands.
+    #[arg(long, value_name = "PLACE")]
+    at: String,
+    /// How long it took from the command to rest, by a watch.
+    #[arg(long, value_name = "TIME")]
+    took: Option<Seconds>,
+    /// The layout, if it is none of the built-in ones: the file that the recording was made with.
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<String>,
+    /// The recording that the stop is in, if not the last one of the train.
+    #[arg(long, value_name = "N")]
+    recording: Option<i64>,
+    /// Write JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A time as a person reads it off a watch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Seconds(TimeSpan);
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let seconds = text.trim().trim_end_matches('s').trim_end().parse::<f64>();
+        let seconds = seconds.ok().filter(|seconds| (0.1..=15.0).contains(seconds));
+        let right =
+            "write the seconds from the command until the train stood, from 0.1s to 15s, such as 3.4s";
+        seconds.map(|seconds| Self(TimeSpan::from_s(seconds))).ok_or_else(|| right.to_owned())
+    }
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let train = TrainId(self.train);
+        let mut store = Store::open(&self.store)?;
+        let stopped = StoppedRun::find(&store, train, self.recording.map(RecordingKey))?;
+        let layout = self.layout_of(&stopped)?;
+        let at = layout.landmark(&self.at)?;
+        let event = stopped.entry(&layout, train, at, self.took.map(|took| took.0))?;
+        let before = known(&layout, &store, train, stopped.from());
+        store.append(stopped.run.key, &[event], now())?;
+        let after = known(&layout, &store, train, stopped.from());
+        let key = last_event(&store, &stopped)?;
+        let told = Told { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
+        if self.json {
+            writeln!(output, "{}", told.value())?;
+        } else {
+            told.write(output)?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn layout_of(&self, stopped: &StoppedRun) -> anyhow::Result<Layout> {
+        let name = &stopped.recording.layout;
+        let layout = match &self.layout {
+            Some(given) => layout_named(given)?.layout,
+            None => {
+                layout_named(name)
+                    .with_context(|| {
+                        format!("the recording is of the layout {name}: give its file with --layout FILE")
+                    })?
+                    .layout
+            }
+        };
+        if layout.name() != name {
+            bail!("the recording is of the layout {name}, not of {}", layout.name());
+        }
+        Ok(layout)
+    }
+}
+
+/// What is known of stops from a step: all of them together, and each.
+struct Known {
+    entry: StopEntry,
+    last: Option<StopMeasurement>,
+}
+
+fn known(layout: &Layout, store: &Store, train: TrainId, from: SpeedStep) -> Option<Known> {
+    let batch = Batch::of_store(layout, store, now(), Some(train)).ok()?;
+    let table = batch.calibration.stops.get(&train)?;
+    let last = table.measurements.iter().rev().find(|stop| stop.step == from).copied();
+    Some(Known { entry: *table.steps.get(&from)?, last })
+}
+
+fn last_event(store: &Store, stopped: &StoppedRun) -> anyhow::Result<EventKey> {
+    let runs = store.runs(stopped.recording.key, now())?;
+    let run = runs.iter().find(|run| run.key == stopped.run.key);
+    let last = run.and_then(|run| run.events.last());
+    last.map(|stored| stored.key).context("the run has gone from the store")
+}
+
+/// What was done, for people and programs.
+struct Told<'a> {
+    arguments: &'a Arguments,
+    layout: &'a Layout,
+    stopped: &'a StoppedRun,
+    key: EventKey,
+    before: Option<Known>,
+    after: Option<Known>,
+}
+
+impl Told<'_> {
+    fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        let Self { arguments: Arguments { train, at, .. }, stopped, key, .. } = self;
+        let (run, recording, from) = (stopped.run.id, stopped.recording.key, stopped.from());
+        writeln!(
+            output,
+            "event {key}: train {train} stands at {at}, stopped from step {from} (recording {recording}, run {run})"
+        )?;
+        let Some(after) = &self.after else {
+            return writeln!(
+                output,
+                "kept; what it says of stops from step {from} is known when the speed at step {from} is: let the train \
+                 pass two contacts at it"
+            );
+        };
+        let now = after.entry.distance;
+        let shown = |mm: f64| format!("{mm:.0}");
+        let before = self
+            .before
+            .as_ref()
+            .map_or_else(String::new, |before| format!("{} -> ", shown(before.entry.distance.value.as_mm())));
+        writeln!(
+            output,
+            "stop from step {from}: {before}{} mm ± {} mm, {} measured",
+            shown(now.value.as_mm()),
+            shown(now.uncertainty.as_mm()),
+            now.count
+        )?;
+        if let Some(sigmas) = self.remarkable() {
+            writeln!(
+                output,
+                "this one is {sigmas:.0} standard deviations from the others; if the tape was misread: footplate store \
+                 exclude {key} --reason \"misread\" --store {}",
+                self.arguments.store.display()
+            )?;
+        }
+        Ok(())
+    }
+
+    /// How far the reading is from what the others made expect, if that is far.
+    fn remarkable(&self) -> Option<f64> {
+        let before = self.before.as_ref()?.entry.distance;
+        let this = self.after.as_ref()?.last?;
+        // The uncertainty of a mean of n is that of one by the root of n.
+        let single = before.uncertainty.as_m() * f64::from(before.count.max(1)).sqrt();
+        let variance = single.powi(2) + before.uncertainty.as_m().powi(2) + this.uncertainty.as_m().powi(2);
+        let sigmas = (this.distance.length() - before.value).as_m().abs() / variance.sqrt();
+        (sigmas > REMARKABLE).then_some(sigmas)
+    }
+
+    fn value(&self) -> Value {
+        let known = |known: &Option<Known>| {
+            known.as_ref().map(|known| {
+                let distance = known.entry.distance;
+                json!({
+                    "distance_mm": distance.value.as_mm(),
+                    "uncertainty_mm": distance.uncertainty.as_mm(),
+                    "measurements": distance.count,
+                })
+            })
+        };
+        json!({
+            "event": self.key.0,
+            "recording": self.stopped.recording.key.0,
+            "run": self.stopped.run.id.0,
+            "train": self.arguments.train,
+            "layout": self.layout.name(),
+            "at": self.arguments.at,
+            "from_step": self.stopped.from().get(),
+            "before": known(&self.before),
+            "after": known(&self.after),
+            "sigmas_from_the_others": self.remarkable(),
+        })
+    }
+}

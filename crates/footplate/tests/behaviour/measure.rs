@@ -1,0 +1,99 @@
+//! `footplate measure stop` takes what a tape says as a measurement like any other, and nothing that cannot be.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::program::{Run, footplate};
+
+/// Four stops of train 24 of 2020, two from step 8, the last of them without what the tape said: `E12 + 260 mm`.
+fn store(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir(&folder).unwrap();
+    let logs = format!("{}/../../testdata/sensor-logs", env!("CARGO_MANIFEST_DIR"));
+    let whole = fs::read_to_string(format!("{logs}/choochoos_2020_track_a_train24_stop.csv")).unwrap();
+    let (without, last) = whole.trim_end().rsplit_once('\n').unwrap();
+    assert!(last.starts_with("4,stopped,8,,260,"), "{last}");
+    let stops = folder.join("train24_stop.csv");
+    fs::write(&stops, format!("{without}\n")).unwrap();
+    let store = folder.join("railway.db");
+    let run = footplate(&[
+        "calibrate",
+        "--from",
+        &format!("{logs}/choochoos_2020_track_a_train24_run.csv"),
+        stops.to_str().unwrap(),
+        "--layout",
+        "track-a",
+        "--store",
+        store.to_str().unwrap(),
+    ]);
+    assert_eq!(run.status, 0, "{run:?}");
+    store
+}
+
+fn measure(store: &Path, arguments: &[&str]) -> Run {
+    footplate(&[&["measure", "stop", "--store", store.to_str().unwrap()], arguments].concat())
+}
+
+#[test]
+fn a_tape_counts_like_any_other_measurement_and_says_what_it_changed() {
+    let store = store("measure-stop");
+    // Given the other stop from step 8, of 198 mm (docs of the team: 260 mm past E12 both times),
+    let run = measure(&store, &["--train", "24", "--at", "E12+270mm", "--json"]);
+    assert_eq!(run.status, 0, "{run:?}");
+    let told: serde_json::Value = serde_json::from_str(&run.output).unwrap();
+    assert_eq!((&told["from_step"], &told["run"]), (&8.into(), &4.into()));
+    let distance = |of: &str| told[of]["distance_mm"].as_f64().unwrap();
+    // then 10 mm more on the tape are 5 mm more in the mean, of two now.
+    assert!((distance("after") - distance("before") - 5.0).abs() < 1.5, "{told}");
+    assert_eq!((&told["before"]["measurements"], &told["after"]["measurements"]), (&1.into(), &2.into()));
+    // The time of reading a tape is not the time it took to stop.
+    let table =
+        footplate(&["calibrate", "--store", store.to_str().unwrap(), "--layout", "track-a", "--json"]);
+    let table: serde_json::Value = serde_json::from_str(&table.output).unwrap();
+    let stops = &table["trains"][0]["stops"]["steps"][0];
+    assert_eq!((&stops["step"], &stops["time"]["measurements"]), (&8.into(), &1.into()), "{stops}");
+}
+
+#[test]
+fn a_second_reading_of_the_same_stop_replaces_the_first_and_a_misread_one_is_pointed_out() {
+    let store = store("measure-again");
+    let run = measure(&store, &["--train", "24", "--at", "E12+860mm"]);
+    assert!(run.output.contains("standard deviations from the others; if the tape was misread"), "{run:?}");
+    let run = measure(&store, &["--train", "24", "--at", "E12 + 260 mm", "--took", "1.33s"]);
+    assert_eq!(run.status, 0);
+    assert!(run.output.ends_with(" -> 198 mm ± 5 mm, 2 measured\n"), "{}", run.output);
+    let event = run.output.split_whitespace().nth(1).unwrap().trim_end_matches(':');
+    let path = store.to_str().unwrap();
+    let excluded = footplate(&["store", "exclude", event, "--reason", "the tape slipped", "--store", path]);
+    assert_eq!(excluded.status, 0, "{excluded:?}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_and_nothing_is_kept() {
+    let store = store("measure-wrong");
+    let path = store.to_str().unwrap();
+    let events = || footplate(&["store", "show", "--store", path]).output;
+    let before = events();
+    for (arguments, complaint) in [
+        (&["--train", "24", "--at", "C13+120mm"][..], "lay the tape from E12, the contact it passed last"),
+        (&["--train", "24", "--at", "E12+9000mm"], "lies beyond C6, the next contact 1008 mm on"),
+        (&["--train", "24", "--at", "E12-200mm"], "cannot stand 200 mm short of it"),
+        (&["--train", "24", "--at", "Z9+1mm"], "no place of track-a is called `Z9`"),
+        (&["--train", "24", "--at", "BR6+1mm"], "BR6 is no contact"),
+        (&["--train", "24", "--at", "E12+26cm"], "is no offset: write millimetres"),
+        (&["--train", "25", "--at", "E12+260mm"], "train 25 was told nothing in any run"),
+        (&["--train", "24", "--at", "E12+260mm", "--took", "4h"], "from 0.1s to 15s, such as 3.4s"),
+        (&["--train", "24", "--at", "E12+260mm", "--recording", "9"], "there is no recording 9"),
+        (&["--train", "24", "--at", "E12+260mm", "--recording", "1"], "measure a stop when it stands"),
+        (
+            &["--train", "24", "--at", "E12+260mm", "--layout", "track-b"],
+            "is of the layout track-a, not of track-b",
+        ),
+    ] {
+        let run = measure(&store, arguments);
+        assert_eq!(run.status, 2, "{arguments:?}: {run:?}");
+        assert!(run.errors.contains(complaint), "{arguments:?}: {}", run.errors);
+    }
+    assert_eq!(events(), before);
+}
