@@ -40,14 +40,14 @@ const PINNED: [(&str, LawFamily, u64); 11] = [
     ("starts", LawFamily::Constant, 0x9c39_d626_6620_99ad),
     ("steady", LawFamily::Smooth, 0xc067_f97d_87d5_4757),
     ("changes", LawFamily::SCurve, 0xbf5f_b701_86bd_c2c6),
-    ("stops", LawFamily::Lag, 0xd2cc_c2a5_fcf7_bec8),
-    ("short-moves", LawFamily::Momentum, 0x519f_730d_84a7_3ef8),
+    ("stops", LawFamily::Lag, 0x5f43_d3ab_78c6_6823),
+    ("short-moves", LawFamily::Momentum, 0xc177_7fb2_2309_bfc7),
     ("gates", LawFamily::Mixed, 0xb388_a900_1efa_f61f),
     ("warm-up", LawFamily::Constant, 0x3c47_7e3c_0060_b619),
     ("stalls", LawFamily::Lag, 0x12b0_1d68_4732_7b67),
     ("faults", LawFamily::Momentum, 0x4123_6485_2e94_4cdb),
-    ("driving", LawFamily::Mixed, 0x5f01_353e_8c9d_cfb0),
-    ("calibration", LawFamily::Smooth, 0xd3e4_76e7_698b_22d3),
+    ("driving", LawFamily::Mixed, 0x926e_70ac_d382_b31d),
+    ("calibration", LawFamily::Smooth, 0xef3a_0533_23c9_b7ca),
 ];
 
 #[test]
