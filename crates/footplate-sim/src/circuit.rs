@@ -72,14 +72,55 @@ impl Circuit {
     pub fn draw(layout: &Layout, seed: u64) -> Result<Self, CircuitError> {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
-        let ways = (0..TRIES).filter_map(|_| {
+        let ways = Self::any(layout, &starts, &mut draws);
+        let best = ways.take(CANDIDATES).max_by_key(|(sensors, _)| *sensors);
+        best.map(|(_, circuit)| circuit).ok_or_else(|| none_found(layout))
+    }
+
+    /// Circuits that share no rails, one for each of so many trains or as many as were found, those with many
+    /// sensors first.
+    ///
+    /// # Errors
+    /// [`CircuitError::NoneFound`] if no way came back.
+    pub(crate) fn draw_apart(
+        layout: &Layout,
+        count: usize,
+        draws: &mut Draws,
+    ) -> Result<Vec<Self>, CircuitError> {
+        let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+        let mut found: Vec<(usize, Self)> = Self::any(layout, &starts, draws).collect();
+        found.sort_by_key(|(sensors, _)| std::cmp::Reverse(*sensors));
+        let mut best: Vec<&(usize, Self)> = Vec::new();
+        // The more circuits the better, and then the more sensors on the poorest of them.
+        let worth = |set: &[&(usize, Self)]| (set.len(), set.last().map(|(sensors, _)| *sensors));
+        for first in &found {
+            let mut set: Vec<&(usize, Self)> = Vec::new();
+            for one in std::iter::once(first).chain(&found) {
+                if set.len() < count && set.iter().all(|(_, other)| !one.1.shares_rails(other)) {
+                    set.push(one);
+                }
+            }
+            if worth(&set) > worth(&best) {
+                best = set;
+            }
+        }
+        if best.is_empty() {
+            return Err(none_found(layout));
+        }
+        Ok(best.into_iter().map(|(_, circuit)| circuit.clone()).collect())
+    }
+
+    /// Random circuits with how many sensors each has, as long as ways are tried.
+    fn any(layout: &Layout, starts: &[NodeId], draws: &mut Draws) -> impl Iterator<Item = (usize, Self)> {
+        (0..TRIES).filter_map(move |_| {
             let start = *starts.get(draws.below(starts.len()))?;
             let circuit = walk(layout, start, |_| Leg::from_curved(draws.chance(0.5))).ok()?;
             Some((circuit.sensors(layout).len(), circuit)).filter(|(sensors, _)| *sensors >= 2)
-        });
-        let best = ways.take(CANDIDATES).max_by_key(|(sensors, _)| *sensors);
-        best.map(|(_, circuit)| circuit)
-            .ok_or_else(|| CircuitError::NoneFound { layout: layout.name().to_owned() })
+        })
+    }
+
+    fn shares_rails(&self, other: &Self) -> bool {
+        self.edges.iter().any(|edge| other.edges.iter().any(|theirs| theirs.stretch() == edge.stretch()))
     }
 
     /// Its edges, in the order of travel; the last ends where the first begins.
@@ -104,6 +145,10 @@ impl Circuit {
     pub fn length(&self, layout: &Layout) -> Length {
         self.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum()
     }
+}
+
+fn none_found(layout: &Layout) -> CircuitError {
+    CircuitError::NoneFound { layout: layout.name().to_owned() }
 }
 
 /// Walks until the way returns to its start; `choose` decides each turnout once. Fails with the last node.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use footplate_core::{Ratio, SensorId};
+use footplate_core::{Ratio, SensorId, TimeSpan};
 
 use crate::draws::Draws;
 
@@ -25,6 +25,26 @@ pub struct Faults {
     pub stuck: Ratio,
     /// How many contacts close by themselves within a minute, over the whole layout; at most 6000 do.
     pub spurious_per_minute: f64,
+}
+
+impl Faults {
+    /// How long a contact that nobody touched stays closed.
+    pub(crate) const SPURIOUS: TimeSpan = TimeSpan::from_ms((1000.0 * SPURIOUS_S) as i64);
+
+    /// Whether a contact fails to close this time.
+    pub(crate) fn misses(&self, sensor: SensorId, draws: &mut Draws) -> bool {
+        draws.chance(self.poor.get(&sensor).map_or(self.missed, |poor| *poor).as_parts())
+    }
+
+    /// How long a contact stays closed this time after the shoe has left it, in s; mostly 0.
+    pub(crate) fn sticks_for_s(&self, draws: &mut Draws) -> f64 {
+        if draws.chance(self.stuck.as_parts()) { draws.uniform(STUCK_S) } else { 0.0 }
+    }
+
+    /// How many contacts close by themselves in a second.
+    pub(crate) fn spurious_per_s(&self) -> f64 {
+        (self.spurious_per_minute / 60.0).min(MOST_SPURIOUS_PER_S)
+    }
 }
 
 /// Why a contact was closed.
@@ -78,7 +98,7 @@ pub(crate) struct Contacts<'faults> {
 impl<'faults> Contacts<'faults> {
     /// All open.
     pub(crate) fn new(faults: &'faults Faults, sensors: Vec<SensorId>, mut draws: Draws) -> Self {
-        let next_spurious = draws.waiting(spurious_per_s(faults));
+        let next_spurious = draws.waiting(faults.spurious_per_s());
         Self { faults, draws, sensors, closures: VecDeque::new(), before_run: Vec::new(), next_spurious }
     }
 
@@ -91,8 +111,7 @@ impl<'faults> Contacts<'faults> {
 
     /// The shoe comes onto a contact.
     pub(crate) fn close(&mut self, sensor: SensorId, at: f64) {
-        let missed = self.faults.poor.get(&sensor).map_or(self.faults.missed, |poor| *poor);
-        if self.draws.chance(missed.as_parts()) {
+        if self.faults.misses(sensor, &mut self.draws) {
             return;
         }
         let (left, opened) = (f64::INFINITY, f64::INFINITY);
@@ -101,8 +120,7 @@ impl<'faults> Contacts<'faults> {
 
     /// The shoe leaves a contact.
     pub(crate) fn leave(&mut self, sensor: SensorId, at: f64) {
-        let sticks = self.draws.chance(self.faults.stuck.as_parts());
-        let for_s = if sticks { self.draws.uniform(STUCK_S) } else { 0.0 };
+        let for_s = self.faults.sticks_for_s(&mut self.draws);
         let closures = self.before_run.iter_mut().chain(&mut self.closures);
         for held in closures.filter(|held| held.sensor == sensor && held.left.is_infinite()) {
             held.left = at;
@@ -115,7 +133,7 @@ impl<'faults> Contacts<'faults> {
     pub(crate) fn read(&mut self, before: f64, reading: f64, latched: bool) -> Vec<Closure> {
         while self.next_spurious <= reading {
             let at = self.next_spurious;
-            self.next_spurious += self.draws.waiting(spurious_per_s(self.faults));
+            self.next_spurious += self.draws.waiting(self.faults.spurious_per_s());
             let Some(&sensor) = self.sensors.get(self.draws.below(self.sensors.len())) else { continue };
             let opened = at + SPURIOUS_S;
             self.closures.push_back(Closure {
@@ -142,10 +160,6 @@ impl<'faults> Contacts<'faults> {
         seen.dedup_by_key(|closure| closure.sensor);
         seen
     }
-}
-
-fn spurious_per_s(faults: &Faults) -> f64 {
-    (faults.spurious_per_minute / 60.0).min(MOST_SPURIOUS_PER_S)
 }
 
 #[cfg(test)]

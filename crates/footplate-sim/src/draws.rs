@@ -26,6 +26,8 @@ pub(crate) enum Purpose {
     Faults = 5,
     /// The choices of a scenario and the hand of the person who measures.
     Scenario = 6,
+    /// A living layout: what its trains, turnouts and people draw from.
+    Living = 7,
 }
 
 /// One stream of draws.

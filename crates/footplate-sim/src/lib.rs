@@ -16,7 +16,8 @@
 //! draws
 //! ```
 //!
-//! Full-size trains on full-size lines are a world of their own, in [`mod@line`].
+//! Full-size trains on full-size lines are a world of their own, in [`mod@line`]. Several trains on a whole layout,
+//! behind the bytes of a command station, are in [`mod@living`].
 
 mod circuit;
 mod contacts;
@@ -25,6 +26,7 @@ mod gates;
 mod host;
 mod law;
 pub mod line;
+pub mod living;
 mod load;
 mod motor;
 mod path;
@@ -44,6 +46,10 @@ pub use circuit::{Circuit, CircuitError};
 pub use contacts::{Cause, Faults};
 pub use gates::GatePass;
 pub use law::{Law, LawFamily};
+pub use living::{
+    CoilAlarm, CtsSwitch, End, FromStation, HandError, LivingLayout, LivingSwitches, Mishap, MishapKind,
+    PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualStation,
+};
 pub use poller::Link;
 pub use railway::Railway;
 pub use recording::SimulatedRecording;

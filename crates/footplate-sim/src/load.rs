@@ -1,5 +1,7 @@
 //! What makes a train faster or slower than its table at every step: the run, the day, the rail.
 
+use core::ops::Deref;
+
 use crate::draws::Draws;
 use crate::motor::STEP_S;
 use crate::train::Train;
@@ -17,10 +19,10 @@ const STALL_BELOW_MM_PER_S: f64 = 50.0;
 /// How often it does (chosen).
 const STALL_CHANCE: f64 = 0.15;
 
-/// All influences on the speed of one run, as a factor on the speed of the wheels.
+/// All influences on the speed of a run, as a factor on the speed of the wheels; `T` is how the train is held.
 #[derive(Debug)]
-pub(crate) struct Load<'train> {
-    train: &'train Train,
+pub(crate) struct Load<T> {
+    train: T,
     draws: Draws,
     run: f64,
     wander: f64,
@@ -31,14 +33,28 @@ pub(crate) struct Load<'train> {
     factor: f64,
 }
 
-impl<'train> Load<'train> {
+impl<T: Deref<Target = Train>> Load<T> {
     /// The influences at the start of a run on a rail with a factor.
-    pub(crate) fn new(train: &'train Train, warmth: f64, rail: f64, mut draws: Draws) -> Self {
+    pub(crate) fn new(train: T, warmth: f64, rail: f64, mut draws: Draws) -> Self {
         let run = draws.normal(1.0, train.run_deviation.as_parts());
         let wander = draws.normal(0.0, train.wander.as_parts());
         let mut load = Self { train, draws, run, wander, until_slow: SLOW_STEP_S, warmth, factor: 1.0 };
         load.factor = load.goal(rail);
         load
+    }
+
+    /// Another run begins from rest on a rail with a factor: its deviation is its own, wander and warmth go on.
+    pub(crate) fn begin_run(&mut self, rail: f64) {
+        self.run = self.draws.normal(1.0, self.train.run_deviation.as_parts());
+        self.factor = self.goal(rail);
+    }
+
+    /// The train has stood for a while; the same as as many steps at rest, all at once.
+    pub(crate) fn stand(&mut self, for_s: f64) {
+        self.warmth *= libm::exp(-for_s / self.train.warm_up_time.as_s().max(SLOW_STEP_S));
+        let kept = libm::exp(-for_s / self.train.wander_time.as_s().max(SLOW_STEP_S));
+        let fresh = self.train.wander.as_parts() * libm::sqrt(1.0 - kept * kept);
+        self.wander = kept * self.wander + self.draws.normal(0.0, fresh);
     }
 
     /// The speed of this run over that of an average one.
@@ -61,7 +77,7 @@ impl<'train> Load<'train> {
         self.until_slow -= STEP_S;
         if self.until_slow <= 0.0 {
             self.until_slow += SLOW_STEP_S;
-            self.warmth = warmth_after(self.train, self.warmth, moves, SLOW_STEP_S);
+            self.warmth = warmth_after(&self.train, self.warmth, moves, SLOW_STEP_S);
             // An autoregression of first order: it keeps its spread whatever the step.
             let kept = 1.0 - SLOW_STEP_S / self.train.wander_time.as_s().max(SLOW_STEP_S);
             let fresh = self.train.wander.as_parts() * libm::sqrt(1.0 - kept * kept);

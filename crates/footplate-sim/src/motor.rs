@@ -7,6 +7,7 @@
 //!
 //! Speeds in mm/s, times in s; the track's influence comes on top in [`load`](crate::load).
 
+use core::ops::Deref;
 use std::collections::VecDeque;
 
 use footplate_core::{Acceleration, Approach, Speed, SpeedStep, TimeSpan};
@@ -56,10 +57,10 @@ enum Process {
     RampUp { up: f64 },
 }
 
-/// A decoder and its motor under way.
+/// A decoder and its motor under way; `T` is how its train is held, borrowed or shared.
 #[derive(Debug, Clone)]
-pub(crate) struct Motor<'train> {
-    train: &'train Train,
+pub(crate) struct Motor<T> {
+    train: T,
     process: Process,
     step: SpeedStep,
     approach: Approach,
@@ -77,9 +78,9 @@ pub(crate) struct Motor<'train> {
     pace: f64,
 }
 
-impl<'train> Motor<'train> {
+impl<T: Deref<Target = Train> + Clone> Motor<T> {
     /// A train at rest.
-    pub(crate) fn at_rest(train: &'train Train) -> Self {
+    pub(crate) fn at_rest(train: T) -> Self {
         let mm = Acceleration::as_mm_per_s2;
         let process = match train.law {
             Law::Constant { up, down } => Process::Ramp { up: mm(up), down: mm(down) },
@@ -121,7 +122,7 @@ impl<'train> Motor<'train> {
     }
 
     /// A train that has long been running steadily.
-    pub(crate) fn running(train: &'train Train, step: SpeedStep, approach: Approach) -> Self {
+    pub(crate) fn running(train: T, step: SpeedStep, approach: Approach) -> Self {
         let mut motor = Self::at_rest(train);
         motor.aim(step, approach);
         let speed = motor.target;

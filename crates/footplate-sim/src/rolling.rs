@@ -14,8 +14,8 @@ use crate::train::Train;
 pub(crate) struct Rolling<'w> {
     path: &'w Path,
     train: &'w Train,
-    motor: Motor<'w>,
-    load: Load<'w>,
+    motor: Motor<&'w Train>,
+    load: Load<&'w Train>,
     draws: Draws,
     distance_mm: f64,
     speed_mm_per_s: f64,
@@ -40,7 +40,7 @@ impl<'w> Rolling<'w> {
     pub(crate) fn new(
         path: &'w Path,
         train: &'w Train,
-        motor: Motor<'w>,
+        motor: Motor<&'w Train>,
         warmth: f64,
         mut draws: Draws,
     ) -> Self {
@@ -74,12 +74,12 @@ impl<'w> Rolling<'w> {
     }
 
     /// The motor.
-    pub(crate) const fn motor(&self) -> &Motor<'w> {
+    pub(crate) const fn motor(&self) -> &Motor<&'w Train> {
         &self.motor
     }
 
     /// What acts on the speed.
-    pub(crate) const fn load(&self) -> &Load<'w> {
+    pub(crate) const fn load(&self) -> &Load<&'w Train> {
         &self.load
     }
 

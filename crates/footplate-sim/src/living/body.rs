@@ -1,0 +1,341 @@
+//! A train's body on the rails: what lies under it, and what its shoe comes to.
+//!
+//! Places are counted in mm along the train's own way, with the sign of travel; turning around turns the count
+//! around. The leading end of the shoe is the train's place. The way always reaches from the rear end to the edge
+//! that the front end is on, so that turnouts decide when the front end comes to them.
+
+use std::collections::VecDeque;
+
+use footplate_core::track::Leg;
+use footplate_core::{EdgeId, SensorId, TurnoutId};
+
+use crate::living::rails::{Ahead, Rails};
+use crate::load::DIRTY_MM;
+use crate::path::Point;
+
+/// Blades of a turnout reach so far from its toe into its legs (chosen: Märklin K and C track, a third of 17 cm).
+const BLADES_MM: f64 = 60.0;
+/// Trains on both legs of a turnout touch each other up to this far from its toe (worked out: 24.3° at a radius of
+/// 424.6 mm part the middles of the tracks by the 40 mm that two engines need).
+const FOULING_MM: f64 = 180.0;
+/// No way leads over more edges at one point (chosen: beyond that the layout has edges without length in a ring).
+const MOST_EDGES_AT_ONCE: usize = 64;
+
+/// An edge under the train or ahead of it.
+#[derive(Debug, Clone, Copy)]
+struct Under {
+    edge: EdgeId,
+    begins: f64,
+    ends: f64,
+    factor: f64,
+}
+
+/// What the train comes to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Met {
+    /// The shoe touches a contact.
+    Touches(Point<SensorId>),
+    /// The shoe leaves a contact that it holds.
+    Leaves(Point<SensorId>),
+    /// The shoe is on dirt.
+    Dirt,
+    /// The front end comes onto another edge, or the rear end leaves one.
+    OtherEdges,
+    /// The front end comes to a pair of turnouts in one place that both lie curved.
+    IllegalPair(TurnoutId),
+    /// The front end comes to where the track ends.
+    End,
+}
+
+/// A train's body.
+#[derive(Debug)]
+pub(crate) struct Body {
+    way: VecDeque<Under>,
+    /// The leading end of the shoe.
+    pub(crate) lead: f64,
+    /// From there to the front end, the length of the shoe, and from its other end to the rear end.
+    ahead: f64,
+    shoe: f64,
+    behind: f64,
+    /// Contacts and dirty spots that the shoe has not come to, in order.
+    contacts: VecDeque<Point<SensorId>>,
+    dirt: VecDeque<f64>,
+    /// Contacts that the shoe holds closed.
+    held: VecDeque<Point<SensorId>>,
+    /// Which of the way's edges the lead is on.
+    under: usize,
+    /// What the rails there make of a speed.
+    pub(crate) factor: f64,
+    /// Where the last dirty spot ends.
+    pub(crate) dirty_until: f64,
+    /// Nothing happens before the lead is here.
+    pub(crate) next: f64,
+}
+
+impl Body {
+    /// A train with the leading end of its shoe on an edge; `None` where track or layout ends within the train.
+    pub(crate) fn put(
+        rails: &Rails<'_>,
+        lies: &impl Fn(TurnoutId) -> Option<Leg>,
+        edge: EdgeId,
+        offset: f64,
+        [ahead, shoe, behind]: [f64; 3],
+    ) -> Option<Self> {
+        let length = rails.rail(edge)?.length_mm;
+        let lead = offset.clamp(0.0, length);
+        let mut body = Self {
+            way: VecDeque::new(),
+            lead,
+            ahead,
+            shoe,
+            behind,
+            contacts: VecDeque::new(),
+            dirt: VecDeque::new(),
+            held: VecDeque::new(),
+            under: 0,
+            factor: 1.0,
+            dirty_until: f64::NEG_INFINITY,
+            next: f64::INFINITY,
+        };
+        body.way.push_back(Under { edge, begins: 0.0, ends: length, factor: 1.0 });
+        // Backwards is forwards seen the other way.
+        for _ in 0..MOST_EDGES_AT_ONCE {
+            let first = *body.way.front()?;
+            if first.begins <= body.rear() {
+                break;
+            }
+            let before = after(rails, lies, first.edge.twin())?.twin();
+            let begins = first.begins - rails.rail(before)?.length_mm;
+            body.way.push_front(Under { edge: before, begins, ends: first.begins, factor: 1.0 });
+        }
+        for under in &mut body.way {
+            under.factor = rails.rail(under.edge)?.factor;
+        }
+        while body.way.back()?.ends < body.front() {
+            let next = after(rails, lies, body.way.back()?.edge)?;
+            body.append(rails, next);
+        }
+        body.look_ahead(rails);
+        Some(body)
+    }
+
+    pub(crate) fn front(&self) -> f64 {
+        self.lead + self.ahead
+    }
+
+    pub(crate) fn rear(&self) -> f64 {
+        self.lead - self.shoe - self.behind
+    }
+
+    /// The edge under the leading end of the shoe, and how far along it that is.
+    pub(crate) fn place(&self) -> Option<(EdgeId, f64)> {
+        let under = self.way.get(self.under)?;
+        Some((under.edge, self.lead - under.begins))
+    }
+
+    /// The next thing that the train came to on its way to where it is; ask until `None`.
+    pub(crate) fn meet(
+        &mut self,
+        rails: &Rails<'_>,
+        lies: &impl Fn(TurnoutId) -> Option<Leg>,
+    ) -> Option<Met> {
+        let met = self.meet_one(rails, lies);
+        if met.is_none() {
+            self.find_next();
+        }
+        met
+    }
+
+    fn meet_one(&mut self, rails: &Rails<'_>, lies: &impl Fn(TurnoutId) -> Option<Leg>) -> Option<Met> {
+        let lead = self.lead;
+        if let Some(held) = self.held.pop_front_if(|held| held.at_mm + self.shoe <= lead) {
+            return Some(Met::Leaves(held));
+        }
+        if let Some(contact) = self.contacts.pop_front_if(|contact| contact.at_mm <= lead) {
+            return Some(Met::Touches(contact));
+        }
+        if let Some(spot) = self.dirt.pop_front_if(|spot| *spot <= lead) {
+            self.dirty_until = spot + DIRTY_MM;
+            return Some(Met::Dirt);
+        }
+        while self.way.get(self.under).is_some_and(|under| under.ends <= lead)
+            && self.under + 1 < self.way.len()
+        {
+            self.under += 1;
+            self.factor = self.way.get(self.under).map_or(1.0, |under| under.factor);
+        }
+        let last = *self.way.back()?;
+        if last.ends <= self.front() {
+            let Some(next) = after(rails, lies, last.edge) else { return Some(Met::End) };
+            if let Some(turnout) = illegal_pair(rails, lies, next) {
+                return Some(Met::IllegalPair(turnout));
+            }
+            self.append(rails, next);
+            return Some(Met::OtherEdges);
+        }
+        if self.under > 0 && self.way.front().is_some_and(|first| first.ends <= self.rear()) {
+            self.way.pop_front();
+            self.under -= 1;
+            return Some(Met::OtherEdges);
+        }
+        None
+    }
+
+    /// A contact that closed is held until the shoe has passed.
+    pub(crate) fn hold(&mut self, contact: Point<SensorId>) {
+        self.held.push_back(contact);
+    }
+
+    /// All contacts that the shoe holds, which it lets go.
+    pub(crate) fn let_go(&mut self) -> impl Iterator<Item = SensorId> + '_ {
+        self.held.drain(..).map(|held| held.what)
+    }
+
+    /// The other way round, where it stands.
+    pub(crate) fn turn(&mut self, rails: &Rails<'_>) {
+        let turned = self.way.iter().rev().filter_map(|under| {
+            let edge = under.edge.twin();
+            Some(Under { edge, begins: -under.ends, ends: -under.begins, factor: rails.rail(edge)?.factor })
+        });
+        self.way = turned.collect();
+        self.lead = self.shoe - self.lead;
+        std::mem::swap(&mut self.ahead, &mut self.behind);
+        self.held = self.held.iter().rev().map(|held| Point { at_mm: -held.at_mm, ..*held }).collect();
+        self.dirty_until = f64::NEG_INFINITY;
+        self.look_ahead(rails);
+    }
+
+    /// Where on a stretch the train is, in mm from the start of its first edge; `None` if it is not on it.
+    fn reach_on(&self, edge: EdgeId) -> Option<[f64; 2]> {
+        let under = self.way.iter().find(|under| under.edge.stretch() == edge.stretch())?;
+        let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
+        let along = if under.edge < under.edge.twin() {
+            [from - under.begins, to - under.begins]
+        } else {
+            [under.ends - to, under.ends - from]
+        };
+        (from < to).then_some(along)
+    }
+
+    /// Whether two trains could touch: they share rails or the legs of a turnout.
+    pub(crate) fn is_near(&self, rails: &Rails<'_>, other: &Self) -> bool {
+        self.way.iter().any(|mine| {
+            other.way.iter().any(|others| {
+                mine.edge.stretch() == others.edge.stretch()
+                    || legs(rails, mine.edge)
+                        .any(|leg| legs(rails, others.edge).any(|theirs| theirs.0 == leg.0))
+            })
+        })
+    }
+
+    /// Whether two trains touch.
+    pub(crate) fn touches(&self, rails: &Rails<'_>, other: &Self) -> bool {
+        self.way.iter().any(|mine| {
+            let Some([from, to]) = self.reach_on(mine.edge) else { return false };
+            let shares = other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
+            shares
+                || legs(rails, mine.edge).any(|(turnout, leg)| {
+                    let fouls =
+                        |way: &Self, under: &Under| way.way_from_toe(rails, under, turnout) < FOULING_MM;
+                    let stands_beside = |theirs: &Under| {
+                        legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
+                            && fouls(other, theirs)
+                    };
+                    fouls(self, mine) && other.way.iter().any(stands_beside)
+                })
+        })
+    }
+
+    /// Whether points that have just moved moved under the train.
+    pub(crate) fn is_on_blades(&self, rails: &Rails<'_>, turnout: TurnoutId) -> bool {
+        let is_leg = |under: &&Under| legs(rails, under.edge).any(|(number, _)| number == turnout);
+        self.way.iter().filter(is_leg).any(|under| self.way_from_toe(rails, under, turnout) < BLADES_MM)
+    }
+
+    /// A turnout that lies wrong for a train which has one part before and one behind its toe.
+    pub(crate) fn splits(
+        &self,
+        rails: &Rails<'_>,
+        lies: &impl Fn(TurnoutId) -> Option<Leg>,
+    ) -> Option<TurnoutId> {
+        self.way.iter().find_map(|under| {
+            let (turnout, leg) = rails.rail(under.edge)?.leaves?;
+            let is_across = self.rear() < under.begins && under.begins < self.front();
+            (is_across && lies(turnout) != Some(leg)).then_some(turnout)
+        })
+    }
+
+    /// How far the nearest part of the train on a leg is from the toe of its turnout; infinite if none is on it.
+    fn way_from_toe(&self, rails: &Rails<'_>, under: &Under, turnout: TurnoutId) -> f64 {
+        let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
+        let Some(rail) = rails.rail(under.edge).filter(|_| from < to) else { return f64::INFINITY };
+        match (rail.leaves, rail.enters) {
+            (Some((number, _)), _) if number == turnout => from - under.begins,
+            _ => under.ends - to,
+        }
+    }
+
+    fn append(&mut self, rails: &Rails<'_>, edge: EdgeId) {
+        let Some((begins, rail)) = self.way.back().map(|last| last.ends).zip(rails.rail(edge)) else {
+            return;
+        };
+        self.way.push_back(Under { edge, begins, ends: begins + rail.length_mm, factor: rail.factor });
+        self.contacts
+            .extend(rail.contacts.iter().map(|(at, what)| Point { at_mm: begins + at, what: *what }));
+        self.dirt.extend(rail.dirty.iter().map(|at| begins + at));
+    }
+
+    /// Finds everything ahead of the shoe anew.
+    fn look_ahead(&mut self, rails: &Rails<'_>) {
+        self.contacts.clear();
+        self.dirt.clear();
+        for under in &self.way {
+            let Some(rail) = rails.rail(under.edge) else { continue };
+            let contacts =
+                rail.contacts.iter().map(|(at, what)| Point { at_mm: under.begins + at, what: *what });
+            self.contacts.extend(contacts.filter(|contact| contact.at_mm > self.lead));
+            self.dirt.extend(rail.dirty.iter().map(|at| under.begins + at).filter(|at| *at > self.lead));
+        }
+        self.under = self.way.iter().position(|under| self.lead < under.ends).unwrap_or(0);
+        self.factor = self.way.get(self.under).map_or(1.0, |under| under.factor);
+        self.find_next();
+    }
+
+    fn find_next(&mut self) {
+        let contact = self.contacts.front().map_or(f64::INFINITY, |contact| contact.at_mm);
+        let left = self.held.front().map_or(f64::INFINITY, |held| held.at_mm + self.shoe);
+        let dirt = self.dirt.front().copied().unwrap_or(f64::INFINITY);
+        let edge = self.way.get(self.under).map_or(f64::INFINITY, |under| under.ends);
+        let front = self.way.back().map_or(f64::INFINITY, |last| last.ends - self.ahead);
+        let rear = self.way.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
+        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear);
+    }
+}
+
+/// The edge after an edge while turnouts lie as they do.
+fn after(rails: &Rails<'_>, lies: &impl Fn(TurnoutId) -> Option<Leg>, edge: EdgeId) -> Option<EdgeId> {
+    match rails.rail(edge)?.ahead {
+        Ahead::Edge(next) => Some(next),
+        Ahead::Points { turnout, straight, curved } => {
+            Some(if lies(turnout) == Some(Leg::Curved) { curved } else { straight })
+        }
+        Ahead::End => None,
+    }
+}
+
+/// The turnout by whose curved leg an edge leaves although its partner lies curved, too.
+fn illegal_pair(
+    rails: &Rails<'_>,
+    lies: &impl Fn(TurnoutId) -> Option<Leg>,
+    edge: EdgeId,
+) -> Option<TurnoutId> {
+    let (turnout, _) = rails.rail(edge)?.leaves.filter(|(_, leg)| *leg == Leg::Curved)?;
+    let partner = rails.layout.never_curved_with(turnout)?;
+    (lies(partner) == Some(Leg::Curved)).then_some(turnout)
+}
+
+/// The turnouts of which an edge is a leg, and which.
+fn legs(rails: &Rails<'_>, edge: EdgeId) -> impl Iterator<Item = (TurnoutId, Leg)> {
+    let rail = rails.rail(edge);
+    rail.into_iter().flat_map(|rail| rail.leaves.into_iter().chain(rail.enters))
+}

@@ -1,0 +1,126 @@
+//! What a person does to trains and turnouts.
+
+use footplate_core::track::{Leg, Position};
+use footplate_core::{Length, TrainId, TurnoutId};
+
+use crate::living::body::{Body, Met};
+use crate::living::live_train::{End, LiveTrain};
+use crate::living::world::LivingLayout;
+use crate::train::Train;
+
+/// Why a hand cannot do that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HandError {
+    /// There is no such train.
+    #[error("there is no train {0}; name one that the layout was made with")]
+    NoTrain(TrainId),
+    /// It would stand beyond the end of the track.
+    #[error("the track ends under the train there; put it further from the end")]
+    NoTrack,
+    /// Another train stands there.
+    #[error("train {0} stands there; put it elsewhere or lift that one first")]
+    Occupied(TrainId),
+}
+
+impl LivingLayout<'_> {
+    /// Puts a train on the rails, standing, with the leading end of its shoe at a place in true lengths. It will run
+    /// in the direction of the place's edge when it is told a step, with the end in front that is given. A wrecked
+    /// train is sound again. What the station told it last it is told again, and so may start at once.
+    ///
+    /// # Errors
+    /// [`HandError`] when there is no such train or no room for it; it is where it was then.
+    pub fn place(&mut self, train: TrainId, at: Position, leads: End) -> Result<(), HandError> {
+        let place =
+            self.trains.iter().position(|found| found.id == train).ok_or(HandError::NoTrain(train))?;
+        let was = self.trains[place].leads;
+        self.trains[place].leads = leads;
+        let lengths = self.trains[place].lengths();
+        let lies = |turnout| self.points.lies(turnout);
+        let body = Body::put(&self.rails, &lies, at.edge, at.offset.as_mm(), lengths);
+        let beside = body.as_ref().and_then(|body| {
+            let others = self.trains.iter().filter(|other| other.id != train);
+            let mut bodies = others.filter_map(|other| Some((other.id, other.body.as_ref()?)));
+            bodies.find(|(_, other)| body.touches(&self.rails, other)).map(|(id, _)| id)
+        });
+        if body.is_none() || beside.is_some() {
+            self.trains[place].leads = was;
+            return Err(beside.map_or(HandError::NoTrack, HandError::Occupied));
+        }
+        self.take_up(place);
+        self.trains[place].is_wrecked = false;
+        self.trains[place].body = body;
+        self.find_near();
+        self.remind(place, self.now());
+        Ok(())
+    }
+
+    /// Takes a train off the rails.
+    pub fn lift(&mut self, train: TrainId) {
+        if let Some(place) = self.trains.iter().position(|found| found.id == train) {
+            self.take_up(place);
+            self.find_near();
+        }
+    }
+
+    /// Pushes a train along its direction of travel; what its shoe touches on the way closes now.
+    pub fn push(&mut self, train: TrainId, by: Length) {
+        let now = self.now();
+        let Some(place) = self.trains.iter().position(|found| found.id == train) else { return };
+        let lies = |turnout| self.points.lies(turnout);
+        let pushed = &mut self.trains[place];
+        let Some(body) = &mut pushed.body else { return };
+        // Not further than from one end of the room to the other.
+        body.lead += by.as_mm().clamp(0.0, 10_000.0);
+        while let Some(met) = body.meet(&self.rails, &lies) {
+            match met {
+                Met::Touches(contact) => {
+                    if self.s88.close(contact.what, now, train, pushed.odometer) {
+                        body.hold(contact);
+                    }
+                }
+                Met::Leaves(contact) => self.s88.leave(contact.what, now),
+                Met::OtherEdges | Met::Dirt => {}
+                Met::End | Met::IllegalPair(_) => break,
+            }
+        }
+        self.find_near();
+    }
+
+    /// Makes the wheels of a train dirty, or cleans them: how fast it is over how fast it would be clean.
+    pub fn dirty_wheels(&mut self, train: TrainId, speed: f64) {
+        if let Some(found) = self.trains.iter_mut().find(|found| found.id == train) {
+            found.wheels = speed.clamp(0.0, 2.0);
+        }
+    }
+
+    /// Puts another engine in the place of one, under its address.
+    ///
+    /// # Errors
+    /// [`HandError`] when there is no such train or the other one finds no room.
+    pub fn swap(&mut self, train: TrainId, other: Train, warmth: f64) -> Result<(), HandError> {
+        let now = self.truth().train(train).ok_or(HandError::NoTrain(train))?;
+        self.lift(train);
+        self.add(train, other, warmth);
+        now.position.map_or(Ok(()), |position| self.place(train, position, now.leads))
+    }
+
+    /// Moves the points of a turnout. Whatever stands on them is not looked at.
+    pub fn lay(&mut self, turnout: TurnoutId, leg: Leg) {
+        if self.points.lies(turnout).is_some() {
+            self.points.lay(turnout, leg);
+        }
+    }
+
+    fn take_up(&mut self, place: usize) {
+        let now = self.now();
+        let train: &mut LiveTrain = &mut self.trains[place];
+        train.stand(now, &mut self.rests);
+        if let Some(mut body) = train.body.take() {
+            for sensor in body.let_go() {
+                self.s88.leave(sensor, now);
+            }
+        }
+        train.sleeps = true;
+    }
+}

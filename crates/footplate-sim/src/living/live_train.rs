@@ -1,0 +1,301 @@
+//! One train of a living layout: what it was told, what drives it, and where it is.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use footplate_core::track::Leg;
+use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+
+use crate::draws::Draws;
+use crate::living::body::{Body, Met};
+use crate::living::mishap::MishapKind;
+use crate::living::rails::Rails;
+use crate::living::s88::S88;
+use crate::living::truth::RestTruth;
+use crate::load::Load;
+use crate::motor::{Motor, STEP_S};
+use crate::train::Train;
+
+/// The step of the integration as a span of time.
+pub(crate) const STEP: TimeSpan = TimeSpan::from_ms(1);
+/// How a train slows down whose motor is turned around while it runs, in mm/s² (chosen: from 300 mm/s within 15 mm,
+/// from top speed within 6 cm; people call it "stopped dead").
+const TURNED_MM_PER_S2: f64 = 3000.0;
+/// How a train slows down without power, in mm/s² (chosen: a worm gear does not roll; from top speed within 12 cm.
+/// There is no decoder that could hold to its law).
+const POWERLESS_MM_PER_S2: f64 = 1500.0;
+
+/// The ends of an engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum End {
+    /// The front end, that leads when it runs forward.
+    Nose,
+    /// The rear end.
+    Tail,
+}
+
+impl End {
+    const fn other(self) -> Self {
+        match self {
+            Self::Nose => Self::Tail,
+            Self::Tail => Self::Nose,
+        }
+    }
+}
+
+/// What a decoder hears.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Order {
+    Step(SpeedStep),
+    Turn,
+}
+
+/// One train.
+#[derive(Debug)]
+pub(crate) struct LiveTrain {
+    pub(crate) id: TrainId,
+    pub(crate) train: Arc<Train>,
+    motor: Motor<Arc<Train>>,
+    pub(crate) load: Load<Arc<Train>>,
+    draws: Draws,
+    /// Nothing while it is lifted.
+    pub(crate) body: Option<Body>,
+    pub(crate) leads: End,
+    /// Orders on their way to the decoder, and when it has them.
+    orders: VecDeque<(Timestamp, Order)>,
+    /// The step that its decoder heard last.
+    heard: SpeedStep,
+    /// Stopping without its decoder: by how much each second, in mm/s², and how fast the wheels still turn.
+    halting: Option<(f64, f64)>,
+    pub(crate) speed: f64,
+    /// Speed with dirty wheels over speed with clean ones.
+    pub(crate) wheels: f64,
+    pub(crate) odometer: f64,
+    /// Since when it has stood, while it stands.
+    pub(crate) stands_since: Option<Timestamp>,
+    /// Nothing that it was told will move it.
+    pub(crate) sleeps: bool,
+    pub(crate) is_wrecked: bool,
+}
+
+/// What a train steps through: the world around it.
+pub(crate) struct Around<'a, 'l, L: Fn(TurnoutId) -> Option<Leg>> {
+    pub(crate) rails: &'a Rails<'l>,
+    pub(crate) lies: &'a L,
+    pub(crate) s88: &'a mut S88,
+    pub(crate) rests: &'a mut Vec<RestTruth>,
+}
+
+/// What a step changed that concerns others.
+#[derive(Debug, Default)]
+pub(crate) struct Stepped {
+    /// It is on other edges than before.
+    pub(crate) other_edges: bool,
+    pub(crate) mishap: Option<MishapKind>,
+}
+
+impl LiveTrain {
+    pub(crate) fn new(id: TrainId, train: Train, warmth: f64, mut draws: Draws) -> Self {
+        let train = Arc::new(train);
+        Self {
+            id,
+            motor: Motor::at_rest(Arc::clone(&train)),
+            load: Load::new(Arc::clone(&train), warmth, 1.0, draws.split()),
+            train,
+            draws,
+            body: None,
+            leads: End::Nose,
+            orders: VecDeque::new(),
+            heard: SpeedStep::STAND,
+            halting: None,
+            speed: 0.0,
+            wheels: 1.0,
+            odometer: 0.0,
+            stands_since: Some(Timestamp::ZERO),
+            sleeps: true,
+            is_wrecked: false,
+        }
+    }
+
+    /// Front overhang, shoe and rear overhang as it runs now, in mm.
+    pub(crate) fn lengths(&self) -> [f64; 3] {
+        let Train { nose, shoe, tail, .. } = &*self.train;
+        // No part of a train is shorter than nothing, whatever a test asks for.
+        let [nose, shoe, tail] = [nose, shoe, tail].map(|length| length.as_mm().max(0.0));
+        match self.leads {
+            End::Nose => [nose, shoe, tail],
+            End::Tail => [tail, shoe, nose],
+        }
+    }
+
+    /// An order has left the line; its decoder will have it some time later.
+    pub(crate) fn tell(&mut self, order: Order, sent: Timestamp) {
+        let delay = self.draws.normal(self.train.command_delay.as_s(), self.train.command_jitter.as_s());
+        let last = self.orders.back().map_or(sent, |(heard, _)| *heard);
+        // Nothing is heard before the step that is under way has ended, and no order overtakes another.
+        let heard = (sent + TimeSpan::from_s(delay.clamp(0.0, 1.0))).max(sent + STEP).max(last);
+        self.orders.push_back((heard, order));
+        self.sleeps = false;
+    }
+
+    /// Its decoder has lost power and forgets everything.
+    pub(crate) fn lose_power(&mut self) {
+        self.orders.clear();
+        self.heard = SpeedStep::STAND;
+        self.halt(POWERLESS_MM_PER_S2);
+    }
+
+    /// It stands at once, and its decoder knows nothing any more.
+    pub(crate) fn stand(&mut self, now: Timestamp, rests: &mut Vec<RestTruth>) {
+        self.halting = None;
+        self.orders.clear();
+        self.heard = SpeedStep::STAND;
+        self.motor = Motor::at_rest(Arc::clone(&self.train));
+        self.come_to_rest(now, rests);
+    }
+
+    fn come_to_rest(&mut self, now: Timestamp, rests: &mut Vec<RestTruth>) {
+        self.speed = 0.0;
+        if self.stands_since.is_none() {
+            self.stands_since = Some(now);
+            let place = self.body.as_ref().and_then(Body::place);
+            rests.extend(place.map(|place| RestTruth::new(self.id, place, now, self.odometer)));
+        }
+    }
+
+    fn halt(&mut self, mm_per_s2: f64) {
+        if !self.motor.is_at_rest() && self.halting.is_none() {
+            self.halting = Some((mm_per_s2, self.motor.wheel_speed()));
+        }
+        if self.halting.is_none() {
+            self.motor = Motor::at_rest(Arc::clone(&self.train));
+        }
+        self.sleeps = false;
+    }
+
+    /// One integration step from `now`.
+    pub(crate) fn advance<L: Fn(TurnoutId) -> Option<Leg>>(
+        &mut self,
+        now: Timestamp,
+        around: &mut Around<'_, '_, L>,
+    ) -> Stepped {
+        let mut stepped = Stepped::default();
+        if self.orders.front().is_some_and(|(heard, _)| *heard <= now)
+            && let Some((_, order)) = self.orders.pop_front()
+        {
+            stepped.other_edges = self.obey(order, around.rails);
+        }
+        let wheel = self.turn_wheels();
+        let Some(body) = &mut self.body else {
+            self.fall_asleep();
+            return stepped;
+        };
+        if wheel > 0.0 {
+            if let Some(since) = self.stands_since.take() {
+                self.load.stand((now - since).as_s());
+                self.load.begin_run(body.factor);
+                if let Some(last) = around.rests.iter_mut().rev().find(|rest| rest.train == self.id) {
+                    last.until = Some(now);
+                }
+                stepped.mishap =
+                    body.splits(around.rails, around.lies).map(|turnout| MishapKind::Derailment { turnout });
+            }
+        } else if self.speed == 0.0 {
+            self.fall_asleep();
+            return stepped;
+        }
+        let here = body.lead;
+        let speed =
+            wheel * self.load.advance(body.factor, here < body.dirty_until, wheel > 0.0) * self.wheels;
+        let gone = 0.5 * (self.speed + speed) * STEP_S;
+        let there = here + gone;
+        self.speed = speed;
+        self.odometer += gone;
+        body.lead = there;
+        if there >= body.next {
+            // Within a millisecond the speed is as good as constant.
+            let part = |at_mm: f64| ((at_mm - here) / gone).clamp(0.0, 1.0);
+            let when = |at_mm: f64| now + TimeSpan::from_s(STEP_S * part(at_mm));
+            let counted = self.odometer - there;
+            while let Some(met) = body.meet(around.rails, around.lies) {
+                match met {
+                    Met::Touches(contact) => {
+                        let (sensor, at_mm) = (contact.what, contact.at_mm);
+                        if around.s88.close(sensor, when(at_mm), self.id, counted + at_mm) {
+                            body.hold(contact);
+                        }
+                    }
+                    Met::Leaves(contact) => {
+                        around.s88.leave(contact.what, when(contact.at_mm + self.train.shoe.as_mm()));
+                    }
+                    Met::Dirt => {
+                        if self.load.stalls(wheel) {
+                            self.motor.stall();
+                        }
+                    }
+                    Met::OtherEdges => stepped.other_edges = true,
+                    Met::IllegalPair(turnout) => {
+                        stepped.mishap = Some(MishapKind::Derailment { turnout });
+                        break;
+                    }
+                    Met::End => {
+                        stepped.mishap = Some(MishapKind::Overrun);
+                        break;
+                    }
+                }
+            }
+        }
+        if wheel == 0.0 {
+            self.come_to_rest(now + STEP, around.rests);
+        }
+        stepped
+    }
+
+    /// How fast the wheels would turn on level straight track, one step later.
+    fn turn_wheels(&mut self) -> f64 {
+        let Some((rate, wheel)) = &mut self.halting else { return self.motor.advance() };
+        *wheel = (*wheel - *rate * STEP_S).max(0.0);
+        let wheel = *wheel;
+        if wheel == 0.0 {
+            self.halting = None;
+            self.motor = Motor::at_rest(Arc::clone(&self.train));
+            if self.heard != SpeedStep::STAND {
+                self.motor.command(self.heard, &mut self.draws);
+            }
+        }
+        wheel
+    }
+
+    /// Its decoder has an order. Returns whether the train is on other edges than before.
+    fn obey(&mut self, order: Order, rails: &Rails<'_>) -> bool {
+        match order {
+            // Stations say the same over and over; a decoder does not begin again.
+            Order::Step(step) if step == self.heard => false,
+            Order::Step(step) => {
+                self.heard = step;
+                if self.halting.is_none() {
+                    self.motor.command(step, &mut self.draws);
+                }
+                false
+            }
+            Order::Turn => {
+                self.heard = SpeedStep::STAND;
+                self.halt(TURNED_MM_PER_S2);
+                if self.halting.is_some() {
+                    // It turns when it stands.
+                    self.orders.push_front((Timestamp::ZERO, Order::Turn));
+                    return false;
+                }
+                self.leads = self.leads.other();
+                if let Some(body) = &mut self.body {
+                    body.turn(rails);
+                }
+                true
+            }
+        }
+    }
+
+    fn fall_asleep(&mut self) {
+        self.sleeps = self.motor.stays_at_rest() && self.orders.is_empty() && self.halting.is_none();
+    }
+}

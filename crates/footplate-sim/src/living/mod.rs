@@ -1,0 +1,32 @@
+//! Trains on a whole layout that go where the turnouts lead them, behind the bytes of a command station.
+//!
+//! ```text
+//! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
+//! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
+//! live_train  mishap       one of them; what can become of it
+//! body  points  s88        where it reaches, how turnouts lie, what contacts report
+//! rails  switches  truth   the rails underneath; how bad the world is; what really happened, for scorers only
+//! ```
+
+mod body;
+mod cts;
+mod hands;
+mod live_train;
+mod mishap;
+mod points;
+mod rails;
+mod s88;
+mod start;
+mod station;
+mod switches;
+mod truth;
+mod world;
+
+pub use cts::CtsSwitch;
+pub use hands::HandError;
+pub use live_train::End;
+pub use mishap::{Mishap, MishapKind};
+pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
+pub use switches::LivingSwitches;
+pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};
+pub use world::LivingLayout;

@@ -1,0 +1,97 @@
+//! The true rails of a whole layout, edge by edge, ready to be run over.
+
+use footplate_core::track::{Layout, Leg, NodeKind, Ways};
+use footplate_core::{EdgeId, NodeId, SensorId, TurnoutId};
+
+use crate::track::TrueTrack;
+
+/// One direction of travel over a stretch of rail.
+#[derive(Debug)]
+pub(crate) struct Rail {
+    pub(crate) length_mm: f64,
+    /// Speed on it over speed on a level straight one.
+    pub(crate) factor: f64,
+    /// Contacts for this direction, in order, by how far along the edge they close.
+    pub(crate) contacts: Vec<(f64, SensorId)>,
+    /// Where dirty spots begin.
+    pub(crate) dirty: Vec<f64>,
+    /// What comes after it.
+    pub(crate) ahead: Ahead,
+    /// The turnout from whose toe it leads away, and by which leg.
+    pub(crate) leaves: Option<(TurnoutId, Leg)>,
+    /// The turnout into whose leg it leads.
+    pub(crate) enters: Option<(TurnoutId, Leg)>,
+}
+
+/// What comes after an edge.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Ahead {
+    Edge(EdgeId),
+    Points { turnout: TurnoutId, straight: EdgeId, curved: EdgeId },
+    End,
+}
+
+/// All edges of a layout as they really are.
+#[derive(Debug)]
+pub(crate) struct Rails<'l> {
+    pub(crate) layout: &'l Layout,
+    pub(crate) track: TrueTrack,
+    rails: Vec<Rail>,
+}
+
+impl<'l> Rails<'l> {
+    pub(crate) fn new(layout: &'l Layout, track: TrueTrack) -> Self {
+        let mut rails: Vec<Rail> = layout
+            .edges()
+            .map(|(id, edge)| Rail {
+                length_mm: track.length(id).as_mm(),
+                factor: track.speed_factor(id).as_parts(),
+                contacts: Vec::new(),
+                dirty: track.dirty_mm(id),
+                ahead: ahead(layout, edge.to),
+                leaves: edge.leg.and_then(|leg| Some((turnout_at(layout, edge.from)?, leg))),
+                enters: layout
+                    .edge(id.twin())
+                    .and_then(|twin| Some((turnout_at(layout, twin.from)?, twin.leg?))),
+            })
+            .collect();
+        for (sensor, node) in layout.sensors() {
+            let offset_mm = track.contact_offset(sensor).as_mm();
+            let after = if offset_mm >= 0.0 { layout.ways(node).edges().next() } else { None };
+            if let Some(rail) = after.and_then(|edge| rails.get_mut(usize::from(edge.0))) {
+                rail.contacts.push((offset_mm.min(rail.length_mm), sensor));
+                continue;
+            }
+            // Before its node, or where the track ends: on the rails that lead to it.
+            for (id, edge) in layout.edges().filter(|(_, edge)| edge.to == node) {
+                if let (Some(rail), true) = (rails.get_mut(usize::from(id.0)), edge.to == node) {
+                    rail.contacts.push(((rail.length_mm + offset_mm).clamp(0.0, rail.length_mm), sensor));
+                }
+            }
+        }
+        for rail in &mut rails {
+            rail.contacts.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        }
+        Self { layout, track, rails }
+    }
+
+    pub(crate) fn rail(&self, edge: EdgeId) -> Option<&Rail> {
+        self.rails.get(usize::from(edge.0))
+    }
+}
+
+fn ahead(layout: &Layout, node: NodeId) -> Ahead {
+    match (layout.ways(node), turnout_at(layout, node)) {
+        (Ways::Ahead(edge), _) => Ahead::Edge(edge),
+        (Ways::Legs { straight, curved }, Some(turnout)) => Ahead::Points { turnout, straight, curved },
+        _ => Ahead::End,
+    }
+}
+
+/// The turnout that is met at its toe at a node.
+fn turnout_at(layout: &Layout, node: NodeId) -> Option<TurnoutId> {
+    match layout.node(node)?.kind {
+        NodeKind::Branch(turnout) => Some(turnout),
+        _ => None,
+    }
+}

@@ -1,0 +1,139 @@
+//! Contacts as the modules of an S88 bus see them: held, or remembered from when they were.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use footplate_core::track::Layout;
+use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, ModuleState};
+
+use crate::contacts::{Cause, Faults};
+use crate::draws::Draws;
+use crate::living::truth::PassTruth;
+
+/// A contact closes or opens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Change {
+    at: Timestamp,
+    /// Of changes at one time the one that was first caused.
+    nth: u64,
+    sensor: SensorId,
+    closes: bool,
+}
+
+/// All contacts and what is remembered of them.
+#[derive(Debug)]
+pub(crate) struct S88 {
+    faults: Faults,
+    draws: Draws,
+    /// Contacts that exist, to draw spurious ones from.
+    sensors: Vec<SensorId>,
+    /// By the contact's number: by how much it is held closed, and whether it was since it was last read.
+    contacts: Vec<(u8, bool)>,
+    changes: BinaryHeap<Reverse<Change>>,
+    caused: u64,
+    next_spurious: Timestamp,
+    /// For scorers: every contact that a train came to, and every one that closed by itself.
+    pub(crate) passes: Vec<PassTruth>,
+}
+
+impl S88 {
+    /// All open; a few are remembered from before, if that is asked for.
+    pub(crate) fn new(layout: &Layout, faults: &Faults, stale: bool, mut draws: Draws) -> Self {
+        let sensors: Vec<SensorId> = layout.sensors().map(|(sensor, _)| sensor).collect();
+        let count = sensors.iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or(0);
+        let mut contacts = vec![(0, false); count];
+        if stale {
+            // Whoever ran trains last came past some of them (chosen: one in five).
+            for sensor in &sensors {
+                contacts[usize::from(sensor.0)].1 = draws.chance(0.2);
+            }
+        }
+        let first = Timestamp::ZERO + TimeSpan::from_s(draws.waiting(faults.spurious_per_s()).min(FOREVER_S));
+        Self {
+            faults: faults.clone(),
+            draws,
+            sensors,
+            contacts,
+            changes: BinaryHeap::new(),
+            caused: 0,
+            next_spurious: first,
+            passes: Vec::new(),
+        }
+    }
+
+    /// A shoe comes onto a contact. Returns whether it closes.
+    pub(crate) fn close(
+        &mut self,
+        sensor: SensorId,
+        at: Timestamp,
+        train: TrainId,
+        odometer_mm: f64,
+    ) -> bool {
+        let closes = !self.faults.misses(sensor, &mut self.draws);
+        let cause = Cause::Train;
+        self.passes.push(PassTruth { sensor, at, train: Some(train), cause, closed: closes, odometer_mm });
+        if closes {
+            self.change(sensor, at, true);
+        }
+        closes
+    }
+
+    /// A shoe leaves a contact that it had closed.
+    pub(crate) fn leave(&mut self, sensor: SensorId, at: Timestamp) {
+        let sticks = TimeSpan::from_s(self.faults.sticks_for_s(&mut self.draws));
+        self.change(sensor, at + sticks, false);
+    }
+
+    /// What the modules show at a time, none earlier than before; `forget` clears what is only remembered.
+    pub(crate) fn read(&mut self, module: u8, at: Timestamp, forget: bool) -> ModuleState {
+        self.settle(at);
+        let first = u16::from(module.saturating_sub(1)) * CONTACTS_PER_MODULE;
+        let numbers = first..first + CONTACTS_PER_MODULE;
+        let contacts = &mut self.contacts;
+        let closed = numbers.filter_map(|number| {
+            let (held, remembered) = contacts.get_mut(usize::from(number))?;
+            let is_closed = *held > 0 || *remembered;
+            if forget {
+                *remembered = false;
+            }
+            is_closed.then_some(SensorId(number))
+        });
+        ModuleState::with_closed(module, closed)
+    }
+
+    fn change(&mut self, sensor: SensorId, at: Timestamp, closes: bool) {
+        self.caused += 1;
+        self.changes.push(Reverse(Change { at, nth: self.caused, sensor, closes }));
+    }
+
+    /// Takes in everything that happened by a time.
+    fn settle(&mut self, by: Timestamp) {
+        while self.next_spurious <= by {
+            let at = self.next_spurious;
+            let waiting = self.draws.waiting(self.faults.spurious_per_s()).min(FOREVER_S);
+            self.next_spurious = at + TimeSpan::from_s(waiting);
+            if let Some(&sensor) = self.sensors.get(self.draws.below(self.sensors.len())) {
+                self.change(sensor, at, true);
+                self.change(sensor, at + Faults::SPURIOUS, false);
+                let (train, cause) = (None, Cause::Spurious);
+                self.passes.push(PassTruth { sensor, at, train, cause, closed: true, odometer_mm: 0.0 });
+            }
+        }
+        while let Some(Reverse(change)) = self.changes.peek().copied().filter(|next| next.0.at <= by) {
+            self.changes.pop();
+            let Some((held, remembered)) = self.contacts.get_mut(usize::from(change.sensor.0)) else {
+                continue;
+            };
+            if change.closes {
+                *held = held.saturating_add(1);
+                *remembered = true;
+            } else {
+                *held = held.saturating_sub(1);
+            }
+        }
+    }
+}
+
+/// Never, as far as any run is concerned: a century.
+const FOREVER_S: f64 = 3e9;

@@ -1,0 +1,333 @@
+//! The virtual 6051: a living layout behind the bytes of its serial line.
+//!
+//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by
+//! what is known of the real box. One byte takes 4.583 ms in either direction. A command acts when its last byte
+//! has arrived; contacts are read when the request for them has.
+
+use std::collections::VecDeque;
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{Ratio, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_wire::marklin_serial::{BYTE_TIME, Message, REPLY_BYTE_SPACING, SOLENOID_HOLD_LONGEST};
+
+use crate::circuit::CircuitError;
+use crate::draws::{Draws, Purpose};
+use crate::living::cts::{Cts, CtsSwitch};
+use crate::living::switches::LivingSwitches;
+use crate::living::world::LivingLayout;
+
+/// From the last bit of a request until the contacts are read (chosen: the modules are clocked out within it).
+const READING: TimeSpan = TimeSpan::from_us(300);
+/// A coil that has been powered for so long has burnt (chosen: ten times what is allowed).
+const BURNS: TimeSpan = TimeSpan::from_ms(5000);
+
+/// How the box and its line behave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StationSwitches {
+    /// How it says that it is ready.
+    pub cts: CtsSwitch,
+    /// The shortest time from the last bit of a request until the first byte of the answer begins (chosen: with it a
+    /// poll of five modules takes the 55 to 60 ms that are reported).
+    pub turnaround: TimeSpan,
+    /// By how much that varies from request to request, evenly (measured: about 5 ms).
+    pub turnaround_spread: TimeSpan,
+    /// Whether a byte that comes while the station is not ready is lost, and takes a byte of the answer that is under
+    /// way with it. Otherwise it waits.
+    pub strict: bool,
+    /// How often a byte is lost on the line, either way.
+    pub lost: Ratio,
+}
+
+impl Default for StationSwitches {
+    fn default() -> Self {
+        Self {
+            cts: CtsSwitch::per_byte(),
+            turnaround: TimeSpan::from_ms(1),
+            turnaround_spread: TimeSpan::from_ms(5),
+            strict: true,
+            lost: Ratio::ZERO,
+        }
+    }
+}
+
+/// What reaches the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FromStation {
+    /// The last bit of a byte.
+    Byte(u8),
+    /// The station is ready for a byte, or no longer.
+    Cts(bool),
+}
+
+/// A solenoid was left powered for longer than half a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CoilAlarm {
+    /// The turnout.
+    pub turnout: TurnoutId,
+    /// Since when its solenoid was powered.
+    pub since: Timestamp,
+}
+
+/// A solenoid under power.
+#[derive(Debug, Clone, Copy)]
+struct Coil {
+    turnout: TurnoutId,
+    since: Timestamp,
+    is_alarming: bool,
+}
+
+/// A living layout behind the bytes of a 6051, on a clock of its own.
+#[derive(Debug)]
+pub struct VirtualStation<'l> {
+    world: LivingLayout<'l>,
+    switches: StationSwitches,
+    draws: Draws,
+    now: Timestamp,
+    cts: Cts,
+    /// Bytes from the host, when their last bit arrives and whether the station was ready when they began.
+    incoming: VecDeque<(Timestamp, u8, bool)>,
+    host_is_free: Timestamp,
+    /// The first byte of a message of two.
+    begun: Option<u8>,
+    /// A request whose contacts have not been read.
+    asked: Option<(Timestamp, Message)>,
+    reply: VecDeque<(Timestamp, u8)>,
+    /// When the last byte of the answer under way has gone.
+    answers_until: Timestamp,
+    forgets: bool,
+    coil: Option<Coil>,
+    alarms: Vec<CoilAlarm>,
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Incoming,
+    Reading,
+    Reply,
+    Cts,
+    Coil,
+}
+
+impl<'l> VirtualStation<'l> {
+    /// A station in front of a layout, just switched on.
+    #[must_use]
+    pub fn new(world: LivingLayout<'l>, seed: u64, switches: StationSwitches) -> Self {
+        let now = world.now();
+        Self {
+            world,
+            cts: Cts::new(switches.cts),
+            switches,
+            draws: Draws::new(seed, Purpose::Line),
+            now,
+            incoming: VecDeque::new(),
+            host_is_free: now,
+            begun: None,
+            asked: None,
+            reply: VecDeque::new(),
+            answers_until: now,
+            forgets: false,
+            coil: None,
+            alarms: Vec::new(),
+        }
+    }
+
+    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
+    ///
+    /// # Errors
+    /// [`CircuitError`] when no train can run round on the layout.
+    pub fn draw(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+    ) -> Result<Self, CircuitError> {
+        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, StationSwitches::default()))
+    }
+
+    /// The time.
+    #[must_use]
+    pub const fn now(&self) -> Timestamp {
+        self.now
+    }
+
+    /// Whether the station says that it is ready for a byte.
+    #[must_use]
+    pub const fn cts(&self) -> bool {
+        self.cts.is_up
+    }
+
+    /// The layout.
+    #[must_use]
+    pub const fn world(&self) -> &LivingLayout<'l> {
+        &self.world
+    }
+
+    /// The layout, for a person's hands.
+    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
+        &mut self.world
+    }
+
+    /// Solenoids that were left powered for too long.
+    #[must_use]
+    pub fn alarms(&self) -> &[CoilAlarm] {
+        &self.alarms
+    }
+
+    /// The host puts a byte on the line, behind those that are still on their way; its last bit arrives 4.583 ms
+    /// after it began.
+    pub fn write(&mut self, byte: u8) {
+        let begins = self.host_is_free.max(self.now);
+        self.host_is_free = begins + BYTE_TIME;
+        // A byte behind another one begins before the station can have said anything.
+        let is_heard = begins == self.now && self.cts.hears() || self.switches.cts == CtsSwitch::None;
+        self.incoming.push_back((self.host_is_free, byte, is_heard));
+    }
+
+    /// Goes on until a time, or until something reaches the host before it.
+    pub fn advance(&mut self, until: Timestamp) -> Option<FromStation> {
+        while let Some((at, next)) = self.next().filter(|(at, _)| *at <= until) {
+            self.world.advance(at);
+            self.now = self.now.max(at);
+            let heard = match next {
+                Next::Incoming => {
+                    if let Some((at, byte, is_heard)) = self.incoming.pop_front() {
+                        self.receive(at, byte, is_heard);
+                    }
+                    None
+                }
+                Next::Reading => {
+                    self.answer();
+                    None
+                }
+                Next::Reply => self.reply.pop_front().map(|(_, byte)| FromStation::Byte(byte)),
+                Next::Cts => Some(FromStation::Cts(self.cts.change())),
+                Next::Coil => {
+                    self.watch_coil();
+                    None
+                }
+            };
+            let is_lost = matches!(heard, Some(FromStation::Byte(_))) && self.loses_one();
+            if heard.is_some() && !is_lost {
+                return heard;
+            }
+        }
+        self.world.advance(until);
+        self.now = self.now.max(until);
+        None
+    }
+
+    /// What happens next, and when; of things at one time the first in the order of this list.
+    fn next(&self) -> Option<(Timestamp, Next)> {
+        let mut next = self.incoming.front().map(|(at, ..)| (*at, Next::Incoming));
+        let mut or = |at: Option<Timestamp>, what| {
+            if let Some(at) = at.filter(|at| next.is_none_or(|(first, _)| *at < first)) {
+                next = Some((at, what));
+            }
+        };
+        or(self.asked.map(|(at, _)| at), Next::Reading);
+        or(self.reply.front().map(|(at, _)| *at), Next::Reply);
+        or(self.cts.next(), Next::Cts);
+        or(
+            self.coil.map(|coil| coil.since + if coil.is_alarming { BURNS } else { SOLENOID_HOLD_LONGEST }),
+            Next::Coil,
+        );
+        next
+    }
+
+    fn loses_one(&mut self) -> bool {
+        let lost = self.switches.lost;
+        lost > Ratio::ZERO && self.draws.chance(lost.as_parts())
+    }
+
+    /// The last bit of a byte from the host has arrived.
+    fn receive(&mut self, at: Timestamp, byte: u8, is_heard: bool) {
+        let answers = self.asked.is_some() || at < self.answers_until;
+        if (answers || !is_heard) && self.switches.strict {
+            self.reply.pop_front();
+            return;
+        }
+        if self.loses_one() {
+            return;
+        }
+        let bytes = [self.begun.unwrap_or(byte), byte];
+        let message = match self.begun.take() {
+            Some(_) => Message::decode(&bytes),
+            None => Message::decode(&bytes[..1]),
+        };
+        let Some((message, _)) = message else {
+            self.begun = Some(byte);
+            self.cts.received(at, at, &mut self.draws);
+            return;
+        };
+        let busy_until = self.obey(at, message);
+        self.cts.received(at, busy_until, &mut self.draws);
+    }
+
+    /// Does what a message says; returns until when the station has its hands full with it.
+    fn obey(&mut self, at: Timestamp, message: Message) -> Timestamp {
+        match message {
+            Message::Drive { train, step, .. } => self.world.tell(train, step, at),
+            Message::Reverse { train, .. } => self.world.turn(train, at),
+            Message::Turnout { turnout, curved } => {
+                self.let_go(at);
+                if self.world.is_powered() {
+                    self.world.points.power(turnout, Leg::from_curved(curved), at);
+                    self.coil = Some(Coil { turnout, since: at, is_alarming: false });
+                }
+            }
+            Message::SolenoidOff => self.let_go(at),
+            Message::Go => self.world.power(true, at),
+            Message::Stop => {
+                self.let_go(at);
+                self.world.power(false, at);
+            }
+            Message::ResetMode { on } => self.forgets = on,
+            Message::ReadModules { .. } | Message::ReadModule { .. } => return self.ask(at, message),
+            Message::Functions { .. } | Message::Unknown { .. } => {}
+        }
+        at
+    }
+
+    fn ask(&mut self, at: Timestamp, request: Message) -> Timestamp {
+        let bytes = 2 * request.modules_read().count() as i64;
+        let spread = self.switches.turnaround_spread.as_s();
+        let varies = TimeSpan::from_s(self.draws.uniform(0.0..spread.max(f64::MIN_POSITIVE)));
+        let first = at + (self.switches.turnaround + varies).max(READING) + BYTE_TIME;
+        self.asked = Some((at + READING, request));
+        self.answers_until = first + TimeSpan::from_ns((bytes - 1) * REPLY_BYTE_SPACING.as_ns());
+        self.answers_until
+    }
+
+    /// Reads the contacts and sends what they show.
+    fn answer(&mut self) {
+        let Some((at, request)) = self.asked.take() else { return };
+        let bytes = 2 * request.modules_read().count() as i64;
+        let spacing = REPLY_BYTE_SPACING.as_ns();
+        let mut goes = self.answers_until - TimeSpan::from_ns((bytes - 1) * spacing);
+        for module in request.modules_read() {
+            for byte in self.world.s88.read(module, at, self.forgets).encode() {
+                self.reply.push_back((goes, byte));
+                goes += TimeSpan::from_ns(spacing);
+            }
+        }
+    }
+
+    fn let_go(&mut self, at: Timestamp) {
+        if let Some(coil) = self.coil.take() {
+            self.world.points.release(coil.turnout, at);
+        }
+    }
+
+    fn watch_coil(&mut self) {
+        let Some(coil) = &mut self.coil else { return };
+        if coil.is_alarming {
+            let turnout = coil.turnout;
+            self.coil = None;
+            self.world.burn(turnout, self.now);
+        } else {
+            coil.is_alarming = true;
+            self.alarms.push(CoilAlarm { turnout: coil.turnout, since: coil.since });
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! How bad a living layout is.
+
+use footplate_core::Ratio;
+
+use crate::contacts::Faults;
+use crate::law::LawFamily;
+
+/// What goes wrong on a living layout, how often, and what its trains are like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LivingSwitches {
+    /// What goes wrong with contacts.
+    pub faults: Faults,
+    /// How often a turnout that was told to move does not.
+    pub turnout_failure: Ratio,
+    /// Whether rails differ from the layout's lengths and are curved and dirty, or are exactly as surveyed.
+    pub true_rails: bool,
+    /// The law of every train drawn; `None`: each train has the next one.
+    pub law: Option<LawFamily>,
+    /// How warm trains are when they are put down, from 0, cold, to 1.
+    pub warmth: f64,
+    /// Whether turnouts lie for the circuits that the trains were put on; otherwise they lie anyhow.
+    pub turnouts_set: bool,
+    /// Whether the station remembers contacts that were closed before it was first asked.
+    pub stale_contacts: bool,
+}
+
+impl LivingSwitches {
+    /// A well-kept laboratory: rates of faults chosen from what course reports complain about.
+    #[must_use]
+    pub fn well_kept() -> Self {
+        Self {
+            faults: Faults {
+                missed: Ratio::from_percent(0.3),
+                stuck: Ratio::from_percent(0.1),
+                spurious_per_minute: 0.05,
+                ..Faults::default()
+            },
+            turnout_failure: Ratio::from_percent(0.3),
+            ..Self::faultless()
+        }
+    }
+
+    /// The same rails and trains, and nothing that fails.
+    #[must_use]
+    pub fn faultless() -> Self {
+        Self {
+            faults: Faults::default(),
+            turnout_failure: Ratio::ZERO,
+            true_rails: true,
+            law: None,
+            warmth: 0.5,
+            turnouts_set: false,
+            stale_contacts: true,
+        }
+    }
+}
+
+impl Default for LivingSwitches {
+    fn default() -> Self {
+        Self::well_kept()
+    }
+}

@@ -1,0 +1,255 @@
+//! Several trains on a whole layout, a millisecond at a time.
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+
+use crate::draws::{Draws, Purpose};
+use crate::living::live_train::{Around, LiveTrain, Order, STEP, Stepped};
+use crate::living::mishap::{Mishap, MishapKind};
+use crate::living::points::Points;
+use crate::living::rails::Rails;
+use crate::living::s88::S88;
+use crate::living::switches::LivingSwitches;
+use crate::living::truth::{RestTruth, Truth};
+use crate::track::TrueTrack;
+use crate::train::Train;
+
+/// Trains on a layout, and everything that they do to each other. Its time moves only when it is told to.
+#[derive(Debug)]
+pub struct LivingLayout<'l> {
+    pub(crate) rails: Rails<'l>,
+    pub(crate) points: Points,
+    pub(crate) s88: S88,
+    pub(crate) trains: Vec<LiveTrain>,
+    /// For each train the step that the station goes on telling it.
+    told: Vec<SpeedStep>,
+    /// Trains that may touch each other, by their places in the list.
+    near: Vec<(usize, usize)>,
+    is_powered: bool,
+    /// Everything has happened up to here; a whole number of steps.
+    now: Timestamp,
+    draws: Draws,
+    mishaps: Vec<Mishap>,
+    pub(crate) rests: Vec<RestTruth>,
+}
+
+impl<'l> LivingLayout<'l> {
+    /// A layout without trains, under power, with rails and turnouts from the seed.
+    #[must_use]
+    pub fn without_trains(layout: &'l Layout, seed: u64, switches: &LivingSwitches) -> Self {
+        let track =
+            if switches.true_rails { TrueTrack::draw(layout, seed) } else { TrueTrack::as_surveyed(layout) };
+        let mut draws = Draws::new(seed, Purpose::Living);
+        let points = Points::draw(layout, switches.turnout_failure, draws.split());
+        let faults = Draws::new(seed, Purpose::Faults);
+        Self {
+            rails: Rails::new(layout, track),
+            points,
+            s88: S88::new(layout, &switches.faults, switches.stale_contacts, faults),
+            trains: Vec::new(),
+            told: Vec::new(),
+            near: Vec::new(),
+            is_powered: true,
+            now: Timestamp::ZERO,
+            draws,
+            mishaps: Vec::new(),
+            rests: Vec::new(),
+        }
+    }
+
+    /// One more train, not yet on the rails: see [`place`](Self::place). A train of the same address is replaced.
+    pub fn add(&mut self, id: TrainId, train: Train, warmth: f64) {
+        let draws = self.draws.split();
+        let added = LiveTrain::new(id, train, warmth.clamp(0.0, 1.0), draws);
+        match self.trains.iter_mut().position(|found| found.id == id) {
+            Some(place) => self.trains[place] = added,
+            None => {
+                self.trains.push(added);
+                self.told.push(SpeedStep::STAND);
+            }
+        }
+        self.find_near();
+    }
+
+    /// The layout as people know it.
+    #[must_use]
+    pub const fn layout(&self) -> &'l Layout {
+        self.rails.layout
+    }
+
+    /// Up to when everything has happened: the next whole millisecond after the time it was told to go on to.
+    #[must_use]
+    pub const fn now(&self) -> Timestamp {
+        self.now
+    }
+
+    /// What went wrong so far, in order.
+    #[must_use]
+    pub fn mishaps(&self) -> &[Mishap] {
+        &self.mishaps
+    }
+
+    /// Whether the rails are under power.
+    #[must_use]
+    pub const fn is_powered(&self) -> bool {
+        self.is_powered
+    }
+
+    /// How a turnout really lies.
+    #[must_use]
+    pub fn lies(&self, turnout: TurnoutId) -> Option<Leg> {
+        self.points.lies(turnout)
+    }
+
+    /// What really happens: for scorers only.
+    #[must_use]
+    pub const fn truth(&self) -> Truth<'_, 'l> {
+        Truth { world: self }
+    }
+
+    /// Lets everything happen until a time. In between nothing can be told.
+    pub fn advance(&mut self, until: Timestamp) {
+        while self.now < until {
+            if self.points.next().is_none() && self.trains.iter().all(|train| train.sleeps) {
+                // Nothing happens on a layout where nothing moves.
+                let steps = (until - self.now).as_ns().div_euclid(STEP.as_ns());
+                let whole = TimeSpan::from_ns(steps * STEP.as_ns());
+                self.now = if self.now + whole < until { self.now + whole + STEP } else { self.now + whole };
+                break;
+            }
+            self.step();
+        }
+    }
+
+    /// The station tells a train a step.
+    pub(crate) fn tell(&mut self, train: TrainId, step: SpeedStep, sent: Timestamp) {
+        if let Some(place) = self.trains.iter().position(|found| found.id == train) {
+            self.told[place] = step;
+            self.send(place, Order::Step(step), sent);
+        }
+    }
+
+    /// The station tells a train to turn around, which sets its step to 0.
+    pub(crate) fn turn(&mut self, train: TrainId, sent: Timestamp) {
+        if let Some(place) = self.trains.iter().position(|found| found.id == train) {
+            self.told[place] = SpeedStep::STAND;
+            self.send(place, Order::Turn, sent);
+        }
+    }
+
+    fn send(&mut self, place: usize, order: Order, sent: Timestamp) {
+        let train = &mut self.trains[place];
+        if self.is_powered && train.body.is_some() && !train.is_wrecked {
+            train.tell(order, sent);
+        }
+    }
+
+    /// The station goes on telling a train what it told it last, which a decoder that forgot it hears anew.
+    pub(crate) fn remind(&mut self, place: usize, now: Timestamp) {
+        let step = self.told[place];
+        if step != SpeedStep::STAND {
+            self.send(place, Order::Step(step), now);
+        }
+    }
+
+    /// The station gives power to the rails, or takes it.
+    pub(crate) fn power(&mut self, on: bool, now: Timestamp) {
+        if on == self.is_powered {
+            return;
+        }
+        self.is_powered = on;
+        for place in 0..self.trains.len() {
+            if on {
+                self.remind(place, now);
+            } else {
+                self.trains[place].lose_power();
+            }
+        }
+    }
+
+    /// A solenoid burns.
+    pub(crate) fn burn(&mut self, turnout: TurnoutId, at: Timestamp) {
+        self.points.burn(turnout);
+        self.mishaps.push(Mishap { at, train: None, kind: MishapKind::CoilBurnt { turnout } });
+    }
+
+    fn step(&mut self) {
+        let Self { rails, points, s88, trains, rests, .. } = self;
+        let (now, lies) = (self.now, |turnout| points.lies(turnout));
+        let mut other_edges = false;
+        let mut wrecked = None;
+        for (place, train) in trains.iter_mut().enumerate() {
+            if train.sleeps {
+                continue;
+            }
+            let Stepped { other_edges: others, mishap } =
+                train.advance(now, &mut Around { rails, lies: &lies, s88, rests });
+            other_edges |= others;
+            if let Some(kind) = mishap {
+                wrecked = wrecked.or(Some((place, kind)));
+            }
+        }
+        self.now = now + STEP;
+        if let Some((place, kind)) = wrecked {
+            self.wreck(place, kind);
+        }
+        if other_edges {
+            self.find_near();
+        }
+        if !self.near.is_empty() {
+            self.collide();
+        }
+        if self.points.next().is_some_and(|next| next <= self.now) {
+            self.throw();
+        }
+    }
+
+    /// Points that have moved derail what stands on them.
+    fn throw(&mut self) {
+        while let Some(turnout) = self.points.moved(self.now) {
+            for place in 0..self.trains.len() {
+                let train = &self.trains[place];
+                let derails = train.body.as_ref().is_some_and(|body| body.is_on_blades(&self.rails, turnout));
+                if derails && !train.is_wrecked {
+                    self.wreck(place, MishapKind::Derailment { turnout });
+                }
+            }
+        }
+    }
+
+    fn collide(&mut self) {
+        for at in 0..self.near.len() {
+            let (one, other) = self.near[at];
+            let (first, second) = (&self.trains[one], &self.trains[other]);
+            let (Some(body), Some(beside)) = (&first.body, &second.body) else { continue };
+            let was_so = first.is_wrecked && second.is_wrecked;
+            if was_so || !body.touches(&self.rails, beside) {
+                continue;
+            }
+            let ids = (first.id, second.id);
+            self.wreck(one, MishapKind::Collision { with: ids.1 });
+            self.wreck(other, MishapKind::Collision { with: ids.0 });
+        }
+    }
+
+    fn wreck(&mut self, place: usize, kind: MishapKind) {
+        let train = &mut self.trains[place];
+        train.stand(self.now, &mut self.rests);
+        train.is_wrecked = true;
+        self.mishaps.push(Mishap { at: self.now, train: Some(train.id), kind });
+    }
+
+    /// Finds the trains that may touch each other; to be called whenever one is on other edges.
+    pub(crate) fn find_near(&mut self) {
+        self.near.clear();
+        for (one, first) in self.trains.iter().enumerate() {
+            for (other, second) in self.trains.iter().enumerate().skip(one + 1) {
+                if let (Some(body), Some(beside)) = (&first.body, &second.body)
+                    && body.is_near(&self.rails, beside)
+                {
+                    self.near.push((one, other));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Trains on a living layout go where turnouts lead them, close what they come to, and come to grief.
+
+use footplate_core::track::Leg;
+use footplate_core::{SensorId, TurnoutId};
+use footplate_sim::{CtsSwitch, MishapKind, StationSwitches};
+
+use crate::yard::{OTHER, TRAIN, empty, put, say, two_loops, wait};
+
+fn sensors_passed(station: &footplate_sim::VirtualStation<'_>) -> Vec<u16> {
+    station.world().truth().passes().iter().map(|pass| pass.sensor.0).collect()
+}
+
+#[test]
+fn a_train_goes_round_and_closes_only_the_contacts_of_its_direction() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 15.0);
+    let passed = sensors_passed(&station);
+    assert!(passed.len() >= 4, "{passed:?}");
+    let round = [4, 6, 0, 2];
+    assert!(passed.iter().zip(round.iter().cycle()).all(|(found, due)| found == due), "{passed:?}");
+    assert!(station.world().mishaps().is_empty());
+}
+
+#[test]
+fn it_goes_where_the_turnout_lies_when_it_comes_to_it() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S3", "B3", 200.0);
+    say(&mut station, &[34, 1]);
+    wait(&mut station, 0.4);
+    say(&mut station, &[32]);
+    assert_eq!(station.world().lies(TurnoutId(1)), Some(Leg::Curved));
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 20.0);
+    let passed = sensors_passed(&station);
+    assert_eq!(passed.get(..4), Some([0, 10, 12, 14].as_slice()), "over S0 into the inner loop: {passed:?}");
+    // Märklin's points give way to a train that comes from the wrong leg.
+    assert!(station.world().mishaps().is_empty(), "{:?}", station.world().mishaps());
+}
+
+#[test]
+fn a_train_told_to_turn_stops_dead_and_comes_back() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 6.0);
+    let before = station.world().truth().train(TRAIN).unwrap();
+    assert!(before.speed.as_mm_per_s() > 200.0);
+    say(&mut station, &[15, 24]);
+    wait(&mut station, 1.0);
+    let stopped = station.world().truth().train(TRAIN).unwrap();
+    assert!(stopped.at_rest_since.is_some());
+    let gone = (stopped.odometer - before.odometer).as_mm();
+    let heard = before.speed.as_mm_per_s() * 0.2;
+    assert!(gone < heard + 70.0, "{gone} mm");
+    let edge_before = stopped.position.unwrap().edge;
+    let last = *station.world().truth().passes().last().unwrap();
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 8.0);
+    let passes = station.world().truth().passes();
+    let next = passes.iter().find(|pass| pass.at > last.at).unwrap();
+    assert_eq!(next.sensor, SensorId(last.sensor.0 ^ 1), "the same place, the other way");
+    assert!(layout.edge(edge_before).is_some());
+}
+
+#[test]
+fn the_other_end_of_the_shoe_leads_after_turning() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    let shoe = station.world().truth().engine(TRAIN).unwrap().shoe.as_mm();
+    say(&mut station, &[15, 24]);
+    wait(&mut station, 0.5);
+    let position = station.world().truth().train(TRAIN).unwrap().position.unwrap();
+    assert!((position.offset.as_mm() - (900.0 - 300.0 + shoe)).abs() < 1e-6, "{position:?}");
+}
+
+#[test]
+fn trains_that_meet_collide_and_stay_where_they_are() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    put(&mut station, OTHER, "R3", "R2", 300.0);
+    say(&mut station, &[8, 24]);
+    say(&mut station, &[12, 58]);
+    wait(&mut station, 20.0);
+    let mishaps = station.world().mishaps();
+    let kinds: Vec<MishapKind> = mishaps.iter().map(|mishap| mishap.kind).collect();
+    assert_eq!(kinds, [MishapKind::Collision { with: OTHER }, MishapKind::Collision { with: TRAIN }]);
+    let truth = station.world().truth();
+    for train in [TRAIN, OTHER] {
+        assert_eq!(truth.train(train).unwrap().at_rest_since, Some(mishaps[0].at));
+        assert!(truth.train(train).unwrap().is_wrecked);
+    }
+}
+
+#[test]
+fn points_thrown_under_a_train_derail_it() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    // The shoe 60 mm past the toe: its tail is on the blades.
+    put(&mut station, TRAIN, "B1", "S1", 60.0);
+    say(&mut station, &[34, 1]);
+    wait(&mut station, 0.4);
+    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
+    assert_eq!(kinds, [MishapKind::Derailment { turnout: TurnoutId(1) }]);
+}
+
+#[test]
+fn a_train_that_backs_over_points_it_has_forced_derails() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    // From the curved leg of turnout 1, which lies straight, half through its toe.
+    put(&mut station, TRAIN, "M1", "R0", 60.0);
+    station.world_mut().lay(TurnoutId(1), Leg::Curved);
+    say(&mut station, &[15, 24]);
+    assert!(station.world().mishaps().is_empty());
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 3.0);
+    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
+    assert_eq!(kinds, [MishapKind::Derailment { turnout: TurnoutId(1) }]);
+}
+
+#[test]
+fn a_train_runs_off_the_end_of_a_siding() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S8", "X", 300.0);
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 20.0);
+    let mishaps = station.world().mishaps();
+    assert_eq!(mishaps.iter().map(|mishap| mishap.kind).collect::<Vec<_>>(), [MishapKind::Overrun]);
+}
+
+#[test]
+fn without_power_everything_stops_and_with_power_it_goes_on() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    say(&mut station, &[10, 24]);
+    wait(&mut station, 6.0);
+    let before = station.world().truth().train(TRAIN).unwrap().odometer;
+    say(&mut station, &[97]);
+    wait(&mut station, 1.0);
+    let stopped = station.world().truth().train(TRAIN).unwrap();
+    assert!(stopped.at_rest_since.is_some());
+    assert!((stopped.odometer - before).as_mm() < 200.0);
+    say(&mut station, &[96]);
+    wait(&mut station, 3.0);
+    assert!(station.world().truth().train(TRAIN).unwrap().speed.as_mm_per_s() > 50.0);
+}
+
+#[test]
+fn hands_lift_push_dirty_and_swap() {
+    let layout = two_loops();
+    let no_wire = StationSwitches { cts: CtsSwitch::None, ..StationSwitches::default() };
+    let mut station = empty(&layout, no_wire);
+    put(&mut station, TRAIN, "S1", "S2", 800.0);
+    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(150.0));
+    assert_eq!(sensors_passed(&station), [4]);
+    station.world_mut().lift(TRAIN);
+    assert!(station.world().truth().train(TRAIN).unwrap().position.is_none());
+    put(&mut station, TRAIN, "S5", "S6", 300.0);
+    station.world_mut().dirty_wheels(TRAIN, 0.8);
+    for byte in [10, 24] {
+        station.write(byte);
+    }
+    wait(&mut station, 10.0);
+    let truth = station.world().truth();
+    let engine = truth.engine(TRAIN).unwrap();
+    let step = footplate_core::SpeedStep::new(10).unwrap();
+    let clean = engine.speeds.speed(step, footplate_core::Approach::Below).as_mm_per_s();
+    let now = truth.train(TRAIN).unwrap().speed.as_mm_per_s();
+    assert!((now / clean - 0.8).abs() < 0.04, "{now} of {clean}");
+    let other = footplate_sim::Train::draw(5, footplate_sim::LawFamily::Lag);
+    station.world_mut().swap(TRAIN, other.clone(), 1.0).unwrap();
+    assert_eq!(station.world().truth().engine(TRAIN), Some(&other));
+    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+}
