@@ -77,6 +77,13 @@ impl SectionIndex {
         self.surveyed.get(section).map_or(0.0, |(_, variance)| *variance)
     }
 
+    /// Surveyed length of a section (m).
+    #[inline]
+    #[must_use]
+    pub fn surveyed_length(&self, section: usize) -> f64 {
+        self.surveyed.get(section).map_or(0.0, |(length, _)| *length)
+    }
+
     /// How well the survey knows the way over some sections as a whole: variance of its logarithm. No timing
     /// of trains can narrow it, so every speed found on these sections shares it.
     #[must_use]

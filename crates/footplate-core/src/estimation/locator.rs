@@ -3,14 +3,25 @@
 //! Ways are counted from a contact passed, in lengths as the train feels them: a contact-to-contact hop is as long as
 //! [`MotionModel::length`] says, and a place within it lies at the same part of it as on the survey.
 
+use super::felt_way::{FeltReach, felt_reach, felt_reaches};
 use super::ground::Ground;
-use crate::calibration::motion::MotionModel;
-use crate::event::Event;
+use crate::calibration::motion::{Following, Guess, MotionModel};
+use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::latency::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Position;
 use crate::units::{Length, Speed};
+
+/// Contacts close a little earlier or later from one passage to the next (m).
+const CONTACT_SCATTER_M: f64 = 0.0015;
+/// Nobody knows where a train is that is lost, to this far (m).
+const ANYWHERE_M: f64 = 30.0;
+/// A contact that is this many standard deviations behind the train has been missed.
+const MISSED_BEYOND: f64 = 4.0;
+/// A report this unlikely (ln of a density in 1/s) is of another train, or of none.
+const LEAST_LIKELIHOOD: f64 = -40.0;
+/// A moment (s) in which a train at rest could have come a little further than is known.
+const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
 /// A place on the way of a train, counted in lengths as the train feels them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,14 +95,19 @@ pub struct PassedContact {
 #[derive(Debug, Clone)]
 pub struct Locator {
     train: TrainId,
-    step: SpeedStep,
+    /// Where the clock of `following` begins.
+    epoch: Timestamp,
+    /// The contact from which ways are counted; `None` while the train is lost.
+    node: Option<NodeId>,
+    following: Following,
 }
 
 impl Locator {
     /// A train that stands nobody knows where.
     #[must_use]
     pub fn new(train: TrainId) -> Self {
-        Self { train, step: SpeedStep::STAND }
+        let nowhere = Guess { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
+        Self { train, epoch: Timestamp::ZERO, node: None, following: Following::at_rest(0.0, nowhere) }
     }
 
     /// The train.
@@ -100,17 +116,63 @@ impl Locator {
         self.train
     }
 
-    /// The train stands here, within one standard deviation: a person put it there or read it off a tape.
-    pub fn place(&mut self, now: Timestamp, at: WayPoint, uncertainty: Length) {
-        let _ = (now, at, uncertainty);
+    fn seconds(&self, time: Timestamp) -> f64 {
+        (time - self.epoch).as_s()
     }
 
-    /// Nobody knows where the train is: it was lifted, or reports make no sense.
-    pub fn lose(&mut self) {}
+    fn timestamp(&self, seconds: f64) -> Timestamp {
+        self.epoch + TimeSpan::from_s(seconds)
+    }
+
+    /// The train stands here, within one standard deviation: a person put it there or read it off a tape.
+    pub fn place(&mut self, now: Timestamp, at: WayPoint, uncertainty: Length) {
+        let sd = uncertainty.as_m();
+        let place = Guess { mean: at.way.as_m(), variance: sd * sd };
+        self.following = Following::at_rest(self.seconds(now), place);
+        self.node = Some(at.node);
+    }
+
+    /// Nobody knows where the train is: it was lifted, or reports make no sense. It runs on at the step it was told.
+    pub const fn lose(&mut self) {
+        self.node = None;
+        self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
+    }
 
     /// A command to the train has left the line. Other entries say nothing here.
     pub fn handle_command(&mut self, ground: Ground<'_>, model: &MotionModel, event: &Event) {
-        let _ = (ground, model, event);
+        let _ = ground;
+        match event.kind {
+            EventKind::Speed { train, step } if train == self.train => {
+                self.following.tell(model, self.seconds(event.time), step.get());
+            }
+            // It faces the other way now; how far its pickup reaches on that side is not known here.
+            EventKind::Reverse { train } if train == self.train => self.lose(),
+            _ => {}
+        }
+    }
+
+    /// The way to a contact that fits best, and how far the train was short of it when it reported.
+    fn best_reach(
+        &self,
+        ground: Ground<'_>,
+        model: &MotionModel,
+        sensor: SensorId,
+        window: ContactWindow,
+    ) -> Option<(FeltReach, Guess, f64)> {
+        let time = self.seconds(window.middle());
+        let place = self.following.place(model, time);
+        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
+        let short = |reach: &FeltReach| Guess {
+            mean: reach.length.mean - place.mean,
+            variance: place.variance + reach.length.variance + noise,
+        };
+        felt_reaches(ground, model, self.node?, sensor)
+            .map(|reach| {
+                let short = short(&reach);
+                (reach, short, log_density(short) + libm::log(speed) + reach.log_chance())
+            })
+            .max_by(|(_, _, one), (_, _, other)| one.total_cmp(other))
     }
 
     /// How likely it is that this train closed a contact within a window: the logarithm of the probability density in
@@ -123,8 +185,11 @@ impl Locator {
         sensor: SensorId,
         window: ContactWindow,
     ) -> Option<f64> {
-        let _ = (ground, model, sensor, window);
-        None
+        if self.node.is_none() {
+            return Some(0.0);
+        }
+        let (_, _, likelihood) = self.best_reach(ground, model, sensor, window)?;
+        Some(likelihood).filter(|likelihood| *likelihood > LEAST_LIKELIHOOD)
     }
 
     /// The train passed a contact: it is judged to have been this train.
@@ -135,15 +200,50 @@ impl Locator {
         sensor: SensorId,
         window: ContactWindow,
     ) -> PassedContact {
-        let _ = (ground, model);
-        PassedContact { sensor, window, late: None, short: None, missed: 0 }
+        let time = self.seconds(window.middle());
+        let known = PassedContact { sensor, window, late: None, short: None, missed: 0 };
+        let Some(node) = ground.node_of(sensor) else { return known };
+        let Some((reach, short, _)) = self.best_reach(ground, model, sensor, window) else {
+            // Lost until now, or no way leads here: it is here all the same, as fast as it was.
+            self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
+            self.following.shift(-self.following.place(model, time).mean);
+            let here = Guess { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+            self.following.pass(model, time, window.variance_s2(), here);
+            self.node = Some(node);
+            return known;
+        };
+        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
+        let place = Guess { variance: reach.length.variance + scatter, ..reach.length };
+        self.following.pass(model, time, window.variance_s2(), place);
+        self.following.shift(-reach.length.mean);
+        self.node = Some(node);
+        let late = [short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
+        PassedContact {
+            late: Some(late),
+            short: Some(Length::from_m(short.mean)),
+            missed: reach.missed,
+            ..known
+        }
     }
 
     /// Where it is at a time that is not before the last entry; `None` while it is lost.
     #[must_use]
     pub fn locate(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
-        let _ = (ground, model, at);
-        None
+        let _ = ground;
+        let node = self.node?;
+        let time = self.seconds(at);
+        let place = self.following.place(model, time);
+        let speed = self.following.speed(model, time);
+        let at_rest = self.following.at(model, time).rests_at(time);
+        Some(Located {
+            at: WayPoint { node, way: Length::from_m(place.mean) },
+            uncertainty: Length::from_m(libm::sqrt(place.variance)),
+            speed: Speed::from_m_per_s(if at_rest { 0.0 } else { speed.mean }),
+            speed_uncertainty: Speed::from_m_per_s(libm::sqrt(speed.variance)),
+            step: SpeedStep::new(self.following.step()).unwrap_or(SpeedStep::STAND),
+            at_rest,
+        })
     }
 
     /// The contact it comes to next if nothing else is commanded; `None` while it stands, stops short of it or is lost.
@@ -154,7 +254,27 @@ impl Locator {
         model: &MotionModel,
         now: Timestamp,
     ) -> Option<DueContact> {
-        let _ = (ground, model, now);
+        let node = self.node?;
+        let time = self.seconds(now);
+        let here = self.following.place(model, time);
+        let mut way = Guess { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+        for hop in ground.hops_ahead(node).take(MOST_HOPS) {
+            let reach = felt_reach(ground, model, &hop);
+            way = Guess { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
+            let beyond = here.mean - way.mean;
+            if beyond > MISSED_BEYOND * libm::sqrt(here.variance + way.variance) {
+                continue;
+            }
+            let sensor = hop.sensor?;
+            let (due, doubt) = self.following.reaches(model, way, time)?;
+            let speed = self.following.speed(model, due).mean;
+            return Some(DueContact {
+                sensor,
+                time: self.timestamp(due),
+                uncertainty: TimeSpan::from_s(doubt),
+                speed: Speed::from_m_per_s(speed),
+            });
+        }
         None
     }
 
@@ -162,8 +282,10 @@ impl Locator {
     /// that were sent. For a train that was told to stop already, where it comes to rest anyway.
     #[must_use]
     pub fn rest_if_stopped(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Rest> {
-        let _ = (ground, model, at);
-        None
+        let _ = ground;
+        let mut stopped = self.following;
+        stopped.tell(model, self.seconds(at), 0);
+        self.rest_of(&stopped, model)
     }
 
     /// The same for a train at rest that is first told a step at `start`: what a short move is made of.
@@ -176,22 +298,30 @@ impl Locator {
         step: SpeedStep,
         stop: Timestamp,
     ) -> Option<Rest> {
-        let _ = (ground, model, start, step, stop);
-        None
+        let _ = ground;
+        let mut moved = self.following;
+        moved.tell(model, self.seconds(start), step.get());
+        moved.tell(model, self.seconds(stop.max(start)), 0);
+        self.rest_of(&moved, model)
+    }
+
+    fn rest_of(&self, following: &Following, model: &MotionModel) -> Option<Rest> {
+        let node = self.node?;
+        let (place, scatter, time) = following.rest(model)?;
+        Some(Rest {
+            at: WayPoint { node, way: Length::from_m(place.mean) },
+            doubt: Length::from_m(libm::sqrt(place.variance)),
+            scatter: Length::from_m(libm::sqrt(scatter)),
+            time: self.timestamp(time),
+        })
     }
 }
 
-/// The way from a waypoint's node to a place on the layout, as the train feels it and as the turnouts lie; `None` if
-/// none leads there within one lap.
-#[must_use]
-pub fn way_to(ground: Ground<'_>, model: &MotionModel, from: NodeId, to: Position) -> Option<Length> {
-    let _ = (ground, model, from, to);
-    None
-}
+/// Hops looked at ahead of a train: more than its way to rest and a few silent contacts.
+const MOST_HOPS: usize = 8;
 
-/// The place on the layout of a point on the way, as the turnouts lie.
-#[must_use]
-pub fn place_of(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
-    let _ = (ground, model, at);
-    None
+/// ln of the density of a normal distribution at zero.
+fn log_density(of: Guess) -> f64 {
+    let variance = of.variance.max(f64::MIN_POSITIVE);
+    -0.5 * (of.mean * of.mean / variance + libm::log(2.0 * core::f64::consts::PI * variance))
 }

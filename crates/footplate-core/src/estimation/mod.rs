@@ -11,6 +11,7 @@
 
 mod belief;
 mod contact_scatter;
+mod felt_way;
 mod forecast;
 mod ground;
 mod law_memory;
@@ -23,10 +24,11 @@ mod train_model;
 mod transition;
 mod way_memory;
 
+pub use felt_way::{place_of, way_to};
 pub use forecast::{Forecast, Phase};
 pub use ground::Ground;
 pub use law_memory::{KnownLaw, LawMemory};
-pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint, place_of, way_to};
+pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint};
 pub use predictor::{Hit, Predictor, Verdict};
 pub use speed_watch::WatchedSpeed;
 pub use train_model::TrainModel;

@@ -3,6 +3,7 @@
 //! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
 //! - [`Trapezoid`] and [`SCurve`] are planned: built from the current state, the target and the [`Limits`].
 //! - [`SpeedChange`] is what a decoder makes of a new throttle step.
+//! - [`RampedLag`] is one shape for all of them, where a fit has to be quick and none is known to be the right one.
 //! - [`TwoSensorRun`] is how an acceleration is measured.
 //! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
 //! - [`ShortMove`] puts a start and a stop together: "go, wait, stop".
@@ -12,6 +13,7 @@ mod bracket;
 mod limits;
 mod motion;
 mod phase;
+mod ramped_lag;
 mod s_curve;
 mod short_move;
 mod slow_end;
@@ -24,6 +26,7 @@ mod two_sensor;
 
 pub use limits::{Limits, ProfileError};
 pub use motion::{Motion, MotionState};
+pub use ramped_lag::RampedLag;
 pub use s_curve::{Playback, SCurve};
 pub use short_move::{ShortMove, ShortMoveError};
 pub use speed_change::{

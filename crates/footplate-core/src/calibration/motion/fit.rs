@@ -1,32 +1,84 @@
 //! Everything a train did so far, and the model that explains it best.
+//!
+//! One chain of trips: a trip begins where the one before came to rest. With `p` the place where a trip began, counted
+//! from the contact passed last before it, `F(t)` the way run by the laws and `W` the way to a contact as the train
+//! feels it, every contact passed at `t` says `p + F(t) − W = 0`, and every stop that the next trip's `p′` is where this
+//! one ended, give or take the scatter of stops. All numbers are found together (Gauss and Newton), with what is known
+//! of model trains beforehand as measurements of their own; the derivatives are numerical. A stop that is followed by a
+//! slow run to the next contact is so measured as well as that run is.
+#![expect(clippy::indexing_slicing, reason = "columns are counted before the vectors are made by that count")]
 
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::chain::Chain;
 use super::model::{MotionModel, StepUse};
+use super::priors::add_priors;
+use super::rows::{Linear, trip_rows};
+use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
-use crate::event::Event;
+use crate::event::{Event, EventKind};
 use crate::ids::{SpeedStep, TrainId};
+use crate::linalg::NormalEquations;
+use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
+
+/// Steps after which an iteration that has not settled is taken as it is.
+const MOST_ITERATIONS: usize = 12;
+/// A step of ln speed no longer than this is believed at once: beyond it the laws bend too much.
+const LONGEST_STEP: f64 = 0.6;
+/// A step that changes no number by more than this (in its unit) was the last.
+const SETTLED: f64 = 2e-4;
+/// In so many iterations all rows count in full: the places at which trips began are not yet known then.
+const ALL_BELIEVED: usize = 3;
+/// Residuals beyond this many standard deviations count linearly (Huber, 1964).
+const HUBER: f64 = 2.5;
 
 /// Collects what one train does and fits its [`MotionModel`] to all of it.
 #[derive(Debug, Clone)]
 pub struct MotionFit {
     model: MotionModel,
+    chain: Chain,
+    sections: Option<SectionIndex>,
+    last: Vec<f64>,
+    date: Timestamp,
 }
 
 impl MotionFit {
     /// Nothing seen yet.
     #[must_use]
     pub fn new(train: TrainId, highest: SpeedStep) -> Self {
-        Self { model: MotionModel::unknown(train, highest) }
+        Self {
+            model: MotionModel::unknown(train, highest),
+            chain: Chain::default(),
+            sections: None,
+            last: Vec::new(),
+            date: Timestamp::ZERO,
+        }
     }
 
     /// The next entry that is about this train: a command to it that has been sent, or a report that was judged to be
     /// of it. The turnouts as they lay at that time.
     pub fn take(&mut self, layout: &Layout, turnouts: &TurnoutStates, event: &Event) {
-        let _ = (layout, turnouts, event);
+        match event.kind {
+            EventKind::Sensor(_) => {
+                let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
+                self.chain.pass(layout, sections, turnouts, event);
+            }
+            EventKind::Speed { train, step } if train == self.model.train() => {
+                let rests_after = self.model.settles_within(self.chain.stopped_from(), SpeedStep::STAND);
+                self.chain.tell(event.time, step, rests_after.as_s());
+            }
+            EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
+            _ => return,
+        }
+        self.date = event.time;
     }
 
     /// The chain is broken: the train was lifted, pushed, stalled or lost. What it did before still counts.
-    pub fn interrupt(&mut self) {}
+    pub fn interrupt(&mut self) {
+        self.chain.interrupt();
+    }
 
     /// A step moved the train, or did not.
     pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
@@ -34,13 +86,144 @@ impl MotionFit {
     }
 
     /// Fits anew to all that was seen. Takes milliseconds; not for between two reports.
-    pub fn refit(&mut self, layout: &Layout, sections: &SectionIndex) {
-        let _ = (layout, sections);
+    pub fn refit(&mut self, sections: &SectionIndex) {
+        let highest = usize::from(self.model.highest().get());
+        let trips = &self.chain.trips;
+        let columns = Columns::of(trips, highest);
+        let mut x = self.start(&columns);
+        let mut solution = None;
+        let mut scale = 1.0;
+        for iteration in 0..MOST_ITERATIONS {
+            let mut equations = NormalEquations::new(columns.all);
+            add_priors(&mut equations, &columns, trips, sections, &x, highest);
+            let mut squares = Squares::default();
+            let mut rows: Vec<Linear> = Vec::new();
+            for place in 0..trips.len() {
+                trip_rows(trips, place, &columns, &x, highest, scale, &mut rows);
+            }
+            for row in &rows {
+                let size = row.residual.abs() / libm::sqrt(row.variance);
+                let weight = if size > HUBER && iteration >= ALL_BELIEVED { HUBER / size } else { 1.0 };
+                // The row is about the step from here; its terms are about the numbers themselves.
+                let here: f64 = row.terms.iter().map(|(column, slope)| slope * x[*column]).sum();
+                equations.add(&row.terms, here - row.residual, row.variance / weight);
+                if row.is_stop {
+                    squares.take(row.residual * row.residual / row.variance * scale * scale);
+                }
+            }
+            if iteration >= ALL_BELIEVED {
+                scale = squares.scale();
+            }
+            let Some(next) = equations.values() else { return };
+            let longest = (0..columns.all).fold(0.0_f64, |longest, i| {
+                let change = (next[i] - x[i]).abs();
+                if is_logarithm(i, highest, &columns) { longest.max(change) } else { longest }
+            });
+            let part = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
+            let mut moved = 0.0_f64;
+            for i in 0..columns.all {
+                let by = part * (next[i] - x[i]);
+                moved = moved.max(if i < columns.lasting { by.abs() } else { 0.0 });
+                x[i] += by;
+            }
+            if (moved < SETTLED && iteration > ALL_BELIEVED) || iteration + 1 == MOST_ITERATIONS {
+                solution = equations.solve();
+                break;
+            }
+        }
+        self.last = x.clone();
+        let Some(solution) = solution else { return };
+        self.model.learn(&columns, &x, &solution, scale, trips, self.date);
+    }
+
+    /// Where the search begins: what the last fit found, and the prior for all else.
+    fn start(&self, columns: &Columns) -> Vec<f64> {
+        let mut x = vec![0.0; columns.all];
+        for (slot, value) in x.iter_mut().zip(&self.model.values) {
+            *slot = *value;
+        }
+        for (section, column) in &columns.sections {
+            x[*column] = self.model.section(*section).map_or(0.0, |(by, _)| by);
+        }
+        x
     }
 
     /// The model as of the last fit.
     #[must_use]
     pub const fn model(&self) -> &MotionModel {
         &self.model
+    }
+}
+
+fn is_logarithm(column: usize, highest: usize, columns: &Columns) -> bool {
+    let first = super::parameters::SPEEDS;
+    (first..first + highest).contains(&column) && column < columns.lasting
+}
+
+/// How much stops scatter against what trains usually do.
+#[derive(Debug, Default)]
+struct Squares {
+    sum: f64,
+    count: f64,
+}
+
+impl Squares {
+    /// What the usual scatter is worth against stops seen.
+    const USUAL: f64 = 10.0;
+
+    /// A stop that is further off than this (squared) was none by the train's own law.
+    const WILD: f64 = 9.0;
+
+    fn take(&mut self, square: f64) {
+        self.sum += square.min(Self::WILD);
+        self.count += 1.0;
+    }
+
+    fn scale(&self) -> f64 {
+        libm::sqrt((self.sum + Self::USUAL) / (self.count + Self::USUAL))
+    }
+}
+
+impl MotionFit {
+    #[doc(hidden)]
+    pub fn describe(&self, sections: &SectionIndex) -> alloc::string::String {
+        use core::fmt::Write;
+        let highest = usize::from(self.model.highest().get());
+        let trips = &self.chain.trips;
+        let columns = Columns::of(trips, highest);
+        let mut s = alloc::string::String::new();
+        let x = &self.last;
+        let _ = sections;
+        for (place, trip) in trips.iter().enumerate() {
+            let mut rows: Vec<Linear> = Vec::new();
+            trip_rows(trips, place, &columns, x, highest, 1.0, &mut rows);
+            let _ = writeln!(
+                s,
+                "trip {place} cont {} rest {} begins {:.2} run {:?} p {:.3} late {:.3} told {:?} dev {:?} ch {:?}",
+                trip.continues,
+                trip.came_to_rest,
+                trip.begins,
+                trip.running,
+                x[columns.place(place)],
+                x[columns.late_start(place)],
+                trip.told
+                    .iter()
+                    .map(|t| (libm::round(t.sent * 100.0) / 100.0, t.to, t.at_rest))
+                    .collect::<Vec<_>>(),
+                columns.own(place, trip, x).deviations,
+                columns.own(place, trip, x).changes
+            );
+            for (row, c) in rows.iter().zip(trip.contacts.iter().map(Some).chain([None])) {
+                let _ = writeln!(
+                    s,
+                    "     {:?} r {:.1} mm sd {:.1} way {:.3}",
+                    c.map(|c| libm::round(c.time * 100.0) / 100.0),
+                    row.residual * 1e3,
+                    1e3 * libm::sqrt(row.variance),
+                    c.map_or(0.0, |c| c.way)
+                );
+            }
+        }
+        s
     }
 }

@@ -4,9 +4,21 @@
 //! experiments are planned and stops are promised. It is made by [`MotionFit`] from everything the train did so far:
 //! not from experiments of a set form, but from the one chain of commands and contacts that any driving is.
 
+mod chain;
+mod doubts;
 mod fit;
+mod follow;
+mod learn;
 mod model;
 mod parameters;
+mod priors;
+mod rows;
+mod scatter;
+mod segment;
+mod spread;
+mod trip;
+mod unknowns;
 
 pub use fit::MotionFit;
+pub(crate) use follow::{Following, Guess};
 pub use model::{MotionModel, StepUse, StopForecast};

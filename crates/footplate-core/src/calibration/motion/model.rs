@@ -1,5 +1,14 @@
 //! How one train moves, as far as is known, and what follows from it.
 
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::parameters::{Answers, prior_means, speed_prior};
+use super::priors::section_variance;
+use super::scatter::usual_scatter;
+use super::segment::{Segment, Told};
+use super::spread::Spread;
 use crate::calibration::SectionIndex;
 use crate::estimate::Estimate;
 use crate::event::Approach;
@@ -30,20 +39,56 @@ pub struct StopForecast {
     pub scatter: Length,
     /// The time.
     pub time: TimeSpan,
+    /// Stops from this step that were measured.
+    pub count: u32,
 }
 
 /// How one train answers its commands on one layout.
+///
+/// Everything in it is in the train's own measure of way: a hop is as long as the train needs speed times time for it
+/// ([`length`](Self::length)), curves and slopes included, so that a stop takes as far in a curve as on the straight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionModel {
     train: TrainId,
     highest: SpeedStep,
+    pub(super) values: Vec<f64>,
+    pub(super) spread: Spread,
+    /// By how much sections are longer than surveyed (m), with the variance.
+    pub(super) sections: BTreeMap<usize, (f64, f64)>,
+    uses: Vec<StepUse>,
+    /// Contacts passed and stops made at each step, from below and from above.
+    pub(super) counts: Vec<[Counts; 2]>,
+    /// How far stops scatter against what trains usually do.
+    pub(super) scatter_scale: f64,
+    pub(super) date: Timestamp,
 }
+
+/// Measurements at one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Counts {
+    pub(super) contacts: u32,
+    pub(super) stops: u32,
+}
+
+/// A stop from rest takes no time; this long (s) is waited anyway before a train counts as standing.
+const LEAST_STOP_S: f64 = 0.5;
 
 impl MotionModel {
     /// What all model trains have in common, and nothing of this one.
     #[must_use]
     pub fn unknown(train: TrainId, highest: SpeedStep) -> Self {
-        Self { train, highest }
+        let steps = usize::from(highest.get());
+        Self {
+            train,
+            highest,
+            values: prior_means(steps),
+            spread: Spread::prior(steps),
+            sections: BTreeMap::new(),
+            uses: vec![StepUse::Untried; steps + 1],
+            counts: vec![[Counts::default(); 2]; steps + 1],
+            scatter_scale: 1.0,
+            date: Timestamp::ZERO,
+        }
     }
 
     /// The train.
@@ -58,50 +103,119 @@ impl MotionModel {
         self.highest
     }
 
-    /// Its steady speed at a step; the count is of contacts passed at it.
+    pub(super) fn steps(&self) -> usize {
+        usize::from(self.highest.get())
+    }
+
+    pub(super) fn answers(&self) -> Answers<'_> {
+        Answers::new(&self.values, self.steps())
+    }
+
+    fn counts_at(&self, step: SpeedStep, approach: Approach) -> Counts {
+        let from_above = usize::from(approach == Approach::Above);
+        let both = self.counts.get(usize::from(step.get())).copied().unwrap_or_default();
+        both.get(from_above).copied().unwrap_or_default()
+    }
+
+    /// Its steady speed at a step; the count is of contacts passed at it. An unknown approach counts as from below.
     #[must_use]
     pub fn speed(&self, step: SpeedStep, approach: Approach) -> Estimate<Speed> {
-        let _ = approach;
-        let value = Speed::from_mm_per_s(40.0 * f64::from(step.get()));
-        Estimate { value, uncertainty: 0.5 * value, count: 0, date: Timestamp::ZERO }
+        let (place, above) = (usize::from(step.get()), approach == Approach::Above);
+        let speed = |answers: &Answers<'_>| answers.speed(place, above);
+        Estimate {
+            value: Speed::from_m_per_s(speed(&self.answers())),
+            uncertainty: Speed::from_m_per_s(self.deviation(speed)),
+            count: self.counts_at(step, approach).contacts,
+            date: self.date,
+        }
+    }
+
+    /// One standard deviation of what follows from the model's numbers, by its slopes.
+    pub(super) fn deviation(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
+        self.spread.deviation(&self.values, self.steps(), of)
     }
 
     /// What experience says of a step.
     #[must_use]
     pub fn uses(&self, step: SpeedStep) -> StepUse {
-        let _ = step;
-        StepUse::Untried
+        self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable)
     }
 
     /// Keeps in mind whether a step moved the train.
     pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
-        let _ = (step, found);
+        if let Some(slot) = self.uses.get_mut(usize::from(step.get())) {
+            *slot = found;
+        }
     }
 
     /// How it stops from its steady speed at a step.
     #[must_use]
     pub fn stop(&self, step: SpeedStep, approach: Approach) -> StopForecast {
-        let speed = self.speed(step, approach).value;
-        let distance = speed * TimeSpan::from_ms(1_500);
+        let above = approach == Approach::Above;
+        let told = Told { sent: 0.0, from: step.get(), to: 0, at_rest: false };
+        let stop = |answers: &Answers<'_>| {
+            let speed = answers.speed(usize::from(step.get()), above);
+            let segment = Segment::of(&told, answers, speed);
+            (speed * segment.begins + segment.way_to_rest(), segment.settled())
+        };
+        let (distance, time) = stop(&self.answers());
+        let speed = self.answers().speed(usize::from(step.get()), above);
         StopForecast {
-            distance,
-            doubt: 0.5 * distance,
-            scatter: 0.02 * distance,
-            time: TimeSpan::from_s(3.0),
+            distance: Length::from_m(distance.max(0.0)),
+            doubt: Length::from_m(self.deviation(|answers| stop(answers).0)),
+            scatter: Length::from_m(self.scatter(speed)),
+            time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
+            count: self.counts_at(step, approach).stops,
         }
     }
 
-    /// How long it takes to be steady at a step from another.
+    /// One standard deviation (m) of stops from a speed (m/s).
+    pub(crate) fn scatter(&self, speed: f64) -> f64 {
+        self.scatter_scale * usual_scatter(speed)
+    }
+
+    /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.
     #[must_use]
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
-        let _ = (from, to);
-        TimeSpan::from_s(3.0)
+        let answers = self.answers();
+        let told = Told { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
+        let segment = Segment::of(&told, &answers, answers.speed(usize::from(from.get()), false));
+        TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
     }
 
     /// The way over a hop as the train feels it, and one standard deviation of it.
     #[must_use]
     pub fn length(&self, sections: &SectionIndex, hop: &Hop<'_>) -> [Length; 2] {
-        let survey = sections.section(hop.id).map_or(0.0, |section| sections.survey_variance(section));
-        [hop.length, Length::from_m(libm::sqrt(survey))]
+        let section = sections.section(hop.id);
+        let known = section.and_then(|section| self.sections.get(&section).copied());
+        let (by, variance) =
+            known.or_else(|| Some((0.0, section_variance(sections, section?)))).unwrap_or_default();
+        let length = (hop.length.as_m() + by).max(0.0);
+        [Length::from_m(length), Length::from_m(libm::sqrt(variance.max(0.0)))]
+    }
+
+    /// By how much a section is longer than surveyed (m), with the variance.
+    pub(super) fn section(&self, section: usize) -> Option<(f64, f64)> {
+        self.sections.get(&section).copied()
+    }
+
+    /// How fast a train of which nothing is known may be at a step (m/s), one standard deviation above the usual.
+    #[must_use]
+    pub fn fastest_of_unknown(step: SpeedStep, highest: SpeedStep) -> Speed {
+        let (mean, deviation) = speed_prior(usize::from(step.get()).max(1), usize::from(highest.get()));
+        Speed::from_m_per_s(libm::exp(mean + deviation))
+    }
+}
+
+impl MotionModel {
+    #[doc(hidden)]
+    pub fn describe(&self) -> alloc::string::String {
+        use core::fmt::Write;
+        let mut s = alloc::string::String::new();
+        for (i, v) in self.values.iter().take(super::parameters::SPEEDS).enumerate() {
+            let _ = write!(s, "{i}:{v:.3}±{:.3} ", libm::sqrt(self.spread.variance(i)));
+        }
+        let _ = write!(s, " scale {:.2}", self.scatter_scale);
+        s
     }
 }

@@ -1,0 +1,122 @@
+//! From commands and reports to trips: what a train was told, and the contacts it passed, one after the other.
+
+use alloc::vec::Vec;
+
+use super::segment::Told;
+use super::trip::{Trip, TripContact};
+use crate::calibration::SectionIndex;
+use crate::event::{Event, EventKind};
+use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, Reach, TurnoutStates};
+
+/// A poll whose interval nobody recorded: a slow 6051.
+const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
+/// Contacts that may stay silent in a row before the way is no longer believed.
+const BELIEVED_MISSED: usize = 2;
+
+/// The trips of one train, the last of them under way.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Chain {
+    pub(super) trips: Vec<Trip>,
+    origin: Option<Timestamp>,
+    step: u8,
+    above: bool,
+    /// The contact passed last.
+    at: Option<NodeId>,
+    last_sensor: Option<SensorId>,
+    /// Whether the next trip begins where the last one ended.
+    unbroken: bool,
+}
+
+impl Chain {
+    fn seconds(&mut self, time: Timestamp) -> f64 {
+        (time - *self.origin.get_or_insert(time)).as_s()
+    }
+
+    /// Breaks the chain: where the train is now has nothing to do with where it was.
+    pub(super) fn interrupt(&mut self) {
+        self.unbroken = false;
+        self.at = None;
+        self.last_sensor = None;
+    }
+
+    /// A command to the train. `rests_after` says how long a stop from a step takes to be over.
+    pub(super) fn tell(&mut self, time: Timestamp, step: SpeedStep, rests_after: f64) {
+        let sent = self.seconds(time);
+        let (from, to) = (self.step, step.get());
+        if to == from {
+            return;
+        }
+        let stopped_at =
+            self.trips.last().and_then(|trip| trip.told.last()).map_or(f64::NEG_INFINITY, |told| told.sent);
+        let at_rest = from == 0 && sent - stopped_at > rests_after;
+        if from == 0 && (at_rest || self.trips.is_empty()) {
+            if let Some(last) = self.trips.last_mut().filter(|_| self.unbroken) {
+                last.came_to_rest = true;
+            }
+            let continues = self.unbroken && self.trips.last().is_some();
+            self.trips.push(Trip::new(sent, None, continues));
+            self.unbroken = true;
+        } else if !self.unbroken {
+            self.trips.push(Trip::new(sent, Some((from, self.above)), false));
+            self.unbroken = true;
+        }
+        if let Some(trip) = self.trips.last_mut() {
+            trip.tell(Told { sent, from, to, at_rest });
+        }
+        (self.step, self.above) = (to, to < from);
+    }
+
+    /// A report that was judged to be of the train.
+    pub(super) fn pass(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        turnouts: &TurnoutStates,
+        event: &Event,
+    ) {
+        let EventKind::Sensor(report) = event.kind else { return };
+        let Some(node) = layout.sensor_node(report.sensor) else { return };
+        if self.last_sensor == Some(report.sensor) {
+            return;
+        }
+        let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs().as_s();
+        let time = self.seconds(event.time) - 0.5 * interval;
+        if self.step == 0 && self.trips.is_empty() {
+            return;
+        }
+        let way = self
+            .at
+            .filter(|_| self.unbroken)
+            .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
+        let begins_anew = !self.unbroken || (self.at.is_some() && way.is_none());
+        if begins_anew {
+            // Running, nobody knows from where: ways are counted from here.
+            self.trips.push(Trip::new(time, Some((self.step, self.above)), false));
+            self.unbroken = true;
+        }
+        let Some(trip) = self.trips.last_mut() else { return };
+        let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
+            (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
+        });
+        trip.pass(TripContact { time, variance: interval * interval / 12.0, way: length, sections });
+        (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
+    }
+
+    /// The step from which the train was told to stop last.
+    pub(super) fn stopped_from(&self) -> SpeedStep {
+        let told = self.trips.last().and_then(|trip| trip.told.last());
+        told.and_then(|told| SpeedStep::new(told.from)).unwrap_or(SpeedStep::STAND)
+    }
+}
+
+/// The way past the fewest silent contacts, and of these the shortest.
+fn reach_of(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, sensor: SensorId) -> Option<Reach> {
+    (0..=BELIEVED_MISSED).find_map(|missed| {
+        layout
+            .reaches(from, turnouts, missed)
+            .filter(|reach| reach.sensor == Some(sensor))
+            .min_by(|one, other| one.length.as_m().total_cmp(&other.length.as_m()))
+    })
+}

@@ -1,0 +1,327 @@
+//! A train under way: where its laws take it from one command to the next, with the doubts that come with each.
+//!
+//! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
+//! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
+//! the laws, `r(t)` share of its change that is done. The train is at
+//!
+//! ```text
+//! x(t) = b + e^ε S(t − η) + ζ r(t)
+//! ```
+//!
+//! `(b, ε, η, ζ)` is a Kalman filter's state. A new command begins a new segment: its `b` is the `x` at which it takes
+//! effect, and the doubt of its own speed and displacement come to `ε` and `ζ`.
+#![expect(clippy::indexing_slicing, reason = "arrays of four letters, indexed below four")]
+
+use super::model::MotionModel;
+use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
+use super::segment::Segment;
+pub(crate) use super::segment::Told;
+
+const B: usize = 0;
+const E: usize = 1;
+const H: usize = 2;
+const Z: usize = 3;
+const N: usize = 4;
+
+/// Commands that can wait for their effect: more than a line carries within a start's delay.
+const MOST_PENDING: usize = 6;
+/// Over this time (s) a run's speed wanders by [`WANDER`].
+const WANDERS_IN: f64 = 4.0;
+/// Looks at one contact from ever better points: speed and place bend the way while little is known.
+const LOOKS: usize = 3;
+/// Part of a change's displacement by which no shape is true in its middle.
+const SHAPE_ERROR: f64 = 0.04;
+/// Bounds of what one run may differ from all others: beyond, the model is wrong.
+const FARTHEST_DEVIATION: f64 = 1.5;
+
+/// A mean and its variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Guess {
+    pub(crate) mean: f64,
+    pub(crate) variance: f64,
+}
+
+/// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Following {
+    segment: Segment,
+    /// What the segment is an answer to.
+    step: u8,
+    from: u8,
+    x: [f64; N],
+    p: [[f64; N]; N],
+    pending: [Option<Told>; MOST_PENDING],
+    /// Until when wander is in the variance of `ε`.
+    wandered: f64,
+}
+
+impl Following {
+    /// At rest at a place.
+    pub(crate) fn at_rest(time: f64, place: Guess) -> Self {
+        let mut p = [[0.0; N]; N];
+        p[B][B] = place.variance;
+        Self {
+            segment: Segment::steady(time, 0.0),
+            step: 0,
+            from: 0,
+            x: [place.mean, 0.0, 0.0, 0.0],
+            p,
+            pending: [None; MOST_PENDING],
+            wandered: time,
+        }
+    }
+
+    /// The step told last, whether it has taken effect or not.
+    pub(crate) fn step(&self) -> u8 {
+        self.pending.iter().flatten().last().map_or(self.step, |told| told.to)
+    }
+
+    /// A command has left the line.
+    pub(crate) fn tell(&mut self, model: &MotionModel, sent: f64, step: u8) {
+        let from = self.step();
+        if from == step {
+            return;
+        }
+        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
+        self.settle(model, sent);
+        if let Some(slot) = self.pending.iter_mut().find(|slot| slot.is_none()) {
+            *slot = Some(Told { sent, from, to: step, at_rest });
+        }
+    }
+
+    /// Whether a train that was told to stop stands by a time.
+    pub(crate) fn rests_at(&self, time: f64) -> bool {
+        self.step == 0 && time >= self.rest_time()
+    }
+
+    fn rest_time(&self) -> f64 {
+        if self.segment.from == 0.0 { self.segment.begins } else { self.segment.settled() }
+    }
+
+    /// Takes all that has taken effect by a time into the state.
+    fn settle(&mut self, model: &MotionModel, time: f64) {
+        while let Some(told) = self.pending[0] {
+            let begins = told.effect(&model.answers()).max(self.segment.begins);
+            if begins > time {
+                break;
+            }
+            self.pending.rotate_left(1);
+            self.pending[MOST_PENDING - 1] = None;
+            self.begin(model, told, begins);
+        }
+        let since = time - self.wandered;
+        if since > 0.0 && self.step != 0 {
+            self.p[E][E] += WANDER * WANDER * since / WANDERS_IN;
+        }
+        self.wandered = self.wandered.max(time);
+    }
+
+    /// The next segment begins: the way so far becomes its origin.
+    fn begin(&mut self, model: &MotionModel, told: Told, begins: f64) {
+        let from_rest = told.at_rest;
+        // A train at rest has run its whole way to rest, whenever it is told the next step.
+        let time = if from_rest { f64::INFINITY } else { begins };
+        let (way, slope) = self.way_and_slope(time);
+        let speed = if from_rest { 0.0 } else { self.segment.speed(begins) };
+        self.transform(slope);
+        self.x[B] = way;
+        let answers = model.answers();
+        self.segment = Segment::of(&told, &answers, speed);
+        self.segment.begins = begins;
+        (self.step, self.from) = (told.to, told.from);
+        for letter in [H, Z] {
+            self.forget(letter);
+        }
+        if from_rest {
+            self.forget(E);
+            self.p[E][E] = TRIP_DEVIATION * TRIP_DEVIATION;
+            self.p[H][H] = LATE_START * LATE_START + model.start_delay_variance();
+        }
+        if told.to != 0 {
+            self.p[E][E] += model.ln_speed_variance(told.to, told.above());
+        }
+        let to = self.segment.to;
+        let doubt = if told.to == 0 {
+            model.stop_doubt(speed)
+        } else if from_rest {
+            model.start_doubt(to)
+        } else {
+            model.change_doubt(speed, to)
+        };
+        let error = if told.to == 0 || from_rest { 0.0 } else { change_error(to - speed) };
+        self.p[Z][Z] = doubt * doubt + error * error;
+        if told.to == 0 {
+            let scatter = model.scatter(speed * libm::exp(self.x[E]));
+            self.p[Z][Z] += scatter * scatter;
+        }
+    }
+
+    /// `x(t)` and its slopes; at an infinite time the whole way of a stop.
+    fn way_and_slope(&self, time: f64) -> (f64, [f64; N]) {
+        let grown = libm::exp(self.x[E]);
+        if time.is_infinite() {
+            let way = self.segment.way_to_rest();
+            return (self.x[B] + grown * way + self.x[Z], [1.0, grown * way, 0.0, 1.0]);
+        }
+        let late = time - self.x[H];
+        let way = if self.is_still() { 0.0 } else { self.segment.way(late) };
+        let (speed, share) = (self.segment.speed(late), self.segment.share(time));
+        let place = self.x[B] + grown * way + self.x[Z] * share;
+        (place, [1.0, grown * way, -grown * speed, share])
+    }
+
+    const fn is_still(&self) -> bool {
+        self.segment.from == 0.0 && self.segment.to == 0.0
+    }
+
+    /// Moves the origin along a slope: `b` takes in all of it.
+    fn transform(&mut self, slope: [f64; N]) {
+        let with: [f64; N] = core::array::from_fn(|i| (0..N).map(|j| slope[j] * self.p[j][i]).sum());
+        let own: f64 = (0..N).map(|j| slope[j] * with[j]).sum();
+        for i in 0..N {
+            self.p[B][i] = with[i];
+            self.p[i][B] = with[i];
+        }
+        self.p[B][B] = own;
+    }
+
+    fn forget(&mut self, letter: usize) {
+        self.x[letter] = 0.0;
+        for i in 0..N {
+            self.p[letter][i] = 0.0;
+            self.p[i][letter] = 0.0;
+        }
+    }
+
+    /// The state at a time that is not before the last contact.
+    pub(crate) fn at(&self, model: &MotionModel, time: f64) -> Self {
+        let mut later = *self;
+        later.settle(model, time);
+        later
+    }
+
+    /// Where it is (m) at a time.
+    pub(crate) fn place(&self, model: &MotionModel, time: f64) -> Guess {
+        let later = self.at(model, time);
+        let (mean, slope) =
+            later.way_and_slope(if later.rests_at(time) && !later.is_still() { f64::INFINITY } else { time });
+        let shape = later.shape_error(time);
+        Guess { mean, variance: later.variance_along(slope) + shape * shape }
+    }
+
+    /// Its speed (m/s) at a time.
+    pub(crate) fn speed(&self, model: &MotionModel, time: f64) -> Guess {
+        let later = self.at(model, time);
+        let speed = libm::exp(later.x[E]) * later.segment.speed(time - later.x[H]);
+        Guess { mean: speed, variance: speed * speed * later.p[E][E] }
+    }
+
+    /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
+    /// train that was told to run.
+    pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Guess, f64, f64)> {
+        let mut later = *self;
+        while let Some(told) = later.pending[0] {
+            let begins = told.effect(&model.answers()).max(later.segment.begins);
+            later.settle(model, begins);
+        }
+        if later.step != 0 {
+            return None;
+        }
+        let (mean, slope) = later.way_and_slope(f64::INFINITY);
+        let speed = later.segment.from * libm::exp(later.x[E]);
+        let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
+        let scatter = scatter * scatter;
+        let variance = (later.variance_along(slope) - scatter).max(0.0);
+        Some((Guess { mean, variance }, scatter, later.rest_time()))
+    }
+
+    fn shape_error(&self, time: f64) -> f64 {
+        let share = self.segment.share(time);
+        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.segment.displacement().abs()
+    }
+
+    fn variance_along(&self, slope: [f64; N]) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..N {
+            for j in 0..N {
+                sum += slope[i] * slope[j] * self.p[i][j];
+            }
+        }
+        sum.max(0.0)
+    }
+
+    /// The train passed a place (m, with the variance of what is known of it) at a mean time (s, with its variance).
+    /// Returns by how much (m) it was short of the place, and the variance of that.
+    pub(crate) fn pass(&mut self, model: &MotionModel, time: f64, time_variance: f64, place: Guess) -> Guess {
+        self.settle(model, time);
+        let speed = self.segment.speed(time - self.x[H]) * libm::exp(self.x[E]);
+        let shape = self.shape_error(time);
+        let noise = place.variance + speed * speed * time_variance + shape * shape;
+        let (mean, p) = (self.x, self.p);
+        let (first, slope) = self.way_and_slope(time);
+        let short = Guess { mean: place.mean - first, variance: self.variance_along(slope) + noise };
+        let mut slope = slope;
+        let mut seen = first;
+        for _ in 0..LOOKS {
+            let with: [f64; N] = core::array::from_fn(|i| (0..N).map(|j| p[i][j] * slope[j]).sum());
+            let s = (0..N).map(|j| slope[j] * with[j]).sum::<f64>() + noise;
+            let back: f64 = (0..N).map(|j| slope[j] * (mean[j] - self.x[j])).sum();
+            let off = place.mean - seen - back;
+            for i in 0..N {
+                self.x[i] = mean[i] + with[i] / s * off;
+            }
+            self.x[E] = self.x[E].clamp(-FARTHEST_DEVIATION, FARTHEST_DEVIATION);
+            for i in 0..N {
+                for j in 0..N {
+                    self.p[i][j] = p[i][j] - with[i] * with[j] / s;
+                }
+            }
+            (seen, slope) = self.way_and_slope(time);
+        }
+        short
+    }
+
+    /// Where it is nobody knows any more.
+    pub(crate) const fn doubt_place(&mut self, variance: f64) {
+        self.p[B] = [variance, 0.0, 0.0, 0.0];
+        self.p[E][B] = 0.0;
+        self.p[H][B] = 0.0;
+        self.p[Z][B] = 0.0;
+    }
+
+    /// All ways are counted from elsewhere from now on.
+    pub(crate) fn shift(&mut self, by: f64) {
+        self.x[B] += by;
+    }
+
+    /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.
+    pub(crate) fn reaches(&self, model: &MotionModel, place: Guess, now: f64) -> Option<(f64, f64)> {
+        if let Some((rest, _, _)) = self.rest(model)
+            && rest.mean <= place.mean
+        {
+            return None;
+        }
+        let place_at = |time: f64| self.place(model, time).mean;
+        let (mut low, mut high) = (now, now + 0.5);
+        while place_at(high) < place.mean {
+            (low, high) = (high, now + 2.0 * (high - now));
+            if high - now > LONGEST_WAIT {
+                return None;
+            }
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if place_at(middle) < place.mean { low = middle } else { high = middle }
+        }
+        let speed = self.speed(model, high).mean.max(SLOWEST);
+        let doubt = libm::sqrt(self.place(model, high).variance + place.variance) / speed;
+        Some((high, doubt))
+    }
+}
+
+/// A train that has not arrived after this long (s) does not arrive: the longest hop at the lowest step takes a minute.
+const LONGEST_WAIT: f64 = 200.0;
+/// Halvings of half a second that leave less than a microsecond.
+const BISECTIONS: usize = 30;
+/// Below this (m/s) a place says nothing of a time.
+const SLOWEST: f64 = 0.002;

@@ -1,0 +1,162 @@
+//! What each contact and each stop of a trip says of the numbers, as linear equations about a point.
+#![expect(clippy::indexing_slicing, reason = "columns are counted before the vectors are made by that count")]
+
+use alloc::vec::Vec;
+
+use super::parameters::{Answers, SPEEDS, hysteresis_at, speed_at};
+use super::scatter::usual_scatter;
+use super::segment::Segment;
+use super::trip::{Own, Trip, Walk};
+use super::unknowns::Columns;
+
+/// Contacts close a little earlier or later from one passage to the next (m).
+const CONTACT_SCATTER: f64 = 0.0015;
+/// Part of a change's displacement by which no shape is true in its middle.
+const SHAPE_ERROR: f64 = 0.04;
+/// What a tape or the train's own settling leaves of a place of rest (m).
+const REST_SCATTER: f64 = 0.0005;
+
+/// One linear equation: `residual + Σ slope·Δ = 0`, give or take.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    pub(super) terms: Vec<(usize, f64)>,
+    pub(super) residual: f64,
+    pub(super) variance: f64,
+    pub(super) is_stop: bool,
+}
+
+/// Steps of the numerical derivatives, in the unit of each number: small against its doubt.
+fn step_of(column: usize) -> f64 {
+    if column < SPEEDS { 1e-4 } else { 1e-5 }
+}
+
+/// What a trip comes to with some numbers: way (m) at each contact, and at rest; speed and doubt of the law besides.
+struct Outcome {
+    ways: Vec<f64>,
+    rest: f64,
+}
+
+fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) -> Outcome {
+    trip.segments(answers, own, segments);
+    let mut walk = Walk::new(trip, own, segments);
+    let ways = trip.contacts.iter().map(|contact| walk.way(contact.time)).collect();
+    Outcome { ways, rest: walk.way_to_rest() }
+}
+
+/// Adds the equations of one trip.
+pub(super) fn trip_rows(
+    trips: &[Trip],
+    place: usize,
+    columns: &Columns,
+    x: &[f64],
+    highest: usize,
+    scale: f64,
+    rows: &mut Vec<Linear>,
+) {
+    let Some(trip) = trips.get(place) else { return };
+    let own = columns.own(place, trip, x);
+    let mut segments = Vec::new();
+    let mut numbers = x[..columns.lasting].to_vec();
+    let here = outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments);
+    let doubts = doubts(trip, &own, &segments);
+    let stop_speed = segments.last().map_or(0.0, |segment| segment.from);
+
+    let mut slopes: Vec<(usize, Outcome)> = Vec::new();
+    for column in involved(trip, highest) {
+        let step = step_of(column);
+        numbers[column] += step;
+        slopes.push((column, outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments)));
+        numbers[column] = x[column];
+    }
+    let answers = Answers::new(&numbers, highest);
+    let mut moved = own.clone();
+    let step = 1e-4;
+    if trip.told.first().is_some_and(|told| told.at_rest) {
+        moved.late_start += step;
+        slopes.push((columns.late_start(place), outcome(trip, &answers, &moved, &mut segments)));
+        moved.late_start = own.late_start;
+    }
+    for piece in 0..trip.pieces.len() {
+        moved.deviations[piece] += step;
+        slopes.push((columns.deviation(place, piece), outcome(trip, &answers, &moved, &mut segments)));
+        moved.deviations[piece] = own.deviations[piece];
+    }
+    for told in 0..trip.told.len() {
+        moved.changes[told] += step;
+        slopes.push((columns.change(place, trip, told), outcome(trip, &answers, &moved, &mut segments)));
+        moved.changes[told] = own.changes[told];
+    }
+    let slope_step = |column: usize| if column < columns.lasting { step_of(column) } else { step };
+
+    let began = columns.place(place);
+    let (mut way, mut sections): (f64, Vec<(usize, f64)>) = (0.0, Vec::new());
+    for (index, contact) in trip.contacts.iter().enumerate() {
+        way += contact.way;
+        for column in contact.sections.iter().filter_map(|section| columns.sections.get(section)) {
+            add_term(&mut sections, *column, -1.0);
+        }
+        let felt: f64 = sections.iter().map(|(column, slope)| slope * x[*column]).sum();
+        let mut terms = sections.clone();
+        terms.push((began, 1.0));
+        for (column, other) in &slopes {
+            let slope = (other.ways[index] - here.ways[index]) / slope_step(*column);
+            if slope != 0.0 {
+                terms.push((*column, slope));
+            }
+        }
+        let (speed, law) = doubts[index];
+        let variance = speed * speed * contact.variance + law * law + CONTACT_SCATTER * CONTACT_SCATTER;
+        let residual = x[began] + here.ways[index] - way + felt;
+        rows.push(Linear { terms, residual, variance, is_stop: false });
+    }
+    if trips.get(place + 1).is_some_and(|next| next.continues) && trip.came_to_rest {
+        let felt: f64 = sections.iter().map(|(column, slope)| slope * x[*column]).sum();
+        let next = columns.place(place + 1);
+        let mut terms = sections;
+        terms.extend([(began, 1.0), (next, -1.0)]);
+        for (column, other) in &slopes {
+            let slope = (other.rest - here.rest) / slope_step(*column);
+            if slope != 0.0 {
+                terms.push((*column, slope));
+            }
+        }
+        let scatter = scale * usual_scatter(stop_speed);
+        let residual = x[began] + here.rest - way + felt - x[next];
+        let variance = scatter * scatter + REST_SCATTER * REST_SCATTER;
+        rows.push(Linear { terms, residual, variance, is_stop: true });
+    }
+}
+
+fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
+    match terms.iter_mut().find(|(known, _)| *known == column) {
+        Some((_, slope)) => *slope += by,
+        None => terms.push((column, by)),
+    }
+}
+
+/// Speed (m/s) at each contact, and by how much the law's shape may be off there (m).
+fn doubts(trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(f64, f64)> {
+    let mut walk = Walk::new(trip, own, segments);
+    trip.contacts
+        .iter()
+        .map(|contact| {
+            walk.way(contact.time);
+            let (middle, displacement) = walk.in_change(contact.time);
+            (walk.speed(contact.time), SHAPE_ERROR * middle * displacement.abs())
+        })
+        .collect()
+}
+
+/// The columns of the train's own numbers on which a trip can depend.
+fn involved(trip: &Trip, highest: usize) -> Vec<usize> {
+    let mut columns: Vec<usize> = (0..SPEEDS).collect();
+    let mut steps: Vec<u8> =
+        trip.told.iter().map(|told| told.to).chain(trip.running.map(|(step, _)| step)).collect();
+    steps.sort_unstable();
+    steps.dedup();
+    for step in steps.into_iter().map(usize::from).filter(|step| (1..=highest).contains(step)) {
+        columns.push(speed_at(step));
+        columns.push(hysteresis_at(step, highest));
+    }
+    columns
+}

@@ -1,0 +1,100 @@
+//! How sure a model's numbers are, one by one and together.
+#![expect(clippy::indexing_slicing, reason = "indices stay below the side of the matrix")]
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::parameters::{
+    Answers, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, count, hysteresis_at, node_covariance,
+    speed_at, speed_prior,
+};
+use crate::linalg::Solution;
+
+/// Steps of numerical slopes.
+const STEP: f64 = 1e-4;
+
+/// The covariance of a model's numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Spread {
+    side: usize,
+    covariance: Vec<f64>,
+}
+
+impl Spread {
+    /// Before a train has moved: every number by itself, nodes of residuals by their speeds.
+    pub(super) fn prior(highest: usize) -> Self {
+        let side = count(highest);
+        let mut spread = Self { side, covariance: vec![0.0; side * side] };
+        for (i, (_, deviation)) in PRIOR.iter().enumerate() {
+            spread.covariance[i * side + i] = deviation * deviation;
+        }
+        for first in [STOP_NODES, START_NODES] {
+            for i in 0..NODES {
+                for j in 0..NODES {
+                    spread.covariance[(first + i) * side + first + j] = node_covariance(i, j);
+                }
+            }
+        }
+        for step in 1..=highest {
+            let (_, deviation) = speed_prior(step, highest);
+            let (speed, hysteresis) = (speed_at(step), hysteresis_at(step, highest));
+            spread.covariance[speed * side + speed] = deviation * deviation;
+            spread.covariance[hysteresis * side + hysteresis] = HYSTERESIS_SPREAD * HYSTERESIS_SPREAD;
+        }
+        spread
+    }
+
+    /// Of the first numbers of a solution.
+    pub(super) fn of(solution: &Solution, highest: usize) -> Self {
+        let side = count(highest);
+        let at = |i: usize| solution.covariance(i / side, i % side);
+        Self { side, covariance: (0..side * side).map(at).collect() }
+    }
+
+    /// Variance of one number.
+    pub(super) fn variance(&self, place: usize) -> f64 {
+        if place < self.side { self.covariance[place * self.side + place].max(0.0) } else { 0.0 }
+    }
+
+    /// One standard deviation of what follows from the numbers.
+    pub(super) fn deviation(&self, values: &[f64], highest: usize, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
+        libm::sqrt(self.variance_along(&self.slopes(values, highest, of)))
+    }
+
+    /// Variance of the sum of numbers times slopes.
+    pub(super) fn variance_along(&self, slopes: &[(usize, f64)]) -> f64 {
+        self.covariance_of(slopes, slopes).max(0.0)
+    }
+
+    /// Covariance of two such sums.
+    pub(super) fn covariance_of(&self, one: &[(usize, f64)], other: &[(usize, f64)]) -> f64 {
+        let mut sum = 0.0;
+        for (i, left) in one {
+            for (j, right) in other {
+                sum += left * right * self.covariance[i * self.side + j];
+            }
+        }
+        sum
+    }
+
+    /// How what follows from the numbers changes with each of them.
+    pub(super) fn slopes(
+        &self,
+        values: &[f64],
+        highest: usize,
+        of: impl Fn(&Answers<'_>) -> f64,
+    ) -> Vec<(usize, f64)> {
+        let mut moved = values.to_vec();
+        let here = of(&Answers::new(&moved, highest));
+        let mut slopes = Vec::new();
+        for place in 0..self.side.min(values.len()) {
+            moved[place] += STEP;
+            let slope = (of(&Answers::new(&moved, highest)) - here) / STEP;
+            moved[place] = values[place];
+            if slope != 0.0 {
+                slopes.push((place, slope));
+            }
+        }
+        slopes
+    }
+}
