@@ -5,13 +5,14 @@
 //! test says, by name; [`Layout::build`] checks it and answers from then on by small integers:
 //! - [`Layout::hops_from`]: which sensors may come next, in nanoseconds, from a table made once;
 //! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent;
-//! - [`Layout::route`]: the shortest way between two nodes;
+//! - [`Layout::route`]: the shortest way between two nodes; [`Layout::circuit_from`]: a way that leads back;
 //! - [`Position`] and [`Landmark`]: points on the rails, and the names people give them.
 
 mod build;
+mod circuit;
 mod error;
 #[cfg(test)]
-mod example;
+pub(crate) mod example;
 mod graph;
 mod hop;
 mod landmark;
@@ -21,6 +22,7 @@ mod reach;
 mod route;
 mod turnout;
 
+pub use circuit::Circuit;
 pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, Ways};
 pub use hop::{Hop, HopId};

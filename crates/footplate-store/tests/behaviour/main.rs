@@ -6,6 +6,7 @@ mod bad_tachometer_recordings;
 mod bad_trains_and_lines;
 mod built_in_layouts;
 mod child_process;
+mod circuits;
 mod journal_survives;
 mod layout_tables;
 mod layouts_of_any_text;
