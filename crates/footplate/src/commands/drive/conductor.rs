@@ -1,0 +1,313 @@
+//! Carries out instructions one after the other: hands orders to the driver, waits, and says what comes of it.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use footplate_core::control::{
+    Achieved, DriveNotice, Driver, Finished, Machine, Order, OrderId, Output, Refusal,
+};
+use footplate_core::{Event, SpeedStep, TimeSpan, Timestamp, TrainId};
+
+use super::instruction::{HELP, Instruction, Until};
+use super::parse::Known;
+use super::script::{Step, step};
+use super::spoken::{Ended, Spoken, Target};
+use super::told::{Tongue, verb};
+
+/// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
+const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
+/// How often it is looked whether a train stands.
+const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
+
+/// Who gives the instructions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Giver {
+    /// A file: a train ends one order before it begins the next.
+    Script,
+    /// A person: a new order takes the place of the one before.
+    Person,
+}
+
+/// Drives by instructions.
+#[derive(Debug)]
+pub(super) struct Conductor {
+    driver: Driver,
+    giver: Giver,
+    steps: VecDeque<Step>,
+    /// No more will come.
+    complete: bool,
+    trains: BTreeMap<TrainId, SpeedStep>,
+    wait: Option<Wait>,
+    pending: BTreeMap<OrderId, Step>,
+    outputs: VecDeque<Output<Spoken>>,
+    began: Option<Timestamp>,
+    /// When something was last looked at.
+    looked: Timestamp,
+    is_over: bool,
+    fell_short: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Wait {
+    until: Until,
+    since: Timestamp,
+    is_met: bool,
+}
+
+impl Conductor {
+    pub(super) fn new(driver: Driver, giver: Giver, steps: Vec<Step>) -> Self {
+        let highest = |train| driver.model(train).map_or(SpeedStep::STAND, footplate_core::calibration::motion::MotionModel::highest);
+        let trains = driver.trains().map(|train| (train, highest(train))).collect();
+        Self {
+            driver,
+            giver,
+            steps: steps.into(),
+            complete: giver == Giver::Script,
+            trains,
+            wait: None,
+            pending: BTreeMap::new(),
+            outputs: VecDeque::new(),
+            began: None,
+            looked: Timestamp::ZERO,
+            is_over: false,
+            fell_short: false,
+        }
+    }
+
+    pub(super) const fn driver(&self) -> &Driver {
+        &self.driver
+    }
+
+    /// Whether an order was refused or given up.
+    pub(super) const fn fell_short(&self) -> bool {
+        self.fell_short
+    }
+
+    /// A person wrote a line.
+    pub(super) fn hear(&mut self, now: Timestamp, line: &str) {
+        let known = Known { layout: self.driver.layout(), trains: &self.trains };
+        match step(line, known) {
+            Ok(heard) => {
+                // Who says something else has waited long enough.
+                if heard.is_some() {
+                    self.wait = None;
+                }
+                self.steps.extend(heard);
+            }
+            Err(mistake) => self.say(mistake.to_string()),
+        }
+        self.go_on(now);
+    }
+
+    /// No more lines will come: what is under way is ended.
+    pub(super) fn complete(&mut self, now: Timestamp) {
+        self.complete = true;
+        self.go_on(now);
+    }
+
+    fn say(&mut self, line: String) {
+        self.outputs.push_back(Output::Notice(Spoken::Line(line)));
+    }
+
+    fn since_begin(&self, time: Timestamp) -> TimeSpan {
+        time - self.began.unwrap_or(time)
+    }
+
+    fn tongue(&self) -> Tongue<'_> {
+        Tongue { driver: &self.driver, began: self.began.unwrap_or_default() }
+    }
+
+    /// Does what can be done now.
+    fn go_on(&mut self, now: Timestamp) {
+        self.began.get_or_insert(now);
+        self.looked = now;
+        self.hand_on(now);
+        while !self.is_over && self.may_go_on(now) {
+            let Some(step) = self.steps.front() else { break };
+            let busy = match step.instruction {
+                Instruction::Order(order) => {
+                    order.train().is_some_and(|train| self.driver.busy(train).is_some())
+                }
+                _ => false,
+            };
+            if busy && self.giver == Giver::Script {
+                break;
+            }
+            if let Some(step) = self.steps.pop_front() {
+                self.carry_out(now, step);
+                self.hand_on(now);
+            }
+        }
+        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.is_empty();
+        if self.complete && idle && !self.is_over {
+            self.end();
+        }
+    }
+
+    fn end(&mut self) {
+        self.is_over = true;
+        self.outputs.push_back(Output::Notice(Spoken::Over));
+    }
+
+    fn may_go_on(&mut self, now: Timestamp) -> bool {
+        let Some(wait) = self.wait else { return true };
+        let met = wait.is_met
+            || match wait.until {
+                Until::Passed(span) => now - wait.since >= span,
+                Until::AtRest(train) => self.driver.busy(train).is_none() && self.driver.stands(train, now),
+                Until::Located(train) => self.driver.locate(train, now).is_some(),
+                Until::At(..) => false,
+            };
+        if met {
+            self.wait = None;
+        } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= WAIT_LIMIT {
+            self.wait = None;
+            self.fell_short = true;
+            self.say(format!("waited {:.0} s in vain; going on", WAIT_LIMIT.as_s()));
+            return true;
+        }
+        met
+    }
+
+    fn carry_out(&mut self, now: Timestamp, step: Step) {
+        match step.instruction {
+            Instruction::Order(order) => match self.driver.order(now, order) {
+                Ok(id) => {
+                    if let (Order::Stop(_) | Order::Move { .. }, Some(train)) = (order, order.train()) {
+                        self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                    }
+                    self.pending.insert(id, step);
+                }
+                Err(why) => self.refuse(now, &step, &why),
+            },
+            Instruction::Where(Some(train)) => {
+                let line = self.tongue().whereabouts(train, now);
+                self.say(line);
+            }
+            Instruction::Where(None) => {
+                for train in self.trains.keys().copied().collect::<Vec<_>>() {
+                    let line = self.tongue().whereabouts(train, now);
+                    self.say(line);
+                }
+            }
+            Instruction::Wait(until) => self.wait = Some(Wait { until, since: now, is_met: false }),
+            Instruction::Help => self.say(HELP.to_owned()),
+            Instruction::Quit => {
+                self.steps.clear();
+                self.end();
+            }
+        }
+    }
+
+    fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
+        self.fell_short = true;
+        self.say(format!("refused `{}`: {why}", step.text));
+        let ended = Ended { refused: Some(why.to_string()), ..self.ended(now, step) };
+        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+    }
+
+    fn ended(&self, time: Timestamp, step: &Step) -> Ended {
+        let (train, target) = match step.instruction {
+            Instruction::Order(order) => (
+                order.train(),
+                match order {
+                    Order::Stop(stop) => Target::Place(stop.target),
+                    Order::Move { distance, .. } => Target::Ahead(distance),
+                    _ => Target::None,
+                },
+            ),
+            _ => (None, Target::None),
+        };
+        Ended {
+            text: step.text.clone(),
+            command: verb(&step.instruction),
+            train,
+            target,
+            achieved: None,
+            error: None,
+            promise: None,
+            at: self.since_begin(time),
+            refused: None,
+        }
+    }
+
+    /// Hands on what the driver asks for, and says what it has to say.
+    fn hand_on(&mut self, now: Timestamp) {
+        while let Some(output) = self.driver.poll_output() {
+            match output {
+                Output::Command(command) => self.outputs.push_back(Output::Command(command)),
+                Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
+                Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
+                Output::Notice(notice) => self.notice(now, &notice),
+            }
+        }
+    }
+
+    fn notice(&mut self, now: Timestamp, notice: &DriveNotice) {
+        if let Some(line) = self.tongue().line(notice) {
+            self.say(line);
+        }
+        match notice {
+            DriveNotice::Passed { train, passed, .. } => {
+                if let Some(wait) = &mut self.wait {
+                    wait.is_met |= wait.until == Until::At(*train, passed.sensor);
+                }
+            }
+            DriveNotice::Done(finished) => self.done(finished),
+            DriveNotice::Thrown { order: Some(order), .. } => {
+                if let Some(step) = self.pending.remove(order) {
+                    let ended = self.ended(now, &step);
+                    self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+                }
+            }
+            DriveNotice::GivenUp { order, why, .. } => {
+                if let Some(step) = self.pending.remove(order) {
+                    self.refuse(now, &step, why);
+                }
+            }
+            DriveNotice::Replaced { order, .. } => {
+                self.pending.remove(order);
+            }
+            _ => {}
+        }
+    }
+
+    fn done(&mut self, finished: &Finished) {
+        let Some(step) = self.pending.remove(&finished.order) else { return };
+        let achieved = finished.achieved;
+        let name = |achieved: Achieved| self.tongue().place(achieved.at);
+        let ended = Ended {
+            achieved: achieved.map(name),
+            error: achieved.and_then(|achieved| achieved.error),
+            promise: finished.promise,
+            ..self.ended(finished.time, &step)
+        };
+        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+    }
+}
+
+impl Machine for Conductor {
+    type Notice = Spoken;
+
+    fn handle_event(&mut self, now: Timestamp, event: &Event) {
+        self.driver.handle_event(now, event);
+        self.go_on(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.driver.handle_timeout(now);
+        self.go_on(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Output<Spoken>> {
+        self.outputs.pop_front()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        let now_and_then = self.wait.map(|wait| match wait.until {
+            Until::Passed(span) => wait.since + span,
+            Until::AtRest(_) => self.looked + LOOK_AGAIN,
+            Until::At(..) | Until::Located(_) => wait.since + WAIT_LIMIT,
+        });
+        [self.driver.next_timeout(), now_and_then].into_iter().flatten().min()
+    }
+}

@@ -1,0 +1,50 @@
+//! What is said of a session: lines for people, and finished orders for whoever counts them.
+
+use footplate_core::control::Promise;
+use footplate_core::track::Landmark;
+use footplate_core::{Length, TimeSpan, TrainId};
+
+/// Something to be said.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Spoken {
+    /// For people.
+    Line(String),
+    /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
+    Begun(TrainId),
+    /// An order has ended.
+    Ended(Ended),
+    /// All has been done.
+    Over,
+}
+
+/// An order that has ended, well or not.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ended {
+    /// As it was written.
+    pub(super) text: String,
+    /// Its first word.
+    pub(super) command: &'static str,
+    pub(super) train: Option<TrainId>,
+    pub(super) target: Target,
+    /// The place, as it is believed.
+    pub(super) achieved: Option<String>,
+    /// How far beyond the target that is.
+    pub(super) error: Option<Length>,
+    /// What had been promised of that.
+    pub(super) promise: Option<Promise>,
+    /// When, since the session began.
+    pub(super) at: TimeSpan,
+    /// Why it was not carried out.
+    pub(super) refused: Option<String>,
+}
+
+/// Where an order was to lead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Target {
+    /// Nowhere in particular.
+    None,
+    /// To a place.
+    Place(Landmark),
+    /// So far from where it was.
+    Ahead(Length),
+}

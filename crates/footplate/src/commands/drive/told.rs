@@ -1,0 +1,165 @@
+//! Notices of the driver as people read them.
+
+use footplate_core::control::{DriveNotice, Driver, Finished, Order, PlannedStop};
+use footplate_core::estimation::{DueContact, PassedContact};
+use footplate_core::track::Landmark;
+use footplate_core::{Command, SensorId, Timestamp, TrainId};
+
+use super::instruction::Instruction;
+
+/// Knows the names of things.
+pub(super) struct Tongue<'d> {
+    pub(super) driver: &'d Driver,
+    pub(super) began: Timestamp,
+}
+
+/// The first word of an instruction.
+pub(super) const fn verb(instruction: &Instruction) -> &'static str {
+    match instruction {
+        Instruction::Order(Order::Speed { .. }) => "speed",
+        Instruction::Order(Order::Reverse { .. }) => "reverse",
+        Instruction::Order(Order::Turnout { .. }) => "turnout",
+        Instruction::Order(Order::Stop(_)) => "stop",
+        Instruction::Order(Order::Move { .. }) => "move",
+        Instruction::Where(_) => "where",
+        Instruction::Wait(_) => "wait",
+        Instruction::Help => "help",
+        Instruction::Quit => "quit",
+    }
+}
+
+impl Tongue<'_> {
+    fn sensor(&self, sensor: SensorId) -> &str {
+        self.driver.layout().sensor_name(sensor)
+    }
+
+    fn at(&self, time: Timestamp) -> String {
+        format!("{:9.3} s", (time - self.began).as_s())
+    }
+
+    /// A place to the millimetre.
+    pub(super) fn place(&self, at: Landmark) -> String {
+        let name = self.driver.layout().node_name(at.node);
+        let mm = at.offset.as_mm().round();
+        if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") }
+    }
+
+    /// One line on where a train is.
+    pub(super) fn whereabouts(&self, train: TrainId, now: Timestamp) -> String {
+        let Some(located) = self.driver.locate(train, now) else {
+            return format!("train {train}: nobody knows where; it has to pass a contact first");
+        };
+        let place = self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
+        let half = 1.959_964 * located.uncertainty.as_mm();
+        let moves = if located.at_rest {
+            "at rest".to_owned()
+        } else {
+            let (speed, doubt) =
+                (located.speed.as_mm_per_s(), 1.959_964 * located.speed_uncertainty.as_mm_per_s());
+            format!("{speed:.0} \u{b1} {doubt:.0} mm/s at step {}", located.step)
+        };
+        format!("train {train}: {place} \u{b1} {half:.0} mm (95 %), {moves}")
+    }
+
+    /// A notice as one line, if there is anything to say.
+    pub(super) fn line(&self, notice: &DriveNotice) -> Option<String> {
+        Some(match notice {
+            DriveNotice::Passed { train, passed, next } => self.passed(*train, passed, next.as_ref()),
+            DriveNotice::Planned(plan) => self.planned(plan),
+            DriveNotice::Overshoots { train, by, .. } => {
+                format!(
+                    "train {train} comes to rest about {:.0} mm beyond the target: it was nearer than believed",
+                    by.as_mm()
+                )
+            }
+            DriveNotice::Done(finished) => self.done(finished)?,
+            DriveNotice::Thrown { turnout, curved, .. } => {
+                format!("turnout {turnout} told to lie {}", leg(*curved))
+            }
+            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+                format!("turnout {turnout} lies {}: train {train} went there", leg(*curved))
+            }
+            DriveNotice::Overdue { train, sensor, by } => format!(
+                "train {train} should have passed {} {:.1} s ago: a missed contact, or it stands",
+                self.sensor(*sensor),
+                by.as_s()
+            ),
+            DriveNotice::Lost { train } => {
+                format!("train {train} is lost: told to stop; put it right, then let it pass a contact")
+            }
+            DriveNotice::Unexplained { sensor, time } => format!(
+                "{}  {} was closed, and no train can have been there",
+                self.at(*time),
+                self.sensor(*sensor)
+            ),
+            DriveNotice::Unconfirmed { command } => format!("no sign that this has left: {}", said(command)),
+            // Whoever replaced it knows; what was given up is said with the order it was.
+            DriveNotice::Replaced { .. } | DriveNotice::GivenUp { .. } => return None,
+        })
+    }
+
+    fn passed(&self, train: TrainId, passed: &PassedContact, next: Option<&DueContact>) -> String {
+        let middle = passed.window.middle();
+        let mut line = format!("{}  train {train} at {}", self.at(middle), self.sensor(passed.sensor));
+        match (passed.late, passed.short) {
+            (Some([late, _]), short) => {
+                let by = if late.as_ms() < 0.0 { "early" } else { "late" };
+                line += &format!(", {:.0} ms {by}", late.as_ms().abs());
+                if let Some(short) = short {
+                    line += &format!(" ({:.1} mm)", short.as_mm().abs());
+                }
+                line += &format!(", predicted {:.3} s", (middle - late - self.began).as_s());
+            }
+            (None, _) => line += ", found",
+        }
+        if passed.missed > 0 {
+            line += &format!(", {} missed before", passed.missed);
+        }
+        if let Some(next) = next {
+            let (time, half) = ((next.time - self.began).as_s(), 1_960.0 * next.uncertainty.as_s());
+            line += &format!("; next {} at {time:.3} s \u{b1} {half:.0} ms", self.sensor(next.sensor));
+        }
+        line
+    }
+
+    fn planned(&self, plan: &PlannedStop) -> String {
+        let mut line = format!("{}  train {} will be told to stop", self.at(plan.leaves), plan.train);
+        if let (Some(sensor), Some(after)) = (plan.trigger, plan.after_trigger) {
+            line += &format!(", {:.3} s after {}", after.as_s(), self.sensor(sensor));
+        }
+        let promise = plan.promise;
+        line + &format!("; rests at {:+.0} mm to {:+.0} mm (95 %)", promise.low.as_mm(), promise.high.as_mm())
+    }
+
+    fn done(&self, finished: &Finished) -> Option<String> {
+        let achieved = finished.achieved?;
+        let mut line = format!(
+            "{}  train {} at {} \u{b1} {:.0} mm",
+            self.at(finished.time),
+            finished.train,
+            self.place(achieved.at),
+            1.959_964 * achieved.uncertainty.as_mm()
+        );
+        if let Some(error) = achieved.error {
+            line += &format!(", {:+.1} mm from the target", error.as_mm());
+        }
+        if let Some(promise) = finished.promise {
+            line += &format!(" (promised {:+.0} mm to {:+.0} mm)", promise.low.as_mm(), promise.high.as_mm());
+        }
+        Some(line)
+    }
+}
+
+const fn leg(curved: bool) -> &'static str {
+    if curved { "curved" } else { "straight" }
+}
+
+fn said(command: &Command) -> String {
+    match command {
+        Command::Speed { train, step } => format!("step {step} for train {train}"),
+        Command::Reverse { train } => format!("turn around, train {train}"),
+        Command::Turnout { turnout, curved } => format!("turnout {turnout} {}", leg(*curved)),
+        Command::PowerOff => "power off".to_owned(),
+        Command::PowerOn => "power on".to_owned(),
+    }
+}
