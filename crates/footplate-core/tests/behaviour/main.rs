@@ -2,6 +2,7 @@
 
 mod counted_run;
 mod draw;
+mod driving;
 mod federated_filters;
 mod inertial;
 mod motion_checks;
@@ -11,6 +12,7 @@ mod profiles;
 mod short_moves;
 mod speed_change_laws;
 mod stopping;
+mod toy_railway;
 mod two_sensors;
 mod ways_on_tracks;
 mod wheel_diameters;

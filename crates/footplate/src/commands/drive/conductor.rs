@@ -55,7 +55,11 @@ struct Wait {
 
 impl Conductor {
     pub(super) fn new(driver: Driver, giver: Giver, steps: Vec<Step>) -> Self {
-        let highest = |train| driver.model(train).map_or(SpeedStep::STAND, footplate_core::calibration::motion::MotionModel::highest);
+        let highest = |train| {
+            driver
+                .model(train)
+                .map_or(SpeedStep::STAND, footplate_core::calibration::motion::MotionModel::highest)
+        };
         let trains = driver.trains().map(|train| (train, highest(train))).collect();
         Self {
             driver,

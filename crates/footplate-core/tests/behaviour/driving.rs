@@ -1,0 +1,217 @@
+//! A driver brings trains to rest where they are ordered, says beforehand what it cannot do, and never waits for a
+//! report that may not come.
+
+use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
+use footplate_core::{Command, Length, Ratio, SensorId, TrainId, TurnoutId};
+
+use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};
+
+const TRAIN: TrainId = TrainId(24);
+
+fn stop_at(driver: &Driver, place: &str) -> StopOrder {
+    StopOrder::at(TRAIN, driver.layout().landmark(place).expect("a place"))
+}
+
+fn is_done(world: &ToyRailway) -> bool {
+    !world.finished().is_empty()
+}
+
+fn speed_of_stop(command: &Command) -> bool {
+    matches!(command, Command::Speed { step, .. } if step.get() == 0)
+}
+
+/// Stops from rest at places near and far; how far beyond each the train really came to rest.
+fn stops(places: &[&str], order: impl Fn(StopOrder) -> StopOrder) -> Vec<(f64, f64, f64)> {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    let mut missed = Vec::new();
+    for place in places {
+        world.notices.clear();
+        let stop = order(stop_at(&driver, place));
+        driver.order(world.now, Order::Stop(stop)).expect("a place that can be reached");
+        assert!(world.run_until(&mut driver, 120.0, is_done), "{place}: {:#?}", world.notices);
+        let finished = world.finished()[0];
+        let promise = finished.promise.expect("a promise");
+        missed.push((world.beyond_mm(place), promise.low.as_mm(), promise.high.as_mm()));
+    }
+    missed
+}
+
+#[test]
+fn a_train_comes_to_rest_within_what_was_promised_of_the_place_it_was_ordered_to() {
+    let places = ["B1+120mm", "A1-30mm", "MR2+40mm", "D1+700mm", "A1+150mm", "B1-80mm", "D1+55mm", "A1"];
+    for (missed, low, high) in stops(&places, |stop| stop) {
+        assert!(missed.abs() < 25.0, "{missed} mm");
+        assert!((low - 3.0..=high + 3.0).contains(&missed), "{missed} mm of {low} to {high} mm");
+        assert!(high - low < 100.0, "{low} to {high} mm");
+    }
+}
+
+#[test]
+fn what_must_not_be_passed_is_aimed_short_of() {
+    let share = Aim::NotBeyond(Ratio::from_percent(0.1));
+    for (missed, _, _) in stops(&["B1+120mm", "D1+700mm", "B1-80mm"], |stop| StopOrder { aim: share, ..stop })
+    {
+        assert!((-120.0..=0.0).contains(&missed), "{missed} mm");
+    }
+}
+
+#[test]
+fn a_short_move_ends_where_it_should() {
+    let mut world = ToyRailway::new(24, "D1", 100.0);
+    let mut driver = driver_of(&world, "D1", 100.0);
+    for mm in [40.0, 120.0, 250.0] {
+        world.notices.clear();
+        let before = world.train().travelled_mm;
+        driver.order(world.now, Order::Move { train: TRAIN, distance: Length::from_mm(mm) }).expect("a move");
+        assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
+        let moved = world.train().travelled_mm - before;
+        eprintln!("{:#?}", world.notices);
+        assert!((moved - mm).abs() < 8.0 + 0.08 * mm, "{moved} mm instead of {mm} mm");
+    }
+}
+
+#[test]
+fn a_running_train_stops_without_slowing_down_first_and_one_too_near_is_told_so() {
+    // Given a train that runs at step 10,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
+    world.run_until(&mut driver, 30.0, |world| world.beyond_mm("B1") > 20.0 && world.beyond_mm("B1") < 40.0);
+    world.notices.clear();
+    // when a place is nearer than it can stop,
+    let near = stop_at(&driver, "B1+100mm");
+    let refused = driver.order(world.now, Order::Stop(near)).expect_err("nearer than it can stop");
+    // then it is refused with the nearest place, and stays refused,
+    let Refusal::TooNear { nearest, beyond, round: Some(round), .. } = &refused else { panic!("{refused}") };
+    assert!(driver.order(world.now, Order::Stop(near)).is_err());
+    assert!((round.as_mm() - 2_300.0).abs() < 40.0, "{round:?}");
+    // the nearest place can be kept,
+    let nearest_mm = driver.layout().landmark(nearest).expect("a place").offset.as_mm();
+    assert!((nearest_mm - 100.0 - beyond.as_mm()).abs() < 12.0, "{refused}");
+    let a_little_further = stop_at(&driver, &format!("B1+{:.0}mm", nearest_mm + 30.0));
+    driver.order(world.now, Order::Stop(a_little_further)).expect("the nearest place and a little");
+    assert!(world.run_until(&mut driver, 20.0, is_done));
+    assert!(world.beyond_mm("B1+100mm") > 0.0);
+    // and the one refused is reached on the next round.
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
+    world.run_until(&mut driver, 60.0, |world| (0.0..20.0).contains(&world.beyond_mm("B1+20mm")));
+    world.notices.clear();
+    let next = StopOrder { next_round: true, ..near };
+    driver.order(world.now, Order::Stop(next)).expect("the next round");
+    assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
+    assert!(world.beyond_mm("B1+100mm").abs() < 30.0, "{} mm", world.beyond_mm("B1+100mm"));
+}
+
+#[test]
+fn the_stop_is_commanded_by_the_clock_when_no_contact_reports() {
+    // Given a train on its way to a stop,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Stop(stop_at(&driver, "D1+100mm"))).expect("one round");
+    world.run_until(&mut driver, 20.0, |world| world.beyond_mm("A1") > 0.0 && world.beyond_mm("A1") < 40.0);
+    // when from then on every contact is silent,
+    world.dead = (0..8).map(SensorId).collect();
+    // then it is told to stop all the same, and not far from where it should.
+    assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
+    assert!(world.commands.iter().any(|(_, command)| speed_of_stop(command)));
+    assert!(world.beyond_mm("D1+100mm").abs() < 150.0, "{} mm", world.beyond_mm("D1+100mm"));
+    assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::Overdue { .. })));
+}
+
+#[test]
+fn a_train_nobody_can_find_is_looked_for_and_then_stopped_where_it_should() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = Driver::new(world.layout.clone(), straight());
+    driver.add_train(known_model(24));
+    driver.order(world.now, Order::Stop(stop_at(&driver, "A1+60mm"))).expect("it will be found");
+    assert!(world.run_until(&mut driver, 120.0, is_done), "{:#?}", world.notices);
+    assert!(world.beyond_mm("A1+60mm").abs() < 30.0, "{} mm", world.beyond_mm("A1+60mm"));
+}
+
+#[test]
+fn a_train_that_has_vanished_is_given_up_and_told_to_stop() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
+    world.dead = (0..12).map(SensorId).collect();
+    world.run(&mut driver, 60.0);
+    assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::Lost { train: TRAIN })));
+    assert!(world.train().speed_mm_per_s < 1.0);
+    let lost = driver.order(world.now, Order::Move { train: TRAIN, distance: Length::from_mm(50.0) });
+    assert_eq!(lost, Err(Refusal::Lost { train: TRAIN }));
+}
+
+#[test]
+fn after_turning_around_a_train_is_known_to_the_centimetre_and_stops_in_the_other_direction() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(8) }).expect("a step");
+    world.run(&mut driver, 6.0);
+    world.notices.clear();
+    driver.order(world.now, Order::Reverse { train: TRAIN, then: step(0) }).expect("a train");
+    assert!(world.run_until(&mut driver, 30.0, is_done), "{:#?}", world.notices);
+    let moving = |command: &Command| matches!(command, Command::Reverse { .. });
+    assert_eq!(world.commands.iter().filter(|(_, command)| moving(command)).count(), 1);
+    let located = driver.locate(TRAIN, world.now).expect("it is not lost");
+    assert!(located.at_rest && located.uncertainty < Length::from_mm(30.0), "{located:?}");
+    world.notices.clear();
+    driver.order(world.now, Order::Stop(stop_at(&driver, "D2+200mm"))).expect("back the way it came");
+    assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
+    assert!(world.beyond_mm("D2+200mm").abs() < 30.0, "{} mm", world.beyond_mm("D2+200mm"));
+}
+
+#[test]
+fn a_turnout_is_never_thrown_under_a_train() {
+    let mut world = ToyRailway::new(24, "A1", 190.0);
+    let mut driver = driver_of(&world, "A1", 190.0);
+    let throw = |turnout| Order::Turnout { turnout: TurnoutId(turnout), curved: true };
+    let refused = driver.order(world.now, throw(1));
+    assert_eq!(refused, Err(Refusal::TurnoutOccupied { turnout: TurnoutId(1), train: TRAIN }));
+    assert_eq!(driver.order(world.now, throw(9)), Err(Refusal::UnknownTurnout { turnout: TurnoutId(9) }));
+    driver.order(world.now, throw(2)).expect("nobody is there");
+    world.run(&mut driver, 1.0);
+    assert!(driver.turnouts().get(TurnoutId(2)).is_some_and(|leg| leg.is_curved()));
+}
+
+#[test]
+fn a_turnout_that_did_not_move_is_found_out_by_where_the_train_went() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    world.stuck.insert(TurnoutId(1));
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Turnout { turnout: TurnoutId(1), curved: true }).expect("free");
+    world.run(&mut driver, 0.5);
+    driver.order(world.now, Order::Stop(stop_at(&driver, "D1+200mm"))).expect("round over C");
+    assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
+    let otherwise = |notice: &DriveNotice| {
+        matches!(notice, DriveNotice::TurnoutLiesOtherwise { turnout: TurnoutId(1), curved: false, .. })
+    };
+    assert!(world.notices.iter().any(otherwise), "{:#?}", world.notices);
+    assert!(world.beyond_mm("D1+200mm").abs() < 30.0, "{} mm", world.beyond_mm("D1+200mm"));
+}
+
+#[test]
+fn orders_that_make_no_sense_are_refused_and_change_nothing() {
+    let world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    let now = world.now;
+    let stop = stop_at(&driver, "B1");
+    let other = StopOrder { train: TrainId(58), ..stop };
+    for (order, says) in [
+        (Order::Speed { train: TRAIN, step: step(15) }, "step 15 is beyond 14, the highest of this train"),
+        (Order::Stop(other), "train 58 is not driven here"),
+        (Order::Stop(StopOrder { step: Some(step(0)), ..stop }), "step 0 does not move this train reliably"),
+        (
+            Order::Stop(StopOrder { aim: Aim::NotBeyond(Ratio::from_percent(80.0)), ..stop }),
+            "80 % is no probability between 0.0001 % and 50 %",
+        ),
+        (Order::Stop(stop_at(&driver, "E1")), "no way leads from `D1` to `E1` as the turnouts lie"),
+        (Order::Stop(stop_at(&driver, "F1+2000mm")), "the track ends at `EX2`, 1100 mm before the way does"),
+        (Order::Stop(stop_at(&driver, "B2")), "no way leads from `D1` to `B2`"),
+        (Order::Move { train: TRAIN, distance: Length::from_mm(-5.0) }, "-5 mm is no way ahead"),
+    ] {
+        let refused = driver.order(now, order).expect_err(says).to_string();
+        assert!(refused.contains(says), "{refused}");
+        assert_eq!(driver.busy(TRAIN), None);
+    }
+}

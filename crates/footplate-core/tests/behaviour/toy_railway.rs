@@ -1,0 +1,340 @@
+//! A small railway by hand for tests of what drives trains: constant accelerations, a slow line, polled contacts.
+//!
+//! ```text
+//!          +-- 500 -- B1 -- 500 --+
+//! A1 -200- 1                      2 -200- D1 --- 900 --- A1      EN1 -300- E1 -800- F1 -900- EX2
+//!          +-- 520 -- C1 -- 450 --+
+//! ```
+
+use std::collections::{BTreeSet, VecDeque};
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
+use footplate_core::control::{DriveNotice, Driver, Finished, Machine, Output};
+use footplate_core::track::{
+    Layout, LayoutPlan, Leg, Place, Position, RailEnd, Stretch, Survey, TurnoutStates,
+};
+use footplate_core::{
+    Command, Event, EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
+
+/// The clock of this world.
+const TICK: TimeSpan = TimeSpan::from_ms(1);
+/// Two bytes on the line.
+const LINE: TimeSpan = TimeSpan::from_us(9_167);
+/// From one poll to the next.
+const POLL: TimeSpan = TimeSpan::from_ms(65);
+/// From a command until the train begins to obey.
+const DEAD: TimeSpan = TimeSpan::from_ms(180);
+/// Speed of a step.
+const MM_PER_S_A_STEP: f64 = 32.0;
+/// Starts and stops alike.
+const MM_PER_S2: f64 = 170.0;
+
+pub(crate) fn step(step: u8) -> SpeedStep {
+    SpeedStep::new(step).expect("a step")
+}
+
+pub(crate) fn layout() -> Layout {
+    let sensor = |name: &str, number| Place::Sensor {
+        names: [format!("{name}1"), format!("{name}2")],
+        sensors: [SensorId(number), SensorId(number + 1)],
+    };
+    let turnout = |number: u16| Place::Turnout {
+        names: [format!("BR{number}"), format!("MR{number}")],
+        turnout: TurnoutId(number),
+    };
+    let end = |number: u16| Place::End { names: [format!("EN{number}"), format!("EX{number}")] };
+    let rail_end = |text: &str| match text.split_once(' ') {
+        Some((node, leg)) => RailEnd { node: node.into(), leg: Some(Leg::from_curved(leg == "curved")) },
+        None => RailEnd { node: text.into(), leg: None },
+    };
+    let stretch = |from: &str, to: &str, mm: f64| Stretch {
+        from: rail_end(from),
+        to: rail_end(to),
+        length: Length::from_mm(mm),
+    };
+    let plan = LayoutPlan {
+        name: "toy".into(),
+        survey: Survey { uncertainty: Length::from_mm(2.0), origin: "made up".into() },
+        places: vec![
+            sensor("A", 0),
+            sensor("B", 2),
+            sensor("C", 4),
+            sensor("D", 6),
+            turnout(1),
+            turnout(2),
+            sensor("E", 8),
+            sensor("F", 10),
+            end(1),
+            end(2),
+        ],
+        stretches: vec![
+            stretch("A1", "BR1", 200.0),
+            stretch("BR1 straight", "B1", 500.0),
+            stretch("BR1 curved", "C1", 520.0),
+            stretch("B1", "MR2 straight", 500.0),
+            stretch("C1", "MR2 curved", 450.0),
+            stretch("MR2", "D1", 200.0),
+            stretch("D1", "A1", 900.0),
+            stretch("EN1", "E1", 300.0),
+            stretch("E1", "F1", 800.0),
+            stretch("F1", "EX2", 900.0),
+        ],
+        never_both_curved: vec![],
+    };
+    Layout::build(&plan).expect("a layout")
+}
+
+pub(crate) fn straight() -> TurnoutStates {
+    [1, 2].map(|turnout| (TurnoutId(turnout), Leg::Straight)).into_iter().collect()
+}
+
+/// A train as it really is.
+#[derive(Debug, Clone)]
+pub(crate) struct ToyTrain {
+    pub(crate) id: TrainId,
+    pub(crate) at: Position,
+    pub(crate) speed_mm_per_s: f64,
+    target_mm_per_s: f64,
+    obeys: VecDeque<(Timestamp, f64)>,
+    pub(crate) travelled_mm: f64,
+    pub(crate) is_off_the_track: bool,
+}
+
+impl ToyTrain {
+    fn tick(&mut self, now: Timestamp, layout: &Layout, turnouts: &TurnoutStates) -> Option<SensorId> {
+        while let Some((from, target)) = self.obeys.front().copied().filter(|(from, _)| *from <= now) {
+            let _ = (self.obeys.pop_front(), from);
+            self.target_mm_per_s = target;
+        }
+        let change = MM_PER_S2 * TICK.as_s();
+        let missing = self.target_mm_per_s - self.speed_mm_per_s;
+        self.speed_mm_per_s += missing.clamp(-change, change);
+        let way = self.speed_mm_per_s * TICK.as_s();
+        let edge = layout.edge(self.at.edge).expect("on the layout");
+        match layout.advance(self.at, Length::from_mm(way), turnouts) {
+            Ok(at) => {
+                self.travelled_mm += way;
+                let passed = (at.edge != self.at.edge).then(|| layout.sensor_at(edge.to)).flatten();
+                self.at = at;
+                passed
+            }
+            Err(_) => {
+                self.is_off_the_track = true;
+                self.speed_mm_per_s = 0.0;
+                None
+            }
+        }
+    }
+}
+
+/// The world and the loop around a driver.
+pub(crate) struct ToyRailway {
+    pub(crate) layout: Layout,
+    /// How the turnouts really lie.
+    pub(crate) turnouts: TurnoutStates,
+    pub(crate) now: Timestamp,
+    pub(crate) trains: Vec<ToyTrain>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) notices: Vec<DriveNotice>,
+    pub(crate) commands: Vec<(Timestamp, Command)>,
+    /// Contacts that do not report.
+    pub(crate) dead: BTreeSet<SensorId>,
+    /// Turnouts that do not move.
+    pub(crate) stuck: BTreeSet<TurnoutId>,
+    queue: VecDeque<Command>,
+    line_free: Timestamp,
+    closed: BTreeSet<SensorId>,
+    polled: Timestamp,
+}
+
+impl ToyRailway {
+    /// One train, `mm` past a node.
+    pub(crate) fn new(train: u16, node: &str, mm: f64) -> Self {
+        let layout = layout();
+        let turnouts = straight();
+        let landmark = layout.landmark(&format!("{node}{mm:+}mm")).expect("a place");
+        let at = layout.locate(landmark, &turnouts).expect("a place");
+        let train = ToyTrain {
+            id: TrainId(train),
+            at,
+            speed_mm_per_s: 0.0,
+            target_mm_per_s: 0.0,
+            obeys: VecDeque::new(),
+            travelled_mm: 0.0,
+            is_off_the_track: false,
+        };
+        Self {
+            layout,
+            turnouts,
+            now: Timestamp::ZERO,
+            trains: vec![train],
+            events: Vec::new(),
+            notices: Vec::new(),
+            commands: Vec::new(),
+            dead: BTreeSet::new(),
+            stuck: BTreeSet::new(),
+            queue: VecDeque::new(),
+            line_free: Timestamp::ZERO,
+            closed: BTreeSet::new(),
+            polled: Timestamp::ZERO,
+        }
+    }
+
+    pub(crate) fn command(&mut self, command: Command) {
+        self.queue.push_back(command);
+    }
+
+    fn obey(&mut self, command: Command) -> EventKind {
+        match command {
+            Command::Speed { train, step } => {
+                for toy in self.trains.iter_mut().filter(|toy| toy.id == train) {
+                    toy.obeys.push_back((self.now + DEAD, MM_PER_S_A_STEP * f64::from(step.get())));
+                }
+                EventKind::Speed { train, step }
+            }
+            Command::Reverse { train } => {
+                for toy in self.trains.iter_mut().filter(|toy| toy.id == train) {
+                    // A shoe of 30 mm: the other end leads.
+                    let back = self.layout.reversed(toy.at).expect("on the layout");
+                    let shoe = Length::from_mm(30.0);
+                    toy.at = self.layout.advance(back, shoe, &self.turnouts).unwrap_or(back);
+                }
+                EventKind::Reverse { train }
+            }
+            Command::Turnout { turnout, curved } => {
+                if !self.stuck.contains(&turnout) {
+                    self.turnouts.set(turnout, Leg::from_curved(curved));
+                }
+                EventKind::Turnout { turnout, curved }
+            }
+            _ => EventKind::Reverse { train: TrainId(0) },
+        }
+    }
+
+    /// One tick of the world: what was reported or has left.
+    pub(crate) fn tick(&mut self) -> Vec<Event> {
+        self.now += TICK;
+        let mut events = Vec::new();
+        let mut passed = Vec::new();
+        for train in &mut self.trains {
+            passed.extend(train.tick(self.now, &self.layout, &self.turnouts));
+        }
+        self.closed.extend(passed.into_iter().filter(|sensor| !self.dead.contains(sensor)));
+        if self.line_free <= self.now
+            && let Some(command) = self.queue.pop_front()
+        {
+            // The effect counts from when the last bit has left.
+            self.line_free = self.now + LINE;
+            self.commands.push((self.line_free, command));
+            let kind = self.obey(command);
+            events.push(Event { time: self.line_free, kind });
+        }
+        if self.now - self.polled >= POLL {
+            let poll_interval = Some(self.now - self.polled);
+            self.polled = self.now;
+            for sensor in std::mem::take(&mut self.closed) {
+                let kind = EventKind::Sensor(Report { sensor, poll_interval });
+                events.push(Event { time: self.now, kind });
+            }
+        }
+        self.events.extend(&events);
+        events
+    }
+
+    /// What the driver asks for is done.
+    pub(crate) fn listen(&mut self, driver: &mut Driver) {
+        while let Some(output) = driver.poll_output() {
+            match output {
+                Output::Command(command) => self.command(command),
+                Output::Notice(notice) => self.notices.push(notice),
+                Output::HoldLine(_) | Output::Watch(_) => {}
+            }
+        }
+    }
+
+    /// Runs the world with a driver for some time.
+    pub(crate) fn run(&mut self, driver: &mut Driver, seconds: f64) {
+        self.run_until(driver, seconds, |_| false);
+    }
+
+    /// The same, until something is so; whether it came to be.
+    pub(crate) fn run_until(
+        &mut self,
+        driver: &mut Driver,
+        seconds: f64,
+        is_so: impl Fn(&Self) -> bool,
+    ) -> bool {
+        let end = self.now + TimeSpan::from_s(seconds);
+        self.listen(driver);
+        while self.now < end && !is_so(self) {
+            for event in self.tick() {
+                driver.handle_event(self.now.max(event.time), &event);
+                self.listen(driver);
+            }
+            if driver.next_timeout().is_some_and(|at| at <= self.now) {
+                driver.handle_timeout(self.now);
+                self.listen(driver);
+            }
+        }
+        is_so(self)
+    }
+
+    pub(crate) fn train(&self) -> &ToyTrain {
+        &self.trains[0]
+    }
+
+    pub(crate) fn finished(&self) -> Vec<Finished> {
+        let done = |notice: &DriveNotice| match notice {
+            DriveNotice::Done(finished) => Some(*finished),
+            _ => None,
+        };
+        self.notices.iter().filter_map(done).collect()
+    }
+
+    /// How far beyond a place the first train really is, by the shorter way.
+    pub(crate) fn beyond_mm(&self, place: &str) -> f64 {
+        let landmark = self.layout.landmark(place).expect("a place");
+        let target = self.layout.locate(landmark, &self.turnouts).expect("a place");
+        let ahead = |from, to| {
+            self.layout.distance_ahead(from, to, &self.turnouts).map_or(f64::INFINITY, Length::as_mm)
+        };
+        let (beyond, short) = (ahead(target, self.train().at), ahead(self.train().at, target));
+        if beyond <= short { beyond } else { -short }
+    }
+}
+
+/// What is known of a toy train after two minutes of runs and stops at four steps.
+pub(crate) fn known_model(train: u16) -> MotionModel {
+    let mut world = ToyRailway::new(train, "D1", 300.0);
+    let id = TrainId(train);
+    let mut fit = MotionFit::new(id, step(14));
+    let turnouts = straight();
+    for speed in [8, 12, 5, 14, 10, 6] {
+        for (told, seconds) in [(step(speed), 16.0), (step(0), 5.0)] {
+            world.command(Command::Speed { train: id, step: told });
+            let end = world.now + TimeSpan::from_s(seconds);
+            while world.now < end {
+                for event in world.tick() {
+                    fit.take(&world.layout, &turnouts, &event);
+                }
+            }
+        }
+        fit.note_use(step(speed), StepUse::Moves);
+    }
+    fit.refit(&SectionIndex::of(&world.layout));
+    fit.model().clone()
+}
+
+/// A driver of one train that is known and of which is known where it stands.
+pub(crate) fn driver_of(world: &ToyRailway, node: &str, mm: f64) -> Driver {
+    let model = known_model(world.train().id.0);
+    let mut driver = Driver::new(world.layout.clone(), straight());
+    let train = model.train();
+    driver.add_train(model);
+    let node = world.layout.node_named(node).expect("a node");
+    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(mm) };
+    driver.place(world.now, train, at, Length::from_mm(2.0));
+    driver
+}
