@@ -305,14 +305,17 @@ impl ToyRailway {
     }
 }
 
-/// What is known of a toy train after two minutes of runs and stops at four steps.
+/// What is known of a toy train after three minutes of runs and stops at eight steps.
 pub(crate) fn known_model(train: u16) -> MotionModel {
     let mut world = ToyRailway::new(train, "D1", 300.0);
     let id = TrainId(train);
     let mut fit = MotionFit::new(id, step(14));
     let turnouts = straight();
-    for speed in [8, 12, 5, 14, 10, 6] {
-        for (told, seconds) in [(step(speed), 16.0), (step(0), 5.0)] {
+    // Long runs, and short ones that end before the speed is reached.
+    let runs =
+        [(8, 16.0), (12, 16.0), (5, 16.0), (4, 12.0), (4, 1.0), (6, 0.7), (14, 16.0), (4, 2.0), (10, 16.0)];
+    for (speed, runs_for) in runs.into_iter().chain([(6, 10.0), (5, 0.5), (4, 16.0), (8, 0.6), (4, 16.0)]) {
+        for (told, seconds) in [(step(speed), runs_for), (step(0), 5.0)] {
             world.command(Command::Speed { train: id, step: told });
             let end = world.now + TimeSpan::from_s(seconds);
             while world.now < end {
