@@ -3,6 +3,7 @@
 mod counted_run;
 mod draw;
 mod driving;
+mod driving_any_orders;
 mod federated_filters;
 mod inertial;
 mod motion_checks;

@@ -40,14 +40,15 @@ pub(super) fn lap(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Opti
     (end > Length::ZERO).then_some(end)
 }
 
-/// The same point counted from another node, which the train came to since: ahead of the one before.
+/// The same point counted from another node, which the train came to since: ahead of the one before, and once round if
+/// it is the same.
 pub(super) fn counted_from(
     ground: Ground<'_>,
     model: &MotionModel,
     point: WayPoint,
     node: NodeId,
 ) -> Option<WayPoint> {
-    let between = way_between(ground, model, point.node, node)?;
+    let (_, [_, between]) = felt_hops(ground, model, point.node).find(|(hop, _)| hop.to == node)?;
     Some(WayPoint { node, way: point.way - between })
 }
 
