@@ -218,7 +218,7 @@ impl Locator {
         self.following.pass(model, time, window.variance_s2(), place);
         self.following.shift(-reach.length.mean);
         self.node = Some(node);
-        let late = [short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
+        let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
         PassedContact {
             late: Some(late),
             short: Some(Length::from_m(short.mean)),

@@ -82,8 +82,8 @@ impl Following {
         if from == step {
             return;
         }
-        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
         self.settle(model, sent);
+        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
         if let Some(slot) = self.pending.iter_mut().find(|slot| slot.is_none()) {
             *slot = Some(Told { sent, from, to: step, at_rest });
         }
@@ -122,7 +122,7 @@ impl Following {
         // A train at rest has run its whole way to rest, whenever it is told the next step.
         let time = if from_rest { f64::INFINITY } else { begins };
         let (way, slope) = self.way_and_slope(time);
-        let speed = if from_rest { 0.0 } else { self.segment.speed(begins) };
+        let speed = if from_rest { 0.0 } else { self.segment.speed(begins - self.x[H]) };
         self.transform(slope);
         self.x[B] = way;
         let answers = model.answers();
