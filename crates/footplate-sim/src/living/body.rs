@@ -9,15 +9,13 @@ use std::collections::VecDeque;
 use footplate_core::track::Leg;
 use footplate_core::{EdgeId, SensorId, TurnoutId};
 
+use crate::circuit::FOULING_MM;
 use crate::living::rails::{Ahead, Rails};
 use crate::load::DIRTY_MM;
 use crate::path::Point;
 
 /// Blades of a turnout reach so far from its toe into its legs (chosen: Märklin K and C track, a third of 17 cm).
 const BLADES_MM: f64 = 60.0;
-/// Trains on both legs of a turnout touch each other up to this far from its toe (worked out: 24.3° at a radius of
-/// 424.6 mm part the middles of the tracks by the 40 mm that two engines need).
-const FOULING_MM: f64 = 180.0;
 /// No way leads over more edges at one point (chosen: beyond that the layout has edges without length in a ring).
 const MOST_EDGES_AT_ONCE: usize = 64;
 

@@ -17,9 +17,12 @@ const FREE_MM: f64 = 15.0;
 const TRIES: usize = 1000;
 
 impl<'l> LivingLayout<'l> {
-    /// A layout with trains, all drawn from the seed, standing where a person has put them: each on a circuit that
-    /// shares no rails with the others' as long as there are such circuits, facing either way, somewhere between
-    /// contacts. Turnouts lie anyhow, unless the switches say otherwise.
+    /// A layout with trains, all drawn from the seed, standing where a person has put them, facing either way,
+    /// somewhere between contacts: each on a circuit of its own (see [`homes`](Self::homes)) and off those of the
+    /// others, so that one at a time can run round; trains for which there is none, anywhere. Turnouts lie anyhow,
+    /// unless the switches say otherwise.
+    ///
+    /// Circuits need not be apart altogether: all of Track A's lead through two of its three necks.
     ///
     /// # Errors
     /// [`CircuitError`] when no train can run round on the layout.
@@ -33,34 +36,47 @@ impl<'l> LivingLayout<'l> {
         let circuits = Circuit::draw_apart(layout, trains.len(), &mut draws)?;
         let mut world = Self::without_trains(layout, seed, switches);
         if switches.turnouts_set {
-            for (turnout, leg) in circuits.iter().flat_map(Circuit::turnouts) {
+            for (turnout, leg) in circuits.iter().rev().flat_map(Circuit::turnouts) {
                 world.lay(turnout, leg);
             }
         }
+        let every: Vec<&Circuit> = circuits.iter().collect();
+        let anywhere: Vec<(EdgeId, [f64; 2])> =
+            layout.edges().map(|(id, edge)| (id, [0.0, edge.length.as_mm()])).collect();
         for (nth, id) in trains.iter().enumerate() {
             // Seeds of neighbouring worlds share no train.
             let own = seed.wrapping_mul(1000).wrapping_add(nth as u64 + 1);
             let laws = LawFamily::ALL;
             let law = switches.law.unwrap_or(laws[(own % laws.len() as u64) as usize]);
             world.add(*id, Train::draw(own, law), switches.warmth);
-            world.put_down(*id, circuits.get(nth), &mut draws);
+            let sidings = Circuit::sidings(layout, &every, nth);
+            world.put_down(*id, if sidings.is_empty() { &anywhere } else { &sidings }, &mut draws);
         }
+        world.homes = trains.iter().copied().zip(circuits).collect();
         Ok(world)
     }
 
-    /// Puts a train on its circuit, or anywhere if it has none; it stays lifted when there is no room.
-    fn put_down(&mut self, train: TrainId, circuit: Option<&Circuit>, draws: &mut Draws) {
-        let anywhere: Vec<EdgeId> = self.layout().edges().map(|(id, _)| id).collect();
+    /// The circuits that whoever put the trains down had in mind for them: what a person could tell a program.
+    #[must_use]
+    pub fn homes(&self) -> &[(TrainId, Circuit)] {
+        &self.homes
+    }
+
+    /// Puts a train on one of several edges between offsets; it stays lifted when there is no room.
+    fn put_down(&mut self, train: TrainId, edges: &[(EdgeId, [f64; 2])], draws: &mut Draws) {
         let Some(engine) = self.truth().engine(train) else { return };
         let [ahead, behind] = [engine.nose, engine.shoe + engine.tail].map(|length| length.as_mm() + FREE_MM);
         for _ in 0..TRIES {
-            let edges = circuit.map_or(anywhere.as_slice(), Circuit::edges);
-            let Some(&edge) = edges.get(draws.below(edges.len())) else { return };
-            let edge = if draws.chance(0.5) { edge } else { edge.twin() };
+            let Some(&(edge, [from, to])) = edges.get(draws.below(edges.len())) else { return };
             let length = self.truth().track().length(edge).as_mm();
-            let offset = draws.uniform(behind..(length - ahead).max(behind + 1.0));
+            let (edge, [from, to]) = if draws.chance(0.5) {
+                (edge, [from, to])
+            } else {
+                (edge.twin(), [length - to, length - from])
+            };
+            let offset = draws.uniform(from + behind..(to - ahead).max(from + behind + 1.0));
             let position = Position { edge, offset: Length::from_mm(offset) };
-            if offset + ahead < length && self.place(train, position, End::Nose).is_ok() {
+            if offset + ahead < to && self.place(train, position, End::Nose).is_ok() {
                 return;
             }
         }

@@ -3,6 +3,7 @@
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
+use crate::circuit::Circuit;
 use crate::draws::{Draws, Purpose};
 use crate::living::live_train::{Around, LiveTrain, Order, STEP, Stepped};
 use crate::living::mishap::{Mishap, MishapKind};
@@ -31,6 +32,7 @@ pub struct LivingLayout<'l> {
     draws: Draws,
     mishaps: Vec<Mishap>,
     pub(crate) rests: Vec<RestTruth>,
+    pub(crate) homes: Vec<(TrainId, Circuit)>,
 }
 
 impl<'l> LivingLayout<'l> {
@@ -54,6 +56,7 @@ impl<'l> LivingLayout<'l> {
             draws,
             mishaps: Vec::new(),
             rests: Vec::new(),
+            homes: Vec::new(),
         }
     }
 

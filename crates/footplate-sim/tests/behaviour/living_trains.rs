@@ -2,7 +2,7 @@
 
 use footplate_core::track::Leg;
 use footplate_core::{SensorId, TurnoutId};
-use footplate_sim::{CtsSwitch, MishapKind, StationSwitches};
+use footplate_sim::{CtsSwitch, LivingSwitches, MishapKind, StationSwitches, VirtualStation};
 
 use crate::yard::{OTHER, TRAIN, empty, put, say, two_loops, wait};
 
@@ -180,4 +180,29 @@ fn hands_lift_push_dirty_and_swap() {
     station.world_mut().swap(TRAIN, other.clone(), 1.0).unwrap();
     assert_eq!(station.world().truth().engine(TRAIN), Some(&other));
     assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+}
+
+#[test]
+fn every_train_drawn_can_run_round_its_circuit_while_the_others_stand() {
+    let layout = two_loops();
+    for seed in 1..20 {
+        let switches = LivingSwitches { turnouts_set: true, ..LivingSwitches::faultless() };
+        for (nth, train) in [TRAIN, OTHER].into_iter().enumerate() {
+            let mut station = VirtualStation::draw(&layout, seed, &[TRAIN, OTHER], &switches).unwrap();
+            let (id, circuit) = station.world().homes()[nth].clone();
+            assert_eq!(id, train);
+            for (turnout, leg) in circuit.turnouts() {
+                station.world_mut().lay(turnout, leg);
+            }
+            say(&mut station, &[11, train.0 as u8]);
+            wait(&mut station, 30.0);
+            assert!(station.world().mishaps().is_empty(), "seed {seed}: {:?}", station.world().mishaps());
+            // One way round or the other.
+            let met = |sensor: SensorId| {
+                let passes = station.world().truth().passes();
+                passes.iter().any(|pass| pass.sensor == sensor || pass.sensor.0 == sensor.0 ^ 1)
+            };
+            assert!(circuit.sensors(&layout).into_iter().all(met), "seed {seed}: train {train}");
+        }
+    }
 }
