@@ -96,6 +96,14 @@ impl Pacing {
         }
     }
 
+    /// How long a message of one byte occupies the line until the next may follow, if nothing is amiss.
+    pub(super) fn word_time(&self) -> TimeSpan {
+        match self.pace {
+            Pace::Cts => BYTE_TIME + CTS_GUARD,
+            Pace::Timed { command_gap, .. } => BYTE_TIME + command_gap,
+        }
+    }
+
     pub(super) fn is_ready(&self, now: Timestamp) -> bool {
         self.ready_at().is_some_and(|at| at <= now)
     }

@@ -3,7 +3,7 @@
 use footplate_core::{SensorId, TimeSpan, Timestamp};
 
 use super::codec::Message;
-use super::exchange::{REPLY_ALLOWANCE, SILENCE, longest_poll};
+use super::exchange::{REPLY_ALLOWANCE, longest_poll};
 use super::line::time_on_line;
 use super::readings::Readings;
 use super::s88::CONTACTS_PER_MODULE;
@@ -53,7 +53,8 @@ impl Polls {
         self.held_until.map(|until| until + HOLD_GRACE)
     }
 
-    /// The request for now, unless the line is wanted for something else before it could end.
+    /// The request for now, unless the line is wanted for something else before it could end. `allowance`: how much
+    /// longer than its bytes take it may be until a solenoid can be released after it, its reply being lost.
     pub(super) fn next(
         &mut self,
         now: Timestamp,
@@ -69,7 +70,7 @@ impl Polls {
         let fits = |request: &Message| {
             free_until.is_none_or(|until| now + longest_poll(*request, REPLY_ALLOWANCE) <= until)
                 // A coil bears no lost reply either.
-                && latest_release.is_none_or(|latest| now + longest_poll(*request, allowance) + SILENCE <= latest)
+                && latest_release.is_none_or(|latest| now + longest_poll(*request, allowance) <= latest)
         };
         let all = Message::ReadModules { count: self.modules };
         let all_due = self.asked_all.is_none_or(|asked| now - asked >= ALL_EVERY);

@@ -81,19 +81,23 @@ impl Queue {
 
     /// The next of the rest; turnouts wait in their order while one is powered.
     pub(super) fn next_usual(&mut self, solenoid_powered: bool) -> Option<Command> {
-        let may_go = |waiting: &Command| !(solenoid_powered && matches!(waiting, Command::Turnout { .. }));
-        let at = self.usual.iter().position(may_go)?;
+        let at = self.usual.iter().position(|waiting| may_go(waiting, solenoid_powered))?;
         self.usual.remove(at)
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.urgent.is_empty() && self.usual.is_empty()
+    /// Whether any of them may go.
+    pub(super) fn has_next(&self, solenoid_powered: bool) -> bool {
+        !self.urgent.is_empty() || self.usual.iter().any(|waiting| may_go(waiting, solenoid_powered))
     }
 
     pub(super) fn clear(&mut self) {
         self.urgent.clear();
         self.usual.clear();
     }
+}
+
+fn may_go(waiting: &Command, solenoid_powered: bool) -> bool {
+    !(solenoid_powered && matches!(waiting, Command::Turnout { .. }))
 }
 
 fn is_speed_of(command: &Command, of: TrainId) -> bool {

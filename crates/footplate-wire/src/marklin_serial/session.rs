@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
 
 use super::codec::{EncodeError, Message};
-use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, Sending};
+use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, SILENCE, Sending};
 use super::farewell::Farewell;
 use super::pacing::Pacing;
 use super::polls::Polls;
@@ -21,6 +21,9 @@ use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
 /// How long CTS may be down before a person should know: no message and no reply takes so long.
 const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
+
+/// Words about power that bring the interface into step.
+const WORDS_INTO_STEP: i64 = 2;
 
 /// Commands since the last reply that are said again if the next is lost; older ones were long acted on.
 const SAID_AGAIN: usize = 16;
@@ -141,10 +144,14 @@ impl Interface {
     }
 
     fn next_purpose(&mut self, now: Timestamp) -> Option<(Message, Purpose)> {
-        if let Some(message) = self.recovery.pop_front() {
+        // Before the words about power the interface may take any byte for the second of something.
+        let out_of_step =
+            self.recovery.front().is_some_and(|word| matches!(word, Message::Go | Message::Stop));
+        let hurries = self.solenoid.hurries(now) && !out_of_step;
+        if let Some(message) = self.recovery.pop_front_if(|_| !hurries) {
             return Some((message, Purpose::Recovery));
         }
-        if self.solenoid.hurries(now) {
+        if hurries {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_urgent() {
@@ -164,7 +171,10 @@ impl Interface {
             self.exchange = Exchange::Quiet(Quiet::begin(now, false));
             return None;
         }
-        let request = self.polls.next(now, &self.readings, &self.solenoid, self.settings.reply_allowance)?;
+        // If the reply is lost, the solenoid is released after the silence and the words that follow it.
+        let step = TimeSpan::from_ns(self.pacing.word_time().as_ns().saturating_mul(WORDS_INTO_STEP));
+        let allowance = self.settings.reply_allowance + SILENCE + step;
+        let request = self.polls.next(now, &self.readings, &self.solenoid, allowance)?;
         Some((request, Purpose::Poll(request)))
     }
 
@@ -340,7 +350,11 @@ impl Session for Interface {
             Exchange::Sending(sending) if self.now < sending.gone() => Some(sending.gone()),
             Exchange::Sending(_) => self.pacing.ready_at(),
             Exchange::Awaiting(awaited) | Exchange::Settling(awaited) => Some(awaited.until),
-            Exchange::Quiet(quiet) => Some(quiet.until),
+            Exchange::Quiet(quiet) => {
+                let release = [self.solenoid.due(), self.solenoid.hurries_at()];
+                let coming = release.into_iter().flatten().filter(|at| *at > self.now);
+                coming.chain([quiet.until]).min()
+            }
         };
         let alarm = self.pacing.down_since().filter(|_| !self.said_not_ready);
         let alarm = alarm.map(|since| since + NOT_READY_AFTER);

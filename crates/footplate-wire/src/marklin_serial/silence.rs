@@ -47,6 +47,10 @@ impl Silence {
 
     /// A reply was lost; says so when it is the last straw.
     pub(super) fn lost(&mut self, now: Timestamp) -> Option<LinkNotice> {
+        if self.lost == 0 {
+            // The station may have fallen silent in the middle of a reply.
+            self.bytes = 0;
+        }
         self.lost = self.lost.saturating_add(1);
         let since = now - self.since?;
         let silent = since >= SILENT_AFTER && self.lost >= LOST_AT_LEAST && self.said != Some(Said::Silent);

@@ -8,8 +8,9 @@ use super::line::{BYTE_TIME, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST};
 const HOLD: TimeSpan = TimeSpan::from_ms(150);
 
 /// From here on a release goes before everything, emergency stops too: as many of them as there are trains would take
-/// longer than the coil bears, and one byte delays them by 5 ms.
-const HURRY_AFTER: TimeSpan = TimeSpan::from_ms(300);
+/// longer than the coil bears, and one byte delays them by 5 ms. With careful gaps up to 210 ms may still pass until the
+/// line is in step.
+const HURRY_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// The solenoid that is powered, if one is.
 #[derive(Debug, Clone, Default)]
@@ -50,7 +51,11 @@ impl Solenoid {
     }
 
     pub(super) fn hurries(&self, now: Timestamp) -> bool {
-        self.since().is_some_and(|since| now - since >= HURRY_AFTER)
+        self.hurries_at().is_some_and(|at| now >= at)
+    }
+
+    pub(super) fn hurries_at(&self) -> Option<Timestamp> {
+        Some(self.since()? + HURRY_AFTER)
     }
 
     /// When the line has to be free for its release at the latest: a whole command may be under way by then.

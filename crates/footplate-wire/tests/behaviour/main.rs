@@ -6,5 +6,8 @@
     reason = "a test may stop at the first surprise"
 )]
 
+mod marklin_serial_bench;
+mod marklin_serial_line;
+mod marklin_serial_mishaps;
 mod marklin_serial_round_trip;
 mod marklin_serial_vectors;

@@ -61,8 +61,11 @@ impl Interface {
     }
 
     pub(super) fn keep_quiet(&mut self, now: Timestamp, quiet: Quiet) -> bool {
-        let is_over = now >= quiet.until;
-        let interrupted = !quiet.in_doubt && (self.farewell.begun || !self.waiting.is_empty());
+        // A line that babbles on must not burn a coil.
+        let is_over = now >= quiet.until || self.solenoid.hurries(now);
+        let release_is_due = self.solenoid.due().is_some_and(|due| now >= due);
+        let command_may_go = self.waiting.has_next(self.solenoid.is_powered());
+        let interrupted = !quiet.in_doubt && (self.farewell.begun || command_may_go || release_is_due);
         if is_over {
             self.complain();
         } else if interrupted {
