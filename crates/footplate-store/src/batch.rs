@@ -6,7 +6,7 @@ use footplate_core::latency::{PollTiming, PollTimingEstimator};
 use footplate_core::track::Layout;
 use footplate_core::{Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use crate::recording::{Recording, Run, TrainAtStart};
+use crate::recording::{Recording, Run};
 use crate::store::{Store, StoreError};
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
@@ -213,7 +213,7 @@ fn batch_run(
     events: Vec<BatchEvent>,
     wanted: Option<TrainId>,
 ) -> Result<Option<BatchRun>, BatchError> {
-    let moving = moving(run);
+    let moving = run.moving();
     let only = match (run.only_train(), moving.as_slice()) {
         (Some(only), _) => only,
         (None, [only]) => *only,
@@ -234,21 +234,6 @@ fn batch_run(
         step: only.step,
         events,
     }))
-}
-
-/// The trains that move in a run, and what they did when it began: those that stand all the time close no contact.
-fn moving(run: &Run) -> Vec<TrainAtStart> {
-    let mut moving: Vec<TrainAtStart> =
-        run.trains.iter().copied().filter(|at_start| at_start.step != SpeedStep::STAND).collect();
-    for raw in &run.events {
-        if let EventKind::Speed { train, step } = raw.event.kind
-            && step != SpeedStep::STAND
-            && moving.iter().all(|known| known.train != train)
-        {
-            moving.push(TrainAtStart { train, step: SpeedStep::STAND });
-        }
-    }
-    moving
 }
 
 /// The rhythm of a recording's link, from all its reports: an excluded report still shows when polls were.

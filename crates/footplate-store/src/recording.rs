@@ -78,6 +78,23 @@ impl Run {
         }
     }
 
+    /// The trains that move, and what they did when the run began: those that stand all the time close no contact.
+    #[must_use]
+    pub fn moving(&self) -> Vec<TrainAtStart> {
+        let begin = self.trains.iter().copied();
+        let mut moving: Vec<TrainAtStart> =
+            begin.filter(|at_start| at_start.step != SpeedStep::STAND).collect();
+        for raw in &self.events {
+            if let EventKind::Speed { train, step } = raw.event.kind
+                && step != SpeedStep::STAND
+                && moving.iter().all(|known| known.train != train)
+            {
+                moving.push(TrainAtStart { train, step: SpeedStep::STAND });
+            }
+        }
+        moving
+    }
+
     /// The contacts that were reported, repeats included.
     pub fn reports(&self) -> impl Iterator<Item = (Timestamp, Report)> + '_ {
         self.events.iter().filter_map(|raw| match raw.event.kind {

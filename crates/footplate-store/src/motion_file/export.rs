@@ -1,0 +1,1 @@
+//! From a motion model to its file.

@@ -1,0 +1,60 @@
+//! What stands in the file of a motion model.
+
+use footplate_core::{Approach, SpeedStep, TrainId};
+use serde::{Deserialize, Serialize};
+
+use crate::calibration_file::Quantity;
+
+/// Names the formulas that made the numbers: it changes when the same events would give others.
+pub const MOTION_MODEL_VERSION: &str = "1";
+
+/// All that is known of how one train moves on one layout.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MotionFile {
+    /// [`MOTION_MODEL_VERSION`] of the program that made it.
+    pub model_version: String,
+    /// The layout on which it was learnt.
+    pub layout: String,
+    /// The train.
+    pub train: TrainId,
+    /// The highest step of its decoder.
+    pub highest_step: SpeedStep,
+    /// Steps that do not move the train, or not for sure.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unreliable_steps: Vec<SpeedStep>,
+    /// What it does at the steps that move it, lowest first.
+    pub steps: Vec<MotionStepForm>,
+    /// How much longer than surveyed the ways between contacts are for it, where it was there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sections: Vec<MotionSectionForm>,
+}
+
+/// A step reached from one side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MotionStepForm {
+    /// The step.
+    pub step: SpeedStep,
+    /// From which side it is reached.
+    pub approach: Approach,
+    /// The steady speed (mm/s); measurements are contacts passed at it.
+    pub speed: Quantity,
+    /// The way from the command to stand until it stands (mm); measurements are stops.
+    pub stop: Quantity,
+    /// How single stops scatter, one standard deviation (mm).
+    pub stop_scatter_mm: f64,
+    /// How long a stop takes (s).
+    pub stop_s: f64,
+}
+
+/// The way between two contacts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MotionSectionForm {
+    /// The contact at one end, by name.
+    pub from: String,
+    /// The contact at the other.
+    pub to: String,
+    /// Surveyed length (mm).
+    pub surveyed_mm: f64,
+    /// What to add to it for this train (mm).
+    pub add: Quantity,
+}

@@ -1,0 +1,12 @@
+//! What is known of how a train moves, as people and programs read it: TOML or JSON, every number with unit, uncertainty,
+//! count and date.
+//!
+//! `docs/formats/motion-model.md` describes it. The store keeps the same form. It is what is needed to drive without
+//! learning again; the truth are the events it was learnt from, and the store can replay them.
+
+mod export;
+mod form;
+mod read;
+
+pub use form::{MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm};
+pub use read::MotionFileError;

@@ -1,0 +1,108 @@
+//! How a train moves, learnt anew from what a store has kept of the sessions in which it was driven.
+//!
+//! The events are the truth and a model is what follows from them, so a session that was killed loses nothing: the next one
+//! replays what was written down and goes on from there. Events that a person has excluded are left out, and where a run
+//! ends the chain of what the train did is broken.
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::MotionFit;
+use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::{EventKind, RunId, SpeedStep, Timestamp, TrainId};
+
+use crate::recording::Run;
+use crate::store::{Store, StoreError};
+
+/// What sessions told of one train.
+#[derive(Debug, Clone)]
+pub struct MotionReplay {
+    /// What follows from it, fitted.
+    pub fit: MotionFit,
+    /// How the turnouts lay at the end, as far as was said.
+    pub turnouts: TurnoutStates,
+    /// Sessions in which the train was driven, by name.
+    pub recordings: Vec<String>,
+    /// Runs that were used.
+    pub runs: usize,
+    /// Commands to the train and reports that were used.
+    pub events: usize,
+    /// When the last of them was, since the Unix epoch, where the runs tell.
+    pub newest: Option<Timestamp>,
+    /// Runs that were not used: other trains moved, too, and nobody has told their contacts apart.
+    pub left_out: Vec<(String, RunId)>,
+}
+
+impl MotionReplay {
+    /// Replays everything that a store held at a date of a train on a layout; `highest` is the highest step of its
+    /// decoder. Recordings that were read from files count as well.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub fn of_store(
+        layout: &Layout,
+        store: &Store,
+        train: TrainId,
+        highest: SpeedStep,
+        as_of: Timestamp,
+    ) -> Result<Self, StoreError> {
+        let mut replay = Self::empty(train, highest);
+        for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
+            for stored in store.runs(recording.key, as_of)? {
+                replay.take(layout, &recording.name, &stored.accepted());
+            }
+        }
+        replay.fit.refit(layout, &SectionIndex::of(layout));
+        Ok(replay)
+    }
+
+    fn empty(train: TrainId, highest: SpeedStep) -> Self {
+        Self {
+            fit: MotionFit::new(train, highest),
+            turnouts: TurnoutStates::unknown(),
+            recordings: Vec::new(),
+            runs: 0,
+            events: 0,
+            newest: None,
+            left_out: Vec::new(),
+        }
+    }
+
+    /// Whether anything was found.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.runs == 0
+    }
+
+    fn take(&mut self, layout: &Layout, recording: &str, run: &Run) {
+        let moving: Vec<TrainId> = run.moving().iter().map(|at_start| at_start.train).collect();
+        let train = self.fit.model().train();
+        self.fit.interrupt();
+        let is_own = moving == [train];
+        if moving.contains(&train) && !is_own {
+            self.left_out.push((recording.to_owned(), run.id));
+        }
+        for raw in &run.events {
+            let is_about_it = match raw.event.kind {
+                EventKind::Turnout { turnout, curved } => {
+                    self.turnouts.set(turnout, Leg::from_curved(curved));
+                    false
+                }
+                EventKind::Sensor(_) => true,
+                EventKind::Speed { train: of, .. }
+                | EventKind::Reverse { train: of }
+                | EventKind::Stopped { train: of, .. } => of == train,
+            };
+            if is_own && is_about_it {
+                self.fit.take(layout, &self.turnouts, &raw.event);
+                self.events += 1;
+                let at = run.began_at.map(|began_at| began_at + (raw.event.time - Timestamp::ZERO));
+                self.newest = self.newest.max(at);
+            }
+        }
+        if is_own {
+            self.runs += 1;
+            if self.recordings.last().is_none_or(|last| last != recording) {
+                self.recordings.push(recording.to_owned());
+            }
+        }
+    }
+}
