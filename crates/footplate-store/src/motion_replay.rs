@@ -50,7 +50,7 @@ impl MotionReplay {
                 replay.take(layout, &recording.name, &stored.accepted());
             }
         }
-        replay.fit.refit(layout, &SectionIndex::of(layout));
+        replay.fit.refit(&SectionIndex::of(layout));
         Ok(replay)
     }
 

@@ -51,6 +51,17 @@ impl Spread {
         Self { side, covariance: (0..side * side).map(at).collect() }
     }
 
+    /// Of a lower triangle, row after row, that is as long as `side` asks for.
+    pub(super) fn of_lower_triangle(side: usize, lower: &[f64]) -> Self {
+        let at = |i: usize, j: usize| lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+        Self { side, covariance: (0..side * side).map(|place| at(place / side, place % side)).collect() }
+    }
+
+    /// Covariance of two numbers.
+    pub(super) fn between(&self, one: usize, other: usize) -> f64 {
+        if one.max(other) < self.side { self.covariance[one * self.side + other] } else { 0.0 }
+    }
+
     /// Variance of one number.
     pub(super) fn variance(&self, place: usize) -> f64 {
         if place < self.side { self.covariance[place * self.side + place].max(0.0) } else { 0.0 }
