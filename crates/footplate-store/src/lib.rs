@@ -12,6 +12,7 @@ mod described;
 mod document;
 mod layout_file;
 mod line_file;
+mod motion_file;
 mod motion_replay;
 pub mod odometry;
 mod published_table;
@@ -44,6 +45,9 @@ pub use layout_file::{
     layout_named, parse_layout, read_layout, write_layout,
 };
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
+pub use motion_file::{
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionFileError, MotionSectionForm, MotionStepForm, UseForm,
+};
 pub use motion_replay::MotionReplay;
 pub use published_table::{
     CheckedFigure, CountedFrom, CrossCheck, NothingToCompare, PublishedFigure, PublishedQuantity,

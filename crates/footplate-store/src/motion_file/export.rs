@@ -1,1 +1,199 @@
-//! From a motion model to its file.
+//! From a motion model to its file, and back.
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::{MotionModel, MotionNumbers, NumbersError, StepUse};
+use footplate_core::track::{Hop, Layout};
+use footplate_core::{Approach, Length, SpeedStep, Timestamp};
+
+use super::form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
+use crate::calibration_file::Quantity;
+
+impl MotionFile {
+    /// What is known of a train on a layout. `newest`: when the last event behind it was, since the Unix epoch.
+    #[must_use]
+    pub fn of(layout: &Layout, model: &MotionModel, newest: Option<Timestamp>) -> Self {
+        let sections = SectionIndex::of(layout);
+        let numbers = model.numbers();
+        let measured_at_s = newest.map(Timestamp::as_s);
+        let steps = || (1..=model.highest().get()).filter_map(SpeedStep::new);
+        let known = steps().filter(|step| model.uses(*step) == StepUse::Moves);
+        Self {
+            model_version: MOTION_MODEL_VERSION.to_owned(),
+            layout: layout.name().to_owned(),
+            train: model.train(),
+            highest_step: model.highest(),
+            unreliable_steps: steps().filter(|step| model.uses(*step) == StepUse::Unreliable).collect(),
+            steps: known.flat_map(|step| both_ways(model, step, measured_at_s)).collect(),
+            sections: named(layout, &sections)
+                .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
+                .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
+                .collect(),
+            exact: exact(&numbers, measured_at_s),
+        }
+    }
+
+    /// The model, to drive with. Sections that the layout does not have are left out.
+    ///
+    /// # Errors
+    /// The numbers make no model.
+    pub fn model(&self, layout: &Layout) -> Result<MotionModel, NumbersError> {
+        let index = SectionIndex::of(layout);
+        let sections = self.sections.iter().filter_map(|form| {
+            let (from, to) = (layout.node_named(&form.from)?, layout.node_named(&form.to)?);
+            let hop = layout.hops_from(from).find(|hop| hop.to == to)?;
+            Some((index.section(hop.id)?, 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
+        });
+        let exact = &self.exact;
+        MotionModel::from_numbers(&MotionNumbers {
+            train: self.train,
+            highest: self.highest_step,
+            values: exact.values.clone(),
+            covariance: exact.covariance.clone(),
+            sections: sections.collect(),
+            uses: exact.uses.iter().map(|form| form.step_use()).collect(),
+            counts: exact
+                .counts
+                .iter()
+                .map(|[c, s, above_c, above_s]| [(*c, *s), (*above_c, *above_s)])
+                .collect(),
+            scatter_scale: exact.scatter_scale,
+            date: exact.measured_at_s.map_or(Timestamp::ZERO, Timestamp::from_s),
+        })
+    }
+}
+
+fn both_ways(
+    model: &MotionModel,
+    step: SpeedStep,
+    measured_at_s: Option<f64>,
+) -> impl Iterator<Item = MotionStepForm> + '_ {
+    [Approach::Below, Approach::Above].into_iter().map(move |approach| {
+        let (speed, stop) = (model.speed(step, approach), model.stop(step, approach));
+        let quantity = |unit: &str, value, uncertainty, measurements| Quantity {
+            value,
+            uncertainty,
+            unit: unit.to_owned(),
+            measurements,
+            measured_at_s,
+        };
+        MotionStepForm {
+            step,
+            approach,
+            speed: quantity("mm/s", speed.value.as_mm_per_s(), speed.uncertainty.as_mm_per_s(), speed.count),
+            stop: quantity("mm", stop.distance.as_mm(), stop.doubt.as_mm(), stop.count),
+            stop_scatter_mm: stop.scatter.as_mm(),
+            stop_s: stop.time.as_s(),
+        }
+    })
+}
+
+/// Every section with the first hop that runs over it, which names it.
+fn named<'l>(layout: &'l Layout, sections: &'l SectionIndex) -> impl Iterator<Item = (Hop<'l>, usize)> {
+    let mut seen: Vec<usize> = Vec::new();
+    layout.hops().filter_map(move |hop| {
+        let section = sections.section(hop.id).filter(|section| !seen.contains(section))?;
+        seen.push(section);
+        Some((hop, section))
+    })
+}
+
+fn section_form(
+    layout: &Layout,
+    sections: &SectionIndex,
+    model: &MotionModel,
+    hop: &Hop<'_>,
+    measured_at_s: Option<f64>,
+) -> MotionSectionForm {
+    let [length, uncertainty] = model.length(sections, hop);
+    let add: Length = length - hop.length;
+    MotionSectionForm {
+        from: layout.node_name(hop.from).to_owned(),
+        to: layout.node_name(hop.to).to_owned(),
+        surveyed_mm: hop.length.as_mm(),
+        add: Quantity {
+            value: add.as_mm(),
+            uncertainty: uncertainty.as_mm(),
+            unit: "mm".to_owned(),
+            // All passages of all trips are fitted together; there are no single measurements of a section.
+            measurements: 0,
+            measured_at_s,
+        },
+    }
+}
+
+fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
+    let counts = numbers.counts.iter().map(|[below, above]| [below.0, below.1, above.0, above.1]);
+    ExactForm {
+        measured_at_s,
+        scatter_scale: numbers.scatter_scale,
+        counts: counts.collect(),
+        uses: numbers.uses.iter().map(|found| UseForm::of(*found)).collect(),
+        values: numbers.values.clone(),
+        covariance: numbers.covariance.clone(),
+    }
+}
+
+impl UseForm {
+    const fn of(found: StepUse) -> Self {
+        match found {
+            StepUse::Untried => Self::Untried,
+            StepUse::Moves => Self::Moves,
+            StepUse::Unreliable => Self::Unreliable,
+        }
+    }
+
+    const fn step_use(self) -> StepUse {
+        match self {
+            Self::Untried => StepUse::Untried,
+            Self::Moves => StepUse::Moves,
+            Self::Unreliable => StepUse::Unreliable,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::TrainId;
+
+    use super::*;
+
+    fn model() -> MotionModel {
+        let mut numbers = MotionModel::unknown(TrainId(24), SpeedStep::new(14).unwrap()).numbers();
+        numbers.uses[9] = StepUse::Moves;
+        numbers.uses[1] = StepUse::Unreliable;
+        numbers.counts[9] = [(31, 4), (12, 2)];
+        numbers.sections = vec![(0, 0.012, 4e-6), (7, -0.003, 9e-6)];
+        numbers.date = Timestamp::from_s(1_795_248_000.0);
+        MotionModel::from_numbers(&numbers).unwrap()
+    }
+
+    #[test]
+    fn a_file_says_what_the_model_says_and_makes_the_same_model() {
+        let layout = crate::built_in("track-a").unwrap().layout;
+        let model = model();
+        let file = MotionFile::of(&layout, &model, Some(Timestamp::from_s(1_795_248_000.0)));
+        // Step 9 moves the train, from either side; step 1 does not, and the others were never tried.
+        assert_eq!(file.steps.len(), 2);
+        assert_eq!((file.steps[0].stop.measurements, file.steps[1].speed.measurements), (4, 12));
+        assert_eq!(file.unreliable_steps, [SpeedStep::new(1).unwrap()]);
+        assert_eq!(file.sections.len(), 2);
+        assert!((file.sections[0].add.value - 12.0).abs() < 1e-9);
+        for text in [toml::to_string(&file).unwrap(), serde_json::to_string(&file).unwrap()] {
+            let again: MotionFile = if text.starts_with('{') {
+                serde_json::from_str(&text).unwrap()
+            } else {
+                toml::from_str(&text).unwrap()
+            };
+            assert_eq!(again, file);
+            let back = again.model(&layout).unwrap();
+            let step = SpeedStep::new(9).unwrap();
+            assert_eq!(back.stop(step, Approach::Above), model.stop(step, Approach::Above));
+            assert_eq!(back.speed(step, Approach::Below).value, model.speed(step, Approach::Below).value);
+            let sections = SectionIndex::of(&layout);
+            for hop in layout.hops() {
+                let (one, other) = (back.length(&sections, &hop), model.length(&sections, &hop));
+                assert!((one[0] - other[0]).as_mm().abs() < 1e-9 && (one[1] - other[1]).as_mm().abs() < 1e-9);
+            }
+        }
+    }
+}

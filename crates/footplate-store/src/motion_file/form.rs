@@ -27,6 +27,39 @@ pub struct MotionFile {
     /// How much longer than surveyed the ways between contacts are for it, where it was there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<MotionSectionForm>,
+    /// What the model is made of, for programs.
+    pub exact: ExactForm,
+}
+
+/// The numbers of a model to the last bit ([`MotionNumbers`](footplate_core::calibration::motion::MotionNumbers)); what
+/// stands above follows from them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExactForm {
+    /// When the newest event was, in seconds since the Unix epoch, where that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_at_s: Option<f64>,
+    /// How far stops scatter against what trains usually do.
+    pub scatter_scale: f64,
+    /// By step from 0 on: contacts passed and stops made from below, and the same from above.
+    pub counts: Vec<[u32; 4]>,
+    /// By step from 0 on: `untried`, `moves` or `unreliable`.
+    pub uses: Vec<UseForm>,
+    /// The numbers by which it answers its commands, in SI units and the order of the model.
+    pub values: Vec<f64>,
+    /// Their covariance: the lower triangle, row after row.
+    pub covariance: Vec<f64>,
+}
+
+/// What experience says of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UseForm {
+    /// Never tried.
+    Untried,
+    /// It moves the train.
+    Moves,
+    /// Not to be relied upon.
+    Unreliable,
 }
 
 /// A step reached from one side.

@@ -8,5 +8,5 @@ mod export;
 mod form;
 mod read;
 
-pub use form::{MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm};
+pub use form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
 pub use read::MotionFileError;

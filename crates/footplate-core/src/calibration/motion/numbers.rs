@@ -181,7 +181,7 @@ mod tests {
         let count = refused(&|numbers| numbers.values.truncate(3));
         assert!(matches!(count, NumbersError::WrongCount { what: "numbers", found: 3, .. }), "{count}");
         assert!(matches!(
-            refused(&|numbers| drop(numbers.covariance.pop())),
+            refused(&|numbers| numbers.covariance.truncate(9)),
             NumbersError::WrongCount { .. }
         ));
         for (what, error) in [

@@ -1,0 +1,196 @@
+//! Reading the file of a motion model, and keeping it in a store.
+
+use std::fs;
+use std::path::Path;
+
+use footplate_core::{Timestamp, TrainId};
+
+use super::form::{MOTION_MODEL_VERSION, MotionFile};
+use crate::store::{CalibrationKind, NewCalibration, Store, StoreError};
+use crate::whole_file::write_whole;
+
+/// Larger files are no motion model: one of a decoder with 126 steps has about 1 MB.
+const LARGEST: u64 = 16 << 20;
+
+/// Why a motion model could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MotionFileError {
+    /// The file could not be read or written.
+    #[error("{file}: {source}")]
+    System {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is too large to be a motion model.
+    #[error("{file}: {bytes} bytes, which no motion model has; one has at most {LARGEST}")]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// Its size.
+        bytes: u64,
+    },
+    /// Its name does not say what is in it.
+    #[error("{file}: a motion model is a .toml or .json file")]
+    UnknownEnding {
+        /// The file.
+        file: String,
+    },
+    /// It is no motion model.
+    #[error("{file}: {problem} (docs/formats/motion-model.md says what stands where)")]
+    Form {
+        /// The file, or the place in the store.
+        file: String,
+        /// What is wrong, with line and column.
+        problem: String,
+    },
+    /// It was made by formulas that give other numbers.
+    #[error(
+        "{file}: made by version {found} of the model, this program has version {MOTION_MODEL_VERSION}; learn it anew \
+         from the store in which its events are"
+    )]
+    OtherModel {
+        /// The file, or the place in the store.
+        file: String,
+        /// Its version.
+        found: String,
+    },
+    /// The store could not be read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// Whether a path ends in `.toml`; `None` if it ends in neither that nor `.json`.
+fn is_toml(path: &Path) -> Option<bool> {
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("toml") => Some(true),
+        Some("json") => Some(false),
+        _ => None,
+    }
+}
+
+impl MotionFile {
+    /// Reads a file that [`write`](Self::write) wrote, TOML or JSON by its ending.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read(path: &Path) -> Result<Self, MotionFileError> {
+        let file = path.display().to_string();
+        let system = |source| MotionFileError::System { file: file.clone(), source };
+        let bytes = fs::metadata(path).map_err(system)?.len();
+        if bytes > LARGEST {
+            return Err(MotionFileError::TooLarge { file, bytes });
+        }
+        let text = fs::read_to_string(path).map_err(system)?;
+        let parsed = match is_toml(path) {
+            Some(true) => toml::from_str(&text).map_err(|error: toml::de::Error| error.to_string()),
+            Some(false) => serde_json::from_str(&text).map_err(|error| error.to_string()),
+            None => return Err(MotionFileError::UnknownEnding { file }),
+        };
+        Self::checked(file, parsed)
+    }
+
+    /// Writes it, TOML or JSON by the ending of the name.
+    ///
+    /// # Errors
+    /// The name has another ending, or the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), MotionFileError> {
+        let file = path.display().to_string();
+        let form = |problem| MotionFileError::Form { file: file.clone(), problem };
+        let text = match is_toml(path) {
+            Some(true) => toml::to_string(self).map_err(|error| form(error.to_string()))?,
+            Some(false) => serde_json::to_string_pretty(self).map_err(|error| form(error.to_string()))?,
+            None => return Err(MotionFileError::UnknownEnding { file }),
+        };
+        write_whole(path, text.as_bytes()).map_err(|source| MotionFileError::System { file, source })
+    }
+
+    /// Keeps it in a store, as made `now` of the events that were there at `as_of`.
+    ///
+    /// # Errors
+    /// The store cannot be written.
+    pub fn keep(&self, store: &mut Store, as_of: Timestamp, now: Timestamp) -> Result<(), MotionFileError> {
+        let file = || format!("the motion model of train {}", self.train);
+        let body = serde_json::to_string(self)
+            .map_err(|error| MotionFileError::Form { file: file(), problem: error.to_string() })?;
+        let new = NewCalibration {
+            kind: CalibrationKind::Motion,
+            train: self.train,
+            as_of,
+            model_version: &self.model_version,
+            body: &body,
+        };
+        Ok(store.keep_calibration(new, now)?)
+    }
+
+    /// The model of a train that was in force at a date.
+    ///
+    /// # Errors
+    /// The store cannot be read, or holds one that another version of the model made.
+    pub fn of_store(store: &Store, train: TrainId, at: Timestamp) -> Result<Option<Self>, MotionFileError> {
+        let Some(kept) = store.calibration(CalibrationKind::Motion, train, at)? else { return Ok(None) };
+        let place = format!("{}, motion model of train {train}", store.path().display());
+        if kept.model_version != MOTION_MODEL_VERSION {
+            return Err(MotionFileError::OtherModel { file: place, found: kept.model_version });
+        }
+        let parsed = serde_json::from_str(&kept.body).map_err(|error| error.to_string());
+        Self::checked(place, parsed).map(Some)
+    }
+
+    fn checked(file: String, parsed: Result<Self, String>) -> Result<Self, MotionFileError> {
+        let form: Self = parsed.map_err(|problem| MotionFileError::Form {
+            file: file.clone(),
+            problem: problem.trim_end().to_owned(),
+        })?;
+        if form.model_version != MOTION_MODEL_VERSION {
+            return Err(MotionFileError::OtherModel { file, found: form.model_version });
+        }
+        Ok(form)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::SpeedStep;
+    use footplate_core::calibration::motion::MotionModel;
+
+    use super::*;
+
+    fn file() -> MotionFile {
+        let layout = crate::built_in("track-a").unwrap().layout;
+        MotionFile::of(&layout, &MotionModel::unknown(TrainId(24), SpeedStep::new(14).unwrap()), None)
+    }
+
+    #[test]
+    fn a_model_comes_back_from_a_file_and_from_a_store() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["motion.toml", "motion.json"] {
+            let path = folder.path().join(name);
+            file().write(&path).unwrap();
+            assert_eq!(MotionFile::read(&path).unwrap(), file());
+        }
+        let mut store = Store::open_or_create(&folder.path().join("railway.db")).unwrap();
+        let at = Timestamp::from_s;
+        assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), None);
+        file().keep(&mut store, at(1.0), at(2.0)).unwrap();
+        assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), Some(file()));
+        // It is no calibration of recordings.
+        assert_eq!(store.calibration(CalibrationKind::Recordings, TrainId(24), at(9.0)).unwrap(), None);
+    }
+
+    #[test]
+    fn what_is_no_model_is_told_apart_from_one_of_another_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let other = MotionFile { model_version: "0".to_owned(), ..file() };
+        other.write(&path("old.toml")).unwrap();
+        let refused = MotionFile::read(&path("old.toml")).unwrap_err().to_string();
+        assert!(refused.contains("made by version 0 of the model, this program has version 1"), "{refused}");
+        fs::write(path("letter.toml"), "Dear train,\n").unwrap();
+        assert!(matches!(MotionFile::read(&path("letter.toml")), Err(MotionFileError::Form { .. })));
+        assert!(matches!(file().write(&path("model.xml")), Err(MotionFileError::UnknownEnding { .. })));
+        assert!(matches!(MotionFile::read(&path("none.toml")), Err(MotionFileError::System { .. })));
+    }
+}
