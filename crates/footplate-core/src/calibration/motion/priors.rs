@@ -11,6 +11,8 @@ use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
 use crate::linalg::NormalEquations;
 
+/// How well the total of all sections run over counts as the survey has it (m).
+const TOTAL: f64 = 0.001;
 /// A train feels a hop up to some per cent longer or shorter than it is, for curves and slopes (published section
 /// means: 1 to 3 %).
 const FELT: f64 = 0.02;
@@ -73,6 +75,12 @@ pub(super) fn add_priors(
     }
     for (section, column) in &columns.sections {
         equations.add(&[(*column, 1.0)], 0.0, section_variance(sections, *section));
+    }
+    // Speeds and lengths could all be longer by the same part, and no timing would tell. The survey's total is the
+    // measure: all that is asked of a model, where a train comes to rest, is the same in any.
+    let all: Vec<(usize, f64)> = columns.sections.values().map(|column| (*column, 1.0)).collect();
+    if !all.is_empty() {
+        equations.add(&all, 0.0, TOTAL * TOTAL);
     }
     for (place, trip) in trips.iter().enumerate() {
         if !trip.continues {
