@@ -23,6 +23,11 @@ const MOVE_LIMIT: TimeSpan = TimeSpan::from_s(30.0);
 const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
 /// A train that is looked for runs about as fast as this, slow enough to be stopped anywhere.
 const FINDING_SPEED: Speed = Speed::from_mm_per_s(150.0);
+/// A stop that scatters by so many times as much as the surest one is worth the time that a faster step saves ...
+const AS_SURE: f64 = 1.5;
+/// ... and so is one that scatters by no more than this: what stops from medium steps repeat to (4 mm), and as much
+/// doubt.
+const SURE: Length = Length::from_mm(8.0);
 /// Stops before this many standard deviations of the stopping distance leave a margin for the settled stretch.
 const STOP_MARGIN: f64 = 3.0;
 
@@ -46,8 +51,9 @@ impl DrivenTrain {
         fast_enough.or(steps.last()).copied().unwrap_or(self.model.highest())
     }
 
-    /// The step from which a train at rest comes to rest at a place: the fastest at which it is settled before a
-    /// contact that is passed in time before the command; on shorter ways the one whose rest is surest.
+    /// The step from which a train at rest comes to rest at a place. Where it can be settled before a contact that is
+    /// passed in time before the command: the fastest from which it stops about as surely as from any. On shorter ways
+    /// the one whose rest is surest.
     pub(super) fn approach_step(
         &self,
         ground: Ground<'_>,
@@ -65,9 +71,21 @@ impl DrivenTrain {
             };
         }
         let steps = self.usable_steps();
-        let settled = steps.iter().rev().find(|step| self.settles_before(ground, located, at, **step));
-        if let Some(step) = settled {
-            return Ok(*step);
+        let settled: Vec<(SpeedStep, Length)> = steps
+            .iter()
+            .filter(|step| self.settles_before(ground, located, at, **step))
+            .map(|step| (*step, self.stop_spread(*step)))
+            .collect();
+        let surest_stop = settled.iter().map(|(_, spread)| *spread).reduce(Length::min);
+        if let Some(surest) = surest_stop {
+            let sure_enough = (surest * AS_SURE).max(SURE);
+            let is_lively = |step: SpeedStep| self.model.speed(step, Approach::Below).value >= FINDING_SPEED;
+            let sure = || settled.iter().filter(|(_, spread)| *spread <= sure_enough);
+            let fastest = sure().next_back().filter(|(step, _)| is_lively(*step));
+            // No train crawls all the way for a few millimetres; it might also stall.
+            let fastest =
+                fastest.or(settled.iter().find(|(step, _)| is_lively(*step))).or(sure().next_back());
+            return fastest.map(|(step, _)| *step).ok_or_else(out_of_reach);
         }
         let mut surest: Option<(SpeedStep, Length)> = None;
         let mut slowest: Option<(SpeedStep, TimeSpan)> = None;
@@ -101,6 +119,12 @@ impl DrivenTrain {
             Some(beyond) => self.too_near(ground, at, beyond, destination),
             None => self.no_way(ground, at.node, destination),
         })
+    }
+
+    /// One standard deviation of stops from a settled step.
+    fn stop_spread(&self, step: SpeedStep) -> Length {
+        let stop = self.model.stop(step, Approach::Below);
+        Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
     }
 
     /// Whether a contact is passed at a settled speed, in time before the command to stop.

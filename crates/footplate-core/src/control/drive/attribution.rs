@@ -66,7 +66,7 @@ pub(super) fn explain(
     if let Some(train) = only(&mut lost) {
         return Some(Explanation::Train(train));
     }
-    let mut overdue = located().filter(|train| train.is_overdue()).map(DrivenTrain::id);
+    let mut overdue = located().filter(|train| train.unseen().is_some()).map(DrivenTrain::id);
     only(&mut overdue).map(Explanation::Strayed)
 }
 

@@ -5,8 +5,9 @@ use crate::estimation::{DueContact, Ground, Located, Locator, PassedContact, Way
 use crate::event::{Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
+use crate::units::Length;
 
-use super::felt_way::{counted_from, landmark_at};
+use super::felt_way::{contacts_until, counted_from, landmark_at};
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
@@ -16,8 +17,10 @@ use super::turning::turned;
 
 /// A command of two bytes takes this long on a line of 2400 baud with eleven bits a byte (Märklin 6050).
 pub(super) const LINE_TIME: TimeSpan = TimeSpan::from_us(9_167);
-/// Beyond the time to rest that is foreseen: decoders creep at the end, and nothing is in a hurry then.
+/// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
+/// then.
 const REST_MARGIN: TimeSpan = TimeSpan::from_ms(300);
+const REST_MARGIN_PART: f64 = 0.2;
 /// Where no time to rest is foreseen: longer than any train of the published tables takes (up to 5 s).
 const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
 /// A command is written within two polls of a few dozen bytes; after this long the line is not what it was.
@@ -26,6 +29,8 @@ const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
 /// And the train is lost when at least this long has passed, or twice the way there: contacts are missed now and then.
 const LOST: TimeSpan = TimeSpan::from_s(10.0);
+/// A contact this many standard deviations behind a train has certainly been passed, if the train runs as it should.
+const CERTAINLY: f64 = 4.0;
 /// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
 const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
 
@@ -43,6 +48,8 @@ pub(super) struct DrivenTrain {
     due: Option<DueContact>,
     since: Timestamp,
     overdue_said: bool,
+    /// A contact that should have reported it, and nothing has reported it since.
+    unseen: Option<SensorId>,
 }
 
 impl DrivenTrain {
@@ -56,6 +63,7 @@ impl DrivenTrain {
             due: None,
             since: Timestamp::ZERO,
             overdue_said: false,
+            unseen: None,
         }
     }
 
@@ -82,9 +90,16 @@ impl DrivenTrain {
         !self.stands(ground, now)
     }
 
-    /// Whether a contact should have reported it long ago.
-    pub(super) const fn is_overdue(&self) -> bool {
-        self.overdue_said
+    /// A contact that should have reported it long ago: it may never have come there.
+    pub(super) const fn unseen(&self) -> Option<SensorId> {
+        self.unseen
+    }
+
+    /// A person says where it is.
+    pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
+        self.locator.place(now, at, uncertainty);
+        self.unseen = None;
+        self.expect_next(ground, now);
     }
 
     pub(super) const fn is_told(&self) -> bool {
@@ -206,7 +221,10 @@ impl DrivenTrain {
                     Phase::Telling { promise } => promise,
                     _ => None,
                 });
-                let until = rest.map_or(now + REST_UNFORESEEN, |rest| rest.time.max(now) + REST_MARGIN);
+                let until = rest.map_or(now + REST_UNFORESEEN, |rest| {
+                    let takes = (rest.time - now).max(TimeSpan::ZERO);
+                    now + TimeSpan::from_s(takes.as_s() * (1.0 + REST_MARGIN_PART)) + REST_MARGIN
+                });
                 self.task = Some(Task { phase: Phase::Settling { promise, until }, ..task });
             }
             (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(ground, now, out),
@@ -223,6 +241,7 @@ impl DrivenTrain {
         passed: PassedContact,
         out: &mut Outputs,
     ) {
+        self.unseen = None;
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.due });
         let Some(task) = self.task else { return };
@@ -298,12 +317,13 @@ impl DrivenTrain {
         }
         if self.overdue_said {
             self.locator.lose();
-            self.due = None;
+            (self.due, self.unseen) = (None, None);
             let train = self.id();
             out.say(DriveNotice::Lost { train });
             self.give_up(now, Refusal::Lost { train }, out);
         } else {
             self.overdue_said = true;
+            self.unseen.get_or_insert(due.sensor);
             out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
         }
     }
@@ -357,13 +377,20 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        let achieved = self.located(ground, time).map(|located| Achieved {
+        let located = self.located(ground, time);
+        let achieved = located.map(|located| Achieved {
             at: landmark_at(ground, &self.model, located.at),
             uncertainty: located.uncertainty,
             error: target.and_then(|target| self.beyond(ground, located.at, target)),
         });
+        if let Some(located) = located {
+            let certain = located.at.way - located.uncertainty * CERTAINLY;
+            let passed = contacts_until(ground, &self.model, located.at.node, certain).last();
+            self.unseen = self.unseen.or(passed.map(|(sensor, _)| sensor));
+        }
         self.task = None;
-        out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise }));
+        let unseen = self.unseen;
+        out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
     }
 
     /// The next contact and when it is due.

@@ -129,8 +129,7 @@ impl Driver {
     /// A person put a train there, or read off where it stands.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         if let Some(train) = self.trains.get_mut(&train) {
-            train.locator.place(now, at, uncertainty);
-            train.expect_next(self.track.ground(), now);
+            train.place(self.track.ground(), now, at, uncertainty);
         }
     }
 

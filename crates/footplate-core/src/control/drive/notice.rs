@@ -138,6 +138,9 @@ pub struct Finished {
     pub achieved: Option<Achieved>,
     /// What was promised when the stop was commanded; only if there was a target.
     pub promise: Option<Promise>,
+    /// A contact that should have reported the train on its way and did not: it was missed, or the train stands short of
+    /// it, and what is believed of it is wrong.
+    pub unseen: Option<SensorId>,
 }
 
 /// Where a train came to rest, as is believed without having measured it.

@@ -53,7 +53,9 @@ impl DrivenTrain {
         if !stands && self.told == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        let Some(located) = self.located(ground, now) else {
+        // Who was not seen where it should have been is looked for first.
+        let located = self.located(ground, now).filter(|_| self.unseen().is_none() || !stands);
+        let Some(located) = located else {
             self.take(
                 Task { order, goal: Goal::RestAt(destination), phase: Phase::Finding { since: now } },
                 out,

@@ -278,6 +278,7 @@ impl Conductor {
     fn done(&mut self, finished: &Finished) {
         let Some(step) = self.pending.remove(&finished.order) else { return };
         let achieved = finished.achieved;
+        self.fell_short |= finished.unseen.is_some();
         let name = |achieved: Achieved| self.tongue().place(achieved.at);
         let ended = Ended {
             achieved: achieved.map(name),
