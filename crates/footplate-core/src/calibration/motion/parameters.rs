@@ -141,7 +141,12 @@ impl<'v> Answers<'v> {
             return below;
         }
         let full = self.at(HYSTERESIS) + self.at(hysteresis_at(step, self.highest));
-        (below + full * (below / FULL_HYSTERESIS_FROM).min(1.0)).max(0.5 * below)
+        (below + full * Self::hysteresis_part(below)).max(0.5 * below)
+    }
+
+    /// The part of full hysteresis that a speed (m/s) shows.
+    pub(super) const fn hysteresis_part(speed: f64) -> f64 {
+        (speed / FULL_HYSTERESIS_FROM).min(1.0)
     }
 
     /// Delay from command to effect of a running train (s).
