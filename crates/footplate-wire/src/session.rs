@@ -19,6 +19,9 @@ pub trait Session {
     /// The station's hand-shake line is `up` (bytes may come) now; also said once at the beginning.
     fn handle_cts(&mut self, now: Timestamp, up: bool);
 
+    /// The line was lost and has been opened again: what was on it is gone, and the station may wait for the rest of it.
+    fn handle_reopened(&mut self, now: Timestamp);
+
     /// Say this to the station as soon as the line is free.
     ///
     /// # Errors

@@ -1,10 +1,26 @@
 //! What time it is, and dates as people read and write them. Nothing below the program asks a clock.
 
 use std::str::FromStr;
+use std::time::{Duration, Instant};
 
 use footplate_core::Timestamp;
 use jiff::civil::{Date, DateTime};
 use jiff::tz::TimeZone;
+
+/// How long something takes, whatever becomes of the date meanwhile.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stopwatch(Instant);
+
+impl Stopwatch {
+    #[expect(clippy::disallowed_methods, reason = "the program's runtime is where time is asked for")]
+    pub(crate) fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    pub(crate) fn elapsed(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
 
 /// The time now, since the Unix epoch.
 pub(crate) fn now() -> Timestamp {

@@ -3,8 +3,12 @@
 mod clock;
 mod commands;
 mod counted;
+#[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
+mod link;
 mod progress;
 mod reading;
+#[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
+mod runtime;
 mod spread;
 
 use std::io::{ErrorKind, Write};

@@ -30,8 +30,9 @@ impl Pace {
     pub const CAREFUL: Self =
         Self::Timed { byte_gap: TimeSpan::from_ms(10), command_gap: TimeSpan::from_ms(100) };
 
-    /// No gaps, for an interface that keeps up with the line, as a simulated one does.
-    pub const FAST: Self = Self::Timed { byte_gap: TimeSpan::ZERO, command_gap: TimeSpan::ZERO };
+    /// Short gaps, for an interface that keeps up, as a simulated one does, or an adapter that keeps the hand-shake
+    /// itself: longer than the 2 ms for which CTS was seen down.
+    pub const FAST: Self = Self::Timed { byte_gap: TimeSpan::from_ms(3), command_gap: TimeSpan::from_ms(3) };
 }
 
 /// Keeps the pace.

@@ -122,7 +122,11 @@ impl Interface {
                 self.said_not_ready = true;
                 self.notify(LinkNotice::NotReady { since: now - since });
             }
-            None => self.said_not_ready = false,
+            None => {
+                if core::mem::take(&mut self.said_not_ready) {
+                    self.silence.doubt();
+                }
+            }
             Some(_) => {}
         }
     }
@@ -312,6 +316,12 @@ impl Session for Interface {
 
     fn handle_cts(&mut self, now: Timestamp, up: bool) {
         self.pacing.cts(now, up);
+        self.go_on(now);
+    }
+
+    fn handle_reopened(&mut self, now: Timestamp) {
+        self.put_in_doubt(now);
+        self.pacing = Pacing::new(now, self.settings.pace);
         self.go_on(now);
     }
 

@@ -45,6 +45,11 @@ impl Silence {
         news.then_some(LinkNotice::Answers)
     }
 
+    /// Something else has cast doubt on the station: its next answer is news.
+    pub(super) fn doubt(&mut self) {
+        self.said = None;
+    }
+
     /// A reply was lost; says so when it is the last straw.
     pub(super) fn lost(&mut self, now: Timestamp) -> Option<LinkNotice> {
         if self.lost == 0 {

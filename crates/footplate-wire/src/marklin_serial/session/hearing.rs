@@ -2,7 +2,7 @@
 
 use footplate_core::{Command, Timestamp};
 
-use super::super::exchange::{Awaited, Exchange, Quiet, reply_bytes};
+use super::super::exchange::{Awaited, Exchange, Purpose, Quiet, Sending, reply_bytes};
 use super::super::readings::Read;
 use super::super::s88::decode_reply;
 use super::Interface;
@@ -14,13 +14,22 @@ impl Interface {
         let found = self.reply.as_bytes().len();
         self.notify(LinkNotice::ReplyLost { expected: reply_bytes(awaited.request), found });
         self.silence.heard_stray(found);
-        self.disturbed = false;
         let silent = self.silence.lost(now);
         self.output.extend(silent.map(Transmit::Notice));
+        self.put_in_doubt(now);
+        true
+    }
+
+    /// Bytes may be lost in either direction: wait, bring the interface into step, and say again what it may have missed.
+    pub(super) fn put_in_doubt(&mut self, now: Timestamp) {
+        // What was being said may have come half. A release is said again by itself.
+        if let Exchange::Sending(Sending { purpose: Purpose::Told(command), .. }) = self.exchange {
+            self.unanswered.push(command);
+        }
+        self.disturbed = false;
         self.exchange = Exchange::Quiet(Quiet::begin(now, true));
         self.recover();
         self.say_again();
-        true
     }
 
     /// What the interface may have missed before the lost reply.

@@ -1,0 +1,323 @@
+//! What a person writes to say which station is meant.
+//!
+//! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…]` is a simulated one in this process,
+//! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
+//! `[?pace=careful&cts=no&modules=5&speed=20]`.
+
+use std::fmt::{Display, Formatter, Result as FmtResult};
+use std::str::FromStr;
+
+use footplate_core::TrainId;
+use footplate_sim::LawFamily;
+
+const SIMULATED: &str = "sim:";
+const SERIAL: &str = "marklin-serial:";
+const TCP: &str = "tcp://";
+
+/// The trains of the course's track that its reports are about.
+const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
+const FASTEST: f64 = 1e6;
+
+/// Which station is meant.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Address {
+    /// A simulated one in this process.
+    Simulated(SimulatedAddress),
+    /// A 6050 or 6051 behind a line of bytes.
+    Serial(SerialAddress),
+}
+
+/// A simulated world.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SimulatedAddress {
+    /// The layout: the name of a built-in one or a layout file.
+    pub(crate) layout: String,
+    /// The seed of the world.
+    pub(crate) seed: u64,
+    /// The trains that stand on it.
+    pub(crate) trains: Vec<TrainId>,
+    /// How they change speed; left out, each has the next law.
+    pub(crate) law: Option<LawFamily>,
+    /// Whether contacts and turnouts fail now and then.
+    pub(crate) faults: bool,
+    /// How fast its clock runs, if it was said.
+    pub(crate) speed: Option<Speed>,
+}
+
+/// How fast a simulated clock runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Speed {
+    /// As fast as it goes.
+    Unpaced,
+    /// So many times as fast as real time.
+    Times(f64),
+}
+
+/// A 6050 or 6051.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SerialAddress {
+    /// Where it is.
+    pub(crate) port: Port,
+    /// How fast it is spoken to without its hand-shake line; left out, by that line where there is one.
+    pub(crate) pace: Option<PaceChoice>,
+    /// Whether its hand-shake line is used; left out, if it can be read.
+    pub(crate) cts: Option<bool>,
+    /// S88 modules on its bus; left out, those that the layout's contacts are on.
+    pub(crate) modules: Option<u8>,
+    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    pub(crate) speed: f64,
+}
+
+/// The gaps that are left without a hand-shake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PaceChoice {
+    /// Long ones, which every interface keeps up with.
+    Careful,
+    /// Short ones, for an interface or an adapter that keeps up.
+    Fast,
+}
+
+/// Where a serial line ends at this computer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Port {
+    /// At a server of the network.
+    Tcp {
+        /// Its name or address.
+        host: String,
+        /// Its port.
+        port: u16,
+    },
+    /// At a serial port or pseudo-terminal.
+    Device(String),
+}
+
+impl FromStr for Address {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (place, parameters) = text.split_once('?').unwrap_or((text, ""));
+        let pairs = || parameters.split('&').filter(|pair| !pair.is_empty()).map(pair);
+        if let Some(layout) = place.strip_prefix(SIMULATED) {
+            let mut address = SimulatedAddress::of(layout)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Simulated(address))
+        } else if let Some(port) = place.strip_prefix(SERIAL) {
+            let mut address = SerialAddress::of(port)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Serial(address))
+        } else {
+            Err(format!(
+                "`{text}` is no link; write sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or \
+                 marklin-serial:tcp://host:port"
+            ))
+        }
+    }
+}
+
+fn pair(text: &str) -> Result<(&str, &str), String> {
+    text.split_once('=').ok_or_else(|| format!("`{text}` has no value; write {text}=…"))
+}
+
+fn number<N: FromStr>(key: &str, value: &str, example: &str) -> Result<N, String> {
+    value.parse().map_err(|_| format!("`{value}` is no {key}; write {key}={example}"))
+}
+
+fn times(value: &str) -> Result<f64, String> {
+    let times: f64 = number("speed", value, "20")?;
+    let runs = times > 0.0 && times <= FASTEST;
+    runs.then_some(times).ok_or_else(|| {
+        format!("speed {value} is not between 0 and {FASTEST}; write speed=20 for twenty times real time")
+    })
+}
+
+impl SimulatedAddress {
+    fn of(layout: &str) -> Result<Self, String> {
+        if layout.is_empty() {
+            return Err("`sim:` wants a layout; write sim:track-a or the path of a layout file".into());
+        }
+        let layout = layout.to_owned();
+        Ok(Self { layout, seed: 1, trains: TRAINS.to_vec(), law: None, faults: true, speed: None })
+    }
+
+    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match key {
+            "seed" => self.seed = number(key, value, "7")?,
+            "speed" if value == "max" => self.speed = Some(Speed::Unpaced),
+            "speed" => self.speed = Some(Speed::Times(times(value)?)),
+            "trains" => self.trains = trains(value)?,
+            "law" => self.law = Some(law(value)?),
+            "faults" => {
+                self.faults = match value {
+                    "some" => true,
+                    "none" => false,
+                    _ => {
+                        return Err(format!(
+                            "`{value}` is no kind of faults; write faults=some or faults=none"
+                        ));
+                    }
+                }
+            }
+            _ => {
+                return Err(format!(
+                    "a simulated link has no `{key}`; it has seed, speed, trains, law and faults"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads trains as `24,58`.
+pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
+    let mut trains = Vec::new();
+    for one in value.split(',') {
+        let train = TrainId(number("train", one.trim(), "24,58").map_err(|_| {
+            format!("`{one}` is no train; write their addresses with commas between, as 24,58")
+        })?);
+        if !(1..=80).contains(&train.0) {
+            return Err(format!("train {train} has no address on a 6051; addresses are 1 to 80"));
+        }
+        if trains.contains(&train) {
+            return Err(format!("train {train} stands there twice; each train has an address of its own"));
+        }
+        trains.push(train);
+    }
+    Ok(trains)
+}
+
+fn law(value: &str) -> Result<LawFamily, String> {
+    let names = || LawFamily::ALL.map(LawFamily::name).join(", ");
+    let named = LawFamily::ALL.into_iter().find(|law| law.name() == value);
+    named.ok_or_else(|| format!("there is no law `{value}`; there are {}", names()))
+}
+
+impl SerialAddress {
+    fn of(port: &str) -> Result<Self, String> {
+        let port = match port.strip_prefix(TCP) {
+            Some(server) => {
+                let wanted = || {
+                    format!("`{server}` is no server; write tcp://host:port, such as tcp://127.0.0.1:2400")
+                };
+                let (host, port) = server.rsplit_once(':').ok_or_else(wanted)?;
+                let host = host.trim_start_matches('[').trim_end_matches(']');
+                if host.is_empty() {
+                    return Err(wanted());
+                }
+                Port::Tcp { host: host.to_owned(), port: port.parse().map_err(|_| wanted())? }
+            }
+            None if port.is_empty() => {
+                return Err("`marklin-serial:` wants a port; write marklin-serial:/dev/ttyUSB0 or \
+                            marklin-serial:tcp://host:port"
+                    .into());
+            }
+            None => Port::Device(port.to_owned()),
+        };
+        Ok(Self { port, pace: None, cts: None, modules: None, speed: 1.0 })
+    }
+
+    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match (key, value) {
+            ("pace", "careful") => self.pace = Some(PaceChoice::Careful),
+            ("pace", "fast") => self.pace = Some(PaceChoice::Fast),
+            ("pace", _) => return Err(format!("`{value}` is no pace; write pace=careful or pace=fast")),
+            ("cts", "yes") => self.cts = Some(true),
+            ("cts", "no") => self.cts = Some(false),
+            ("cts", _) => return Err(format!("`{value}` says nothing of CTS; write cts=yes or cts=no")),
+            ("modules", _) => {
+                let modules: u8 = number(key, value, "5")?;
+                if !(1..=31).contains(&modules) {
+                    return Err(format!("{modules} sensor modules; the bus has 1 to 31"));
+                }
+                self.modules = Some(modules);
+            }
+            ("speed", _) => self.speed = times(value)?,
+            _ => {
+                return Err(format!("a serial link has no `{key}`; it has pace, cts, modules and speed"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Display for Port {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        match self {
+            Self::Tcp { host, port } => write!(f, "{TCP}{host}:{port}"),
+            Self::Device(path) => f.write_str(path),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        text.parse::<Address>().expect_err(text)
+    }
+
+    #[test]
+    fn a_simulated_world_is_named_with_what_it_is_made_of() {
+        let written = "sim:track-a?seed=7&speed=20&trains=24,58,74&faults=none";
+        let expected = SimulatedAddress {
+            layout: "track-a".into(),
+            seed: 7,
+            trains: vec![TrainId(24), TrainId(58), TrainId(74)],
+            law: None,
+            faults: false,
+            speed: Some(Speed::Times(20.0)),
+        };
+        assert_eq!(written.parse(), Ok(Address::Simulated(expected)));
+        let Ok(Address::Simulated(plain)) = "sim:loop.toml".parse() else { panic!("a plain one") };
+        assert_eq!((plain.seed, plain.trains, plain.speed), (1, TRAINS.to_vec(), None));
+        for law in LawFamily::ALL {
+            assert!(format!("sim:track-a?law={law}&speed=max").parse::<Address>().is_ok());
+        }
+    }
+
+    #[test]
+    fn a_cable_is_named_by_its_port() {
+        let serial = |port| SerialAddress { port, pace: None, cts: None, modules: None, speed: 1.0 };
+        let device = serial(Port::Device("/dev/ttyUSB0".into()));
+        assert_eq!("marklin-serial:/dev/ttyUSB0".parse(), Ok(Address::Serial(device)));
+        let tcp = SerialAddress {
+            pace: Some(PaceChoice::Fast),
+            speed: 50.0,
+            ..serial(Port::Tcp { host: "127.0.0.1".into(), port: 2400 })
+        };
+        let written = "marklin-serial:tcp://127.0.0.1:2400?pace=fast&speed=50";
+        assert_eq!(written.parse(), Ok(Address::Serial(tcp)));
+        let six = serial(Port::Tcp { host: "::1".into(), port: 2400 });
+        assert_eq!("marklin-serial:tcp://[::1]:2400".parse(), Ok(Address::Serial(six)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_what_would_be_right() {
+        let cases = [
+            ("/dev/ttyUSB0", "marklin-serial:/dev/ttyUSB0"),
+            ("sim:", "sim:track-a"),
+            ("sim:track-a?seed", "write seed=…"),
+            ("sim:track-a?seed=x", "write seed=7"),
+            ("sim:track-a?speed=0", "speed=20"),
+            ("sim:track-a?speed=-3", "speed=20"),
+            ("sim:track-a?speed=NaN", "speed=20"),
+            ("sim:track-a?trains=24,,58", "24,58"),
+            ("sim:track-a?trains=81", "1 to 80"),
+            ("sim:track-a?trains=24,24", "an address of its own"),
+            ("sim:track-a?law=newton", "there are"),
+            ("sim:track-a?faults=all", "faults=some"),
+            ("sim:track-a?sped=20", "seed, speed, trains, law and faults"),
+            ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
+            ("marklin-serial:tcp://host", "tcp://host:port"),
+            ("marklin-serial:tcp://host:99999", "tcp://host:port"),
+            ("marklin-serial:tcp://:80", "tcp://host:port"),
+            ("marklin-serial:/dev/ttyS0?modules=32", "1 to 31"),
+            ("marklin-serial:/dev/ttyS0?cts=maybe", "cts=no"),
+            ("marklin-serial:/dev/ttyS0?pace=slow", "pace=careful"),
+            ("marklin-serial:/dev/ttyS0?baud=9600", "pace, cts, modules and speed"),
+        ];
+        for (text, right) in cases {
+            assert!(refused(text).contains(right), "{text}: {}", refused(text));
+        }
+    }
+}

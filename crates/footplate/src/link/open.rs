@@ -1,0 +1,83 @@
+//! An address becomes a link, and what the session over it has to know.
+
+use footplate_core::track::Layout;
+use footplate_core::{Ratio, TimeSpan};
+use footplate_sim::living::{LivingSwitches, VirtualStation};
+use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Pace, Settings};
+
+use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
+use super::{Link, SimulatedLink, StreamLink};
+
+/// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
+/// 16 ms unless told otherwise.
+const JITTER: TimeSpan = TimeSpan::from_ms(40);
+
+/// Opens a line. `layout` is the layout that is simulated, if one is.
+///
+/// # Errors
+/// When a simulated layout has no circuit for a train, or a port cannot be opened.
+pub(crate) fn open<'l>(
+    address: &Address,
+    layout: &'l Layout,
+    default_speed: Speed,
+) -> anyhow::Result<Box<dyn Link + 'l>> {
+    Ok(match address {
+        Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
+        Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
+    })
+}
+
+/// The station of an address on its layout, in this process.
+///
+/// # Errors
+/// When the layout has no circuit for a train.
+pub(crate) fn open_simulated<'l>(
+    address: &SimulatedAddress,
+    layout: &'l Layout,
+    default_speed: Speed,
+) -> anyhow::Result<SimulatedLink<'l>> {
+    let station = station(address, layout)?;
+    Ok(SimulatedLink::new(station, address.speed.unwrap_or(default_speed)))
+}
+
+/// The virtual station of an address.
+///
+/// # Errors
+/// When the layout has no circuit for a train.
+pub(crate) fn station<'l>(
+    address: &SimulatedAddress,
+    layout: &'l Layout,
+) -> anyhow::Result<VirtualStation<'l>> {
+    let mut switches = if address.faults { LivingSwitches::well_kept() } else { LivingSwitches::faultless() };
+    switches.law = address.law;
+    if !address.faults {
+        switches.turnout_failure = Ratio::ZERO;
+    }
+    Ok(VirtualStation::draw(layout, address.seed, &address.trains, &switches)?)
+}
+
+/// How many modules the contacts of a layout are on.
+pub(crate) fn module_count(layout: &Layout) -> u8 {
+    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    u8::try_from(highest / CONTACTS_PER_MODULE + 1).unwrap_or(u8::MAX)
+}
+
+/// What the session over an open line has to know.
+pub(crate) fn session_settings(address: &Address, link: &dyn Link, layout: &Layout) -> Settings {
+    let modules = module_count(layout);
+    match address {
+        Address::Simulated(_) => Settings::with_cts(modules),
+        Address::Serial(serial) => serial_settings(serial, link.cts().is_some(), modules),
+    }
+}
+
+fn serial_settings(address: &SerialAddress, has_cts: bool, modules: u8) -> Settings {
+    let pace = match (address.pace, has_cts) {
+        (Some(PaceChoice::Careful), _) | (None, false) => Pace::CAREFUL,
+        (Some(PaceChoice::Fast), _) => Pace::FAST,
+        (None, true) => Pace::Cts,
+    };
+    let mut settings = Settings::timed(address.modules.unwrap_or(modules), pace);
+    settings.reply_allowance += TimeSpan::from_s(JITTER.as_s() * address.speed.max(1.0));
+    settings
+}

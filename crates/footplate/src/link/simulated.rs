@@ -1,0 +1,87 @@
+//! A virtual station in this process: on a clock of its own, or paced at a multiple of real time.
+
+use std::time::Duration;
+
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_sim::living::{FromStation, VirtualStation};
+
+use super::address::Speed;
+use super::{Heard, Link, Lost};
+use crate::clock::Stopwatch;
+
+/// While nobody paces it, a virtual clock makes steps of this size at most, so that orders are looked for.
+const VIRTUAL_PATIENCE: TimeSpan = TimeSpan::from_ms(1_000);
+
+/// As long as a person who waits does not notice.
+const PERSON_MS: f64 = 30.0;
+
+/// A link into a simulated world.
+pub(crate) struct SimulatedLink<'l> {
+    station: VirtualStation<'l>,
+    speed: Speed,
+    began: Timestamp,
+    stopwatch: Stopwatch,
+}
+
+impl<'l> SimulatedLink<'l> {
+    pub(crate) fn new(station: VirtualStation<'l>, speed: Speed) -> Self {
+        let began = station.now();
+        Self { station, speed, began, stopwatch: Stopwatch::start() }
+    }
+
+    /// The station and the world behind it: for hands and for scorers.
+    pub(crate) fn station(&self) -> &VirtualStation<'l> {
+        &self.station
+    }
+
+    /// The same, to change the world with.
+    pub(crate) fn station_mut(&mut self) -> &mut VirtualStation<'l> {
+        &mut self.station
+    }
+
+    /// Lets real time catch up with the station's.
+    fn keep_pace(&self) {
+        if let Speed::Times(times) = self.speed {
+            let due = Duration::from_secs_f64(((self.station.now() - self.began).as_s() / times).max(0.0));
+            if let Some(ahead) = due.checked_sub(self.stopwatch.elapsed()) {
+                std::thread::sleep(ahead);
+            }
+        }
+    }
+}
+
+impl Link for SimulatedLink<'_> {
+    fn now(&self) -> Timestamp {
+        self.station.now()
+    }
+
+    fn write(&mut self, byte: u8) -> Result<(), Lost> {
+        self.station.write(byte);
+        Ok(())
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        let heard = self.station.advance(until);
+        self.keep_pace();
+        match heard {
+            Some(FromStation::Byte(byte)) => Heard::Byte(byte),
+            Some(FromStation::Cts(up)) => Heard::Cts(up),
+            None => Heard::Nothing,
+        }
+    }
+
+    fn cts(&self) -> Option<bool> {
+        Some(self.station.cts())
+    }
+
+    fn patience(&self) -> TimeSpan {
+        match self.speed {
+            Speed::Unpaced => VIRTUAL_PATIENCE,
+            Speed::Times(times) => TimeSpan::from_s(PERSON_MS * 1e-3 * times),
+        }
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        Ok(())
+    }
+}

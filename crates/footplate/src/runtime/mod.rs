@@ -1,0 +1,21 @@
+//! The one loop around a line, a session and a machine: live, simulated and in tests.
+//!
+//! ```text
+//! run         bytes in, bytes out, entries written down before the machine sees them
+//! attendant   who watches it: notices to people, orders from them
+//! ending      trains are told to stand, whatever ends it; what could not be confirmed is said
+//! stop_flag   Ctrl-C and the signals that end a program
+//! ```
+
+mod attendant;
+mod ending;
+mod run;
+mod stop_flag;
+
+#[cfg(test)]
+mod over_a_simulation;
+
+pub(crate) use attendant::{Attendant, Recorder, Wish};
+pub(crate) use ending::Ended;
+pub(crate) use run::Runtime;
+pub(crate) use stop_flag::StopFlag;

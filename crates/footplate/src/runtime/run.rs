@@ -1,0 +1,286 @@
+//! Goes round between a line, a session and a machine until somebody has enough.
+
+use std::time::Duration;
+
+use footplate_core::control::{Machine, Output};
+use footplate_core::{Event, Timestamp};
+use footplate_wire::marklin_serial::Interface;
+use footplate_wire::{Closing, LinkNotice, Session, Transmit};
+
+use super::attendant::{Attendant, Recorder, Wish};
+use super::ending::{Ended, REOPEN_WITHIN_S, SECOND_CHANCE, WITHIN};
+use super::stop_flag::StopFlag;
+use crate::clock::Stopwatch;
+use crate::link::{Heard, Link, Lost};
+
+/// Between two attempts to open a line again.
+const REOPEN_EVERY: Duration = Duration::from_millis(250);
+
+/// A line, a session over it and what writes down what happens.
+///
+/// However it is left, at its end, with an error or in a panic: trains are told to stand first.
+pub(crate) struct Runtime<'r, L: Link> {
+    link: L,
+    session: Interface,
+    recorder: Option<&'r mut dyn Recorder>,
+    stop: Option<StopFlag>,
+    /// Entries that are not written down yet; kept so that no byte costs an allocation.
+    fresh: Vec<Event>,
+    notices: Vec<LinkNotice>,
+    is_closed: bool,
+}
+
+/// What ends a round.
+enum Broken {
+    Lost(Lost),
+    Recorder(anyhow::Error),
+}
+
+impl<'r, L: Link> Runtime<'r, L> {
+    /// `stop`: what raises the flag that ends a run, if something may.
+    pub(crate) fn new(
+        link: L,
+        mut session: Interface,
+        recorder: Option<&'r mut dyn Recorder>,
+        stop: Option<StopFlag>,
+    ) -> Self {
+        if let Some(up) = link.cts() {
+            session.handle_cts(link.now(), up);
+        }
+        let (fresh, notices) = (Vec::new(), Vec::new());
+        Self { link, session, recorder, stop, fresh, notices, is_closed: false }
+    }
+
+    /// The line.
+    pub(crate) fn link(&self) -> &L {
+        &self.link
+    }
+
+    /// The line, to change a simulated world with.
+    pub(crate) fn link_mut(&mut self) -> &mut L {
+        &mut self.link
+    }
+
+    /// Runs until the attendant has enough, somebody stops the program, or the line is lost. The session stays open:
+    /// another machine may go on with it.
+    ///
+    /// # Errors
+    /// When the recorder could not write down what happened.
+    pub(crate) fn run<M: Machine>(
+        &mut self,
+        machine: &mut M,
+        attendant: &mut dyn Attendant<M>,
+    ) -> anyhow::Result<Ended> {
+        let mut doubt: Option<(Timestamp, String)> = None;
+        let mut attended = self.link.now();
+        self.ask(machine, attendant);
+        let mut wakes = machine.next_timeout();
+        loop {
+            let now = self.link.now();
+            let mut eventful = match self.serve(machine) {
+                Ok(eventful) => eventful,
+                Err(Broken::Recorder(error)) => return Err(error),
+                Err(Broken::Lost(lost)) => match self.open_again(lost) {
+                    Ok(()) => false,
+                    Err(lost) => return Ok(Ended::LineLost(lost)),
+                },
+            };
+            for notice in self.notices.drain(..) {
+                judge(&mut doubt, now, &notice);
+                attendant.hear_of_line(now, &notice);
+            }
+            if doubt.as_ref().is_some_and(|(until, _)| now >= *until)
+                && let Some((_, why)) = doubt.take()
+            {
+                return Ok(Ended::NoAnswer(why));
+            }
+            if eventful || now - attended >= self.link.patience() {
+                attended = now;
+                if self.stop.is_some_and(StopFlag::is_up) {
+                    return Ok(Ended::Interrupted);
+                }
+                self.ask(machine, attendant);
+                if attendant.attend(now, machine) == Wish::Finish {
+                    return Ok(Ended::Finished);
+                }
+                eventful = true;
+            }
+            if wakes.is_some_and(|at| now >= at) {
+                machine.handle_timeout(now);
+                eventful = true;
+            }
+            if eventful {
+                self.ask(machine, attendant);
+                wakes = machine.next_timeout();
+            }
+            if self.session.next_timeout().is_some_and(|at| now >= at) {
+                self.session.handle_timeout(now);
+            }
+            if let Err(lost) = self.write() {
+                match self.open_again(lost) {
+                    Ok(()) => continue,
+                    Err(lost) => return Ok(Ended::LineLost(lost)),
+                }
+            }
+            if !self.fresh.is_empty() || !self.notices.is_empty() {
+                continue;
+            }
+            let until = (attended + self.link.patience()).max(now);
+            let until = [wakes, self.session.next_timeout()].into_iter().flatten().fold(until, Ord::min);
+            match self.link.wait(until) {
+                Heard::Nothing => {}
+                heard => {
+                    // Whatever the machine wants to say now goes before the next poll, which may begin with this byte.
+                    let now = self.link.now();
+                    if wakes.is_some_and(|at| now >= at) {
+                        machine.handle_timeout(now);
+                        self.ask(machine, attendant);
+                        wakes = machine.next_timeout();
+                    }
+                    match heard {
+                        Heard::Byte(byte) => self.session.handle_bytes(now, &[byte]),
+                        Heard::Cts(up) => self.session.handle_cts(now, up),
+                        Heard::Lost(lost) => {
+                            if let Err(lost) = self.open_again(lost) {
+                                return Ok(Ended::LineLost(lost));
+                            }
+                        }
+                        Heard::Nothing => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes what the session has to say; entries are written down before the machine hears of them.
+    fn serve<M: Machine>(&mut self, machine: &mut M) -> Result<bool, Broken> {
+        self.write().map_err(Broken::Lost)?;
+        if self.fresh.is_empty() {
+            return Ok(false);
+        }
+        self.write_down().map_err(Broken::Recorder)?;
+        let now = self.link.now();
+        for event in self.fresh.drain(..) {
+            machine.handle_event(now, &event);
+        }
+        Ok(true)
+    }
+
+    fn write_down(&mut self) -> anyhow::Result<()> {
+        match &mut self.recorder {
+            Some(recorder) => recorder.record(&self.fresh),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the session's bytes and gathers its entries and notices.
+    fn write(&mut self) -> Result<(), Lost> {
+        while let Some(output) = self.session.poll_output() {
+            match output {
+                Transmit::Byte(byte) => self.link.write(byte)?,
+                Transmit::Event(event) => self.fresh.push(event),
+                Transmit::Notice(notice) => self.notices.push(notice),
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks the machine what it wants.
+    fn ask<M: Machine>(&mut self, machine: &mut M, attendant: &mut dyn Attendant<M>) {
+        let now = self.link.now();
+        while let Some(output) = machine.poll_output() {
+            match output {
+                Output::Command(command) => {
+                    if let Err(error) = self.session.handle_command(now, command) {
+                        attendant.hear_of_refusal(now, command, error);
+                    }
+                }
+                Output::HoldLine(until) => self.session.hold_line(until),
+                Output::Watch(sensor) => self.session.watch(sensor),
+                Output::Notice(notice) => attendant.hear(now, notice),
+            }
+        }
+    }
+
+    /// A lost line may come back: a plug was pushed in again, a server was started anew.
+    fn open_again(&mut self, lost: Lost) -> Result<(), Lost> {
+        eprintln!("{lost}; trying to open it again for {REOPEN_WITHIN_S:.0} s");
+        let since = Stopwatch::start();
+        while since.elapsed().as_secs_f64() < REOPEN_WITHIN_S && !self.stop.is_some_and(StopFlag::is_up) {
+            std::thread::sleep(REOPEN_EVERY);
+            if self.link.reopen().is_ok() {
+                let now = self.link.now();
+                self.session.handle_reopened(now);
+                if let Some(up) = self.link.cts() {
+                    self.session.handle_cts(now, up);
+                }
+                eprintln!("the line is open again");
+                return Ok(());
+            }
+        }
+        Err(lost)
+    }
+
+    /// Tells every train to stand, lets go of solenoids, takes the power from the track, and says what of it was said.
+    /// Not longer than a few seconds, whatever the line does.
+    pub(crate) fn close(&mut self) -> Closing {
+        if !self.is_closed {
+            self.is_closed = true;
+            self.say_goodbye();
+        }
+        self.session.closing()
+    }
+
+    fn say_goodbye(&mut self) {
+        let began = self.link.now();
+        let stopwatch = Stopwatch::start();
+        self.session.close(began);
+        loop {
+            if self.write().is_err() {
+                return;
+            }
+            // What was told is part of the record; that it could not be written must not keep a train running.
+            if !self.fresh.is_empty() {
+                if let Err(error) = self.write_down() {
+                    eprintln!("the last commands were not recorded: {error:#}");
+                }
+                self.fresh.clear();
+            }
+            self.notices.clear();
+            let now = self.link.now();
+            let late = now - began >= WITHIN || stopwatch.elapsed().as_secs_f64() >= WITHIN.as_s();
+            if late || self.session.closing().is_complete() {
+                return;
+            }
+            let end = began + WITHIN;
+            match self.link.wait(self.session.next_timeout().unwrap_or(end).min(end)) {
+                Heard::Byte(byte) => self.session.handle_bytes(self.link.now(), &[byte]),
+                Heard::Cts(up) => self.session.handle_cts(self.link.now(), up),
+                Heard::Nothing => self.session.handle_timeout(self.link.now()),
+                Heard::Lost(_) => return,
+            }
+        }
+    }
+}
+
+/// Whether a notice puts the station in doubt or clears it.
+fn judge(doubt: &mut Option<(Timestamp, String)>, now: Timestamp, notice: &LinkNotice) {
+    match notice {
+        LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => {
+            *doubt = Some((now + SECOND_CHANCE, notice.to_string()));
+        }
+        LinkNotice::Answers => *doubt = None,
+        _ => {}
+    }
+}
+
+impl<L: Link> Drop for Runtime<'_, L> {
+    fn drop(&mut self) {
+        if !self.is_closed {
+            let closing = self.close();
+            if std::thread::panicking() || !closing.is_complete() {
+                eprintln!("{closing}");
+            }
+        }
+    }
+}
