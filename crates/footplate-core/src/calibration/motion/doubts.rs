@@ -1,22 +1,28 @@
 //! What a model does not know of single changes of speed.
+//!
+//! The way that a change adds is linear in a train's numbers, so its slopes are written down and nothing is allocated:
+//! a change of speed `Δ = v − v′` over `n` steps displaces by `Δ (q + θ + κ|Δ| + ρ|n|/2)`, and starts and stops by what
+//! their nodes add.
 
 use super::model::MotionModel;
-use super::parameters::{Answers, START_DELAY, speed_at};
-use super::segment::{Segment, Told};
+use super::parameters::{Answers, DOWN, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at};
 
 impl MotionModel {
     /// Variance of ln of the steady speed at a step.
     pub(crate) fn ln_speed_variance(&self, step: u8, above: bool) -> f64 {
         let place = usize::from(step);
         let speed = self.answers().speed(place, above);
-        if speed <= 0.0 {
+        if speed <= 0.0 || place == 0 || place > self.steps() {
             return 0.0;
         }
-        if !above && place >= 1 {
+        let below = self.answers().speed(place, false);
+        if !above {
             return self.spread.variance(speed_at(place));
         }
-        let deviation = self.deviation(|answers| answers.speed(place, above)) / speed;
-        deviation * deviation
+        let [hysteresis, own] = self.hysteresis_places(place);
+        let part = Answers::hysteresis_part(below) / speed;
+        let slopes = [(speed_at(place), below / speed), (hysteresis, part), (own, part)];
+        self.spread.variance_along(&slopes)
     }
 
     /// Variance of the delay of a start (s²).
@@ -26,37 +32,42 @@ impl MotionModel {
 
     /// One standard deviation (m) of the way to rest from a speed (m/s), for what is not known of the law.
     pub(crate) fn stop_doubt(&self, speed: f64) -> f64 {
-        let told = Told { sent: 0.0, from: self.step_near(speed), to: 0, at_rest: false };
-        self.deviation(|answers| {
-            let segment = Segment::of(&told, answers, speed);
-            speed * segment.begins + segment.way_to_rest()
-        })
+        let [(low, left), (high, right)] = nodes_about(speed);
+        let [delay, lag, kappa, rho] = self.law_slopes(DOWN, speed, 0.0);
+        let slopes = [delay, lag, kappa, rho, (STOP_NODES + low, left), (STOP_NODES + high, right)];
+        libm::sqrt(self.spread.variance_along(&slopes))
     }
 
     /// The same of where a train is that has started to a speed; the delay of the start apart.
     pub(crate) fn start_doubt(&self, speed: f64) -> f64 {
-        let told = Told { sent: 0.0, from: 0, to: self.step_near(speed), at_rest: true };
-        self.displacement_doubt(&told, 0.0, speed)
+        let [(low, left), (high, right)] = nodes_about(speed);
+        let [_, lag, kappa, rho] = self.law_slopes(UP, 0.0, speed);
+        let slopes = [lag, kappa, rho, (START_NODES + low, left), (START_NODES + high, right)];
+        libm::sqrt(self.spread.variance_along(&slopes))
     }
 
     /// The same of a change from one speed to another.
     pub(crate) fn change_doubt(&self, from: f64, to: f64) -> f64 {
-        let told = Told { sent: 0.0, from: self.step_near(from), to: self.step_near(to), at_rest: false };
-        self.displacement_doubt(&told, from, to)
+        let slopes = self.law_slopes(if to > from { UP } else { DOWN }, from, to);
+        libm::sqrt(self.spread.variance_along(&slopes))
     }
 
-    fn displacement_doubt(&self, told: &Told, from: f64, to: f64) -> f64 {
-        self.deviation(|answers: &Answers<'_>| {
-            let segment = Segment::between(told, answers, from, to);
-            let delay = if told.at_rest { 0.0 } else { (from - to) * segment.begins };
-            delay + segment.displacement()
-        })
+    /// Slopes of a displacement in delay, lag, `κ` and `ρ` of a direction.
+    fn law_slopes(&self, first: usize, from: f64, to: f64) -> [(usize, f64); 4] {
+        let change = from - to;
+        let steps = f64::from(self.step_near(from)) - f64::from(self.step_near(to));
+        [
+            (first, change),
+            (first + 1, change),
+            (first + 2, change * change.abs()),
+            (first + 3, 0.5 * change * steps.abs()),
+        ]
     }
 
-    /// The step whose speed is nearest.
+    /// The step whose speed is nearest; 0 for standstill.
     fn step_near(&self, speed: f64) -> u8 {
         let answers = self.answers();
         let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();
-        (1..=self.highest().get()).min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(1)
+        (0..=self.highest().get()).min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(0)
     }
 }

@@ -4,7 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::parameters::{Answers, prior_means, speed_prior};
+use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
 use super::priors::section_variance;
 use super::scatter::usual_scatter;
 use super::segment::{Segment, Told};
@@ -109,6 +109,11 @@ impl MotionModel {
 
     pub(super) fn answers(&self) -> Answers<'_> {
         Answers::new(&self.values, self.steps())
+    }
+
+    /// Places of what hysteresis at a step is made of.
+    pub(super) fn hysteresis_places(&self, step: usize) -> [usize; 2] {
+        [HYSTERESIS, hysteresis_at(step, self.steps())]
     }
 
     fn counts_at(&self, step: SpeedStep, approach: Approach) -> Counts {

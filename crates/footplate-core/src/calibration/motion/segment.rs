@@ -51,11 +51,7 @@ impl Segment {
 
     /// What a command makes of a train that runs at `speed` (m/s) when it takes effect.
     pub(super) fn of(told: &Told, answers: &Answers<'_>, speed: f64) -> Self {
-        Self::between(told, answers, speed, answers.speed(usize::from(told.to), told.above()))
-    }
-
-    /// The same to a given speed (m/s).
-    pub(super) fn between(told: &Told, answers: &Answers<'_>, speed: f64, to: f64) -> Self {
+        let to = answers.speed(usize::from(told.to), told.above());
         let steps = f64::from(told.to) - f64::from(told.from);
         let change = to - speed;
         let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
