@@ -65,7 +65,11 @@ pub(super) enum Stage {
     /// At the step; this many contacts are still to be passed once it is steady.
     Steady { contacts: u8 },
     /// Waiting for the moment to stop, if it is known already.
-    Aiming { at: Option<Timestamp> },
+    Aiming {
+        at: Option<Timestamp>,
+        /// Contacts at which it may be worked out anew.
+        again: u8,
+    },
     /// Told to stop; rests by then.
     Braking { until: Timestamp },
     /// On a short move, to be stopped then.

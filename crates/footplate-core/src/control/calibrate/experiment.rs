@@ -16,12 +16,15 @@ pub enum Experiment {
         /// From where it is reached.
         approach: Approach,
     },
-    /// Stop from a steady step so that the train rests a little short of a contact, then crawl on to it.
+    /// Stop from a steady step near a contact, then crawl on to the next one.
     Stop {
         /// The step.
         step: SpeedStep,
         /// From where it is reached.
         approach: Approach,
+        /// Whether the train is to rest a little past the contact, so that it is timed on the way to rest; otherwise a
+        /// little short of it.
+        is_past: bool,
     },
     /// From rest, run for a while too short to reach the speed, stop, then crawl on to the next contact.
     Move {
@@ -50,7 +53,10 @@ impl fmt::Display for Experiment {
         };
         match self {
             Self::Speed { step, approach } => write!(f, "speed at step {step} {}", from(approach)),
-            Self::Stop { step, approach } => write!(f, "stop from step {step} {}", from(approach)),
+            Self::Stop { step, approach, is_past } => {
+                let side = if *is_past { "past" } else { "short of" };
+                write!(f, "stop from step {step} {}, {side} a contact", from(approach))
+            }
             Self::Move { step, run } => write!(f, "short move of {:.1} s at step {step}", run.as_s()),
         }
     }

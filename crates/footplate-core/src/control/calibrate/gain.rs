@@ -1,87 +1,53 @@
-//! What an experiment is expected to bring.
-//!
-//! The objective is the mean, over usable steps and both approaches, of the doubt of a stop against the scatter that no
-//! knowledge would narrow: `(d² + u²) / s²` with `d` the doubt of the stop, `u` that of the way in a second of running, and
-//! `s` the scatter. An experiment at one step that measures with noise `n` takes `ρ² d_j² d² / (d² + n²)` from the variance
-//! of another step `j` whose doubt shares the part `ρ` with its own: the gain of one scalar measurement (Kalman, 1960).
+//! What an experiment is expected to bring, from what the model knows and what the experiment would see of it.
 
 use super::accuracy::usable_steps;
 use super::experiment::Experiment;
-use crate::calibration::motion::MotionModel;
+use super::planner::crawl_step;
+use crate::calibration::motion::{MotionModel, Objective, Prospect};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
-use crate::time::TimeSpan;
 use crate::units::Length;
-
-/// Steps over which what is learnt of one is worth 1/e of it at another: stops follow laws that are smooth in speed.
-const SHARED_OVER_STEPS: f64 = 2.0;
-
-/// How much of the doubt at a step the two approaches share.
-const SHARED_BY_APPROACHES: f64 = 0.8;
-
-/// A crawl to a contact tells where the train stood this well: a poll of 70 ms at 80 mm/s, and the start before it.
-const CRAWL_NOISE: Length = Length::from_mm(4.0);
-
-/// A hop at a steady step is timed this well: two polls of 70 ms, each with a standard deviation of 1/√12 of it.
-const TIMING_NOISE: TimeSpan = TimeSpan::from_ms(29);
 
 /// A typical hop, from contact to contact (the mean of the built-in layouts' circuits).
 pub(super) const TYPICAL_HOP: Length = Length::from_mm(390.0);
 
-/// A usable scatter never counts as less than this: below it nobody would see the difference.
-const LEAST_SCATTER: Length = Length::from_mm(2.0);
+/// A contact that is passed in braking is aimed at about this part of the way to rest before its end: the train is slow
+/// there, so that a poll's time is a short way, and nearly all of the stop lies behind it.
+const PAST_PART: f64 = 0.12;
 
-/// How much the objective falls by an experiment, summed over usable steps and both approaches.
+/// ... and at least this far before its end, ...
+const LEAST_PAST: Length = Length::from_mm(25.0);
+
+/// ... or this many standard deviations of where the stop ends, so that it surely is passed.
+const PAST_BY: f64 = 1.6;
+
+/// The objective over the steps that move a train.
 #[must_use]
-pub fn gain(model: &MotionModel, experiment: &Experiment) -> f64 {
+pub fn objective(model: &MotionModel) -> Objective {
+    Objective::of(model, &usable_steps(model))
+}
+
+/// By how much an experiment is expected to lower the objective: the one place that says what an experiment is worth.
+#[must_use]
+pub fn gain(model: &MotionModel, objective: &Objective, experiment: &Experiment) -> f64 {
+    objective.gain(model, &prospect(model, experiment))
+}
+
+fn prospect(model: &MotionModel, experiment: &Experiment) -> Prospect {
+    let crawl = crawl_step(model).unwrap_or(model.highest());
     match *experiment {
-        Experiment::Stop { step, approach } => gain_of_stop(model, step, approach),
-        Experiment::Speed { step, approach } => gain_of_speed(model, step, approach),
-        Experiment::Move { step, run } => gain_of_move(model, step, run),
-    }
-}
-
-fn gain_of_stop(model: &MotionModel, step: SpeedStep, approach: Approach) -> f64 {
-    let stop = model.stop(step, approach);
-    let own = square(stop.doubt);
-    let noise = square(stop.scatter) + square(CRAWL_NOISE);
-    let part = own / (own + noise);
-    let mut sum = 0.0;
-    for other in usable_steps(model) {
-        for side in [Approach::Below, Approach::Above] {
-            let there = model.stop(other, side);
-            let shared = shared_doubt(step, approach, other, side);
-            sum += shared * shared * part * square(there.doubt) / square(there.scatter.max(LEAST_SCATTER));
+        Experiment::Speed { step, approach } => model.prospect_of_speed(step, approach),
+        Experiment::Stop { step, approach, is_past } => {
+            let past = is_past.then(|| past_by(model, step, approach));
+            model.prospect_of_stop(step, approach, crawl, past)
         }
+        Experiment::Move { step, run } => model.prospect_of_move(step, run, crawl),
     }
-    sum
 }
 
-fn gain_of_speed(model: &MotionModel, step: SpeedStep, approach: Approach) -> f64 {
-    let speed = model.speed(step, approach);
-    let (value, doubt) = (speed.value.as_m_per_s(), speed.uncertainty.as_m_per_s());
-    let hop = (TYPICAL_HOP / speed.value.max(crate::units::Speed::from_mm_per_s(10.0))).as_s();
-    let noise = value * TIMING_NOISE.as_s() / hop;
-    let own = doubt * doubt;
-    let part = own / (own + noise * noise);
-    // Metres in a second of running.
-    let scatter = model.stop(step, approach).scatter.max(LEAST_SCATTER);
-    if part.is_finite() { part * own / square(scatter) } else { 0.0 }
-}
-
-/// A short move is half a start and half a stop: it narrows what the stop from its step would.
-fn gain_of_move(model: &MotionModel, step: SpeedStep, run: TimeSpan) -> f64 {
-    let settles = model.settles_within(SpeedStep::STAND, step).as_s().max(0.1);
-    let reached = (run.as_s() / settles).clamp(0.0, 1.0);
-    0.5 * reached * gain_of_stop(model, step, Approach::Below)
-}
-
-fn shared_doubt(step: SpeedStep, approach: Approach, other: SpeedStep, side: Approach) -> f64 {
-    let apart = f64::from(step.get().abs_diff(other.get()));
-    let across = if approach == side { 1.0 } else { SHARED_BY_APPROACHES };
-    across * libm::exp(-apart / SHARED_OVER_STEPS)
-}
-
-fn square(length: Length) -> f64 {
-    length.as_m() * length.as_m()
+/// How far past a contact a train is to rest so that it is passed in braking.
+pub(super) fn past_by(model: &MotionModel, step: SpeedStep, approach: Approach) -> Length {
+    let stop = model.stop(step, approach);
+    let sigma = Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()));
+    (PAST_PART * stop.distance).max(LEAST_PAST).max(PAST_BY * sigma)
 }

@@ -29,6 +29,6 @@ mod tracker;
 pub use accuracy::{StepAccuracy, usable_steps};
 pub use calibrator::Calibrator;
 pub use experiment::{Experiment, Why};
-pub use gain::gain;
+pub use gain::{gain, objective};
 pub use notice::{CalibrationNotice, Done, Ending, Mishap, Phase, Progress};
 pub use settings::CalibratorSettings;

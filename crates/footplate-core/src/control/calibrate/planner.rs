@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use super::accuracy::{steps, usable_steps};
 use super::experiment::{Experiment, Why};
-use super::gain::{TYPICAL_HOP, gain};
+use super::gain::{TYPICAL_HOP, gain, objective, past_by};
 use crate::calibration::motion::{MotionModel, StepUse};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
@@ -30,8 +30,24 @@ const RUN_UP: u8 = 2;
 /// Runs of short moves, from what just moves a train to what nearly reaches the speed (`s`).
 const MOVES: [f64; 3] = [0.7, 1.2, 2.0];
 
+/// A contact is passed in braking only if at least the rest of the stop lies before it.
+const MOST_PAST: f64 = 0.5;
+
+/// Short moves are tried at steps up to this speed.
+const FASTEST_MOVE: Speed = Speed::from_mm_per_s(300.0);
+
+/// A speed that so many contacts have told is not run for its own sake any more: what is left of its doubt is the survey's,
+/// which all speeds share and no run narrows.
+const ENOUGH_CONTACTS: u32 = 8;
+
+/// ... and none is run more often than this.
+const MOST_RUNS: u32 = 2;
+
 /// From rest to the next command: reports of the last contact are in by then.
 const PAUSE: TimeSpan = TimeSpan::from_ms(500);
+
+/// From rest over the better part of a hop, at the step that does it in about this time.
+const LONG_CRAWL: TimeSpan = TimeSpan::from_ms(4_000);
 
 /// Experiments that gain less than this in a second are not worth wearing the train out: a thousandth of a stop's scatter
 /// squared.
@@ -68,7 +84,7 @@ impl Planner {
     pub(super) fn note(&mut self, experiment: &Experiment) {
         let (table, key) = match *experiment {
             Experiment::Speed { step, approach } => (&mut self.runs, (step, approach)),
-            Experiment::Stop { step, approach } => (&mut self.stops, (step, approach)),
+            Experiment::Stop { step, approach, .. } => (&mut self.stops, (step, approach)),
             Experiment::Move { .. } => return,
         };
         *table.entry(key).or_default() += 1;
@@ -79,6 +95,10 @@ impl Planner {
         self.stops.get(&(step, approach)).copied().unwrap_or(0)
     }
 
+    fn runs_at(&self, step: SpeedStep, approach: Approach) -> u32 {
+        self.runs.get(&(step, approach)).copied().unwrap_or(0)
+    }
+
     /// The next experiment, if one fits into the time that is left.
     pub(super) fn choose(&mut self, model: &MotionModel, stance: Stance, left: TimeSpan) -> Option<Choice> {
         let fits = |experiment: &Experiment| cost(model, stance, experiment) <= left;
@@ -86,10 +106,11 @@ impl Planner {
         if let Some(experiment) = stair {
             return Some(Choice { experiment, why: Why::NeverTried });
         }
+        let objective = objective(model);
         let mut best: Option<(f64, Choice)> = None;
         for experiment in self.candidates(model).into_iter().filter(fits) {
             let takes = cost(model, stance, &experiment);
-            let gain = gain(model, &experiment);
+            let gain = gain(model, &objective, &experiment);
             let rate = gain / takes.as_s().max(0.1);
             if rate > LEAST_RATE && best.is_none_or(|(most, _)| rate > most) {
                 best = Some((rate, Choice { experiment, why: Why::MostPerSecond { gain, takes } }));
@@ -131,11 +152,19 @@ impl Planner {
                 if approach == Approach::Above && usable.last() == Some(step) {
                     continue;
                 }
-                all.push(Experiment::Stop { step: *step, approach });
-                all.push(Experiment::Speed { step: *step, approach });
+                all.push(Experiment::Stop { step: *step, approach, is_past: false });
+                if past_by(model, *step, approach) <= MOST_PAST * model.stop(*step, approach).distance {
+                    all.push(Experiment::Stop { step: *step, approach, is_past: true });
+                }
+                if model.speed(*step, approach).count < ENOUGH_CONTACTS
+                    && self.runs_at(*step, approach) < MOST_RUNS
+                {
+                    all.push(Experiment::Speed { step: *step, approach });
+                }
             }
         }
-        for step in usable.iter().skip(usable.len() / 4).step_by(3) {
+        let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FASTEST_MOVE;
+        for step in usable.iter().filter(slow).skip(1).step_by(2) {
             all.extend(MOVES.map(|run| Experiment::Move { step: *step, run: TimeSpan::from_s(run) }));
         }
         let untried = steps(model).filter(|step| !usable.contains(step));
@@ -187,12 +216,10 @@ pub(super) fn cost(model: &MotionModel, stance: Stance, experiment: &Experiment)
         Experiment::Speed { step, approach } => {
             reaching(model, stance, step, approach) + hop_time(model, step, approach, 1.5)
         }
-        Experiment::Stop { step, approach } => {
+        Experiment::Stop { step, approach, is_past } => {
             let stop = model.stop(step, approach).time + PAUSE;
-            reaching(model, stance, step, approach)
-                + hop_time(model, step, approach, 1.0)
-                + stop
-                + crawl(model, 0.2)
+            let on = if is_past { LONG_CRAWL } else { crawl(model, 0.2) };
+            reaching(model, stance, step, approach) + hop_time(model, step, approach, 1.0) + stop + on
         }
         Experiment::Move { step, run } => {
             let slow = crawl_step(model).unwrap_or(step);

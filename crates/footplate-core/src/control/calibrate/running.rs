@@ -4,6 +4,7 @@ use super::accuracy::usable_steps;
 use super::activity::{Activity, Stage, Trial};
 use super::calibrator::Calibrator;
 use super::experiment::Experiment;
+use super::gain::past_by;
 use super::notice::{CalibrationNotice, Done, Ending};
 use super::planner::{crawl_step, needs_run_up, run_up_step};
 use crate::event::Approach;
@@ -41,6 +42,9 @@ const MOST_AHEAD: usize = 6;
 /// The way to the next contact that a train at rest should cover in this time, if it is long.
 const CRAWL_TAKES: TimeSpan = TimeSpan::from_ms(2_000);
 
+/// A stop is aimed anew at this many contacts on the way to its moment; then it is made as it was planned.
+const AIM_AGAIN: u8 = 3;
+
 /// Hops that take longer than this tell enough alone.
 const LONG_HOP: TimeSpan = TimeSpan::from_ms(3_500);
 
@@ -64,7 +68,7 @@ impl Calibrator<'_> {
         self.activity =
             Activity::Trying(Trial { experiment, begun: now, before, stage: Stage::Steady { contacts: 0 } });
         match experiment {
-            Experiment::Speed { step, approach } | Experiment::Stop { step, approach } => {
+            Experiment::Speed { step, approach } | Experiment::Stop { step, approach, .. } => {
                 if needs_run_up(self.stance, step, approach) {
                     let by = run_up_step(self.model(), step, approach);
                     self.set_stage(Stage::RunUp);
@@ -168,7 +172,10 @@ impl Calibrator<'_> {
                     self.on_steady(now);
                 }
             }
-            Stage::Aiming { .. } if self.asked.is_none() => self.aim(now),
+            Stage::Aiming { again, .. } if self.asked.is_none() && again > 0 => {
+                self.set_stage(Stage::Aiming { at: None, again: again - 1 });
+                self.aim(now);
+            }
             Stage::Crawling => self.conclude(now),
             _ => {}
         }
@@ -179,21 +186,23 @@ impl Calibrator<'_> {
         match self.trial().map(|trial| trial.experiment) {
             Some(Experiment::Speed { .. }) => self.conclude(now),
             Some(Experiment::Stop { .. }) => {
-                self.set_stage(Stage::Aiming { at: None });
+                self.set_stage(Stage::Aiming { at: None, again: AIM_AGAIN });
                 self.aim(now);
             }
             Some(Experiment::Move { .. }) => {
-                self.set_stage(Stage::Aiming { at: None });
+                self.set_stage(Stage::Aiming { at: None, again: AIM_AGAIN });
                 self.tell(now, SpeedStep::STAND);
             }
             None => {}
         }
     }
 
-    /// Works out when to stop so that the train rests a little short of a contact.
+    /// Works out when to stop so that the train rests a little short of a contact, or a little past it.
     fn aim(&mut self, now: Timestamp) {
         let at = self.moment_to_stop(now);
-        self.set_stage(Stage::Aiming { at });
+        let Some(Stage::Aiming { again, .. }) = self.trial().map(|trial| &trial.stage) else { return };
+        let again = *again;
+        self.set_stage(Stage::Aiming { at, again });
         match at {
             Some(at) => self.hold_line(Some(at)),
             // Where it would rest is not known: then anywhere is as good.
@@ -211,7 +220,10 @@ impl Calibrator<'_> {
             return None;
         }
         let sigma = libm::hypot(rest.doubt.as_m(), rest.scatter.as_m());
-        let short = (LEAST_SHORT + Length::from_m(SHORT_BY * sigma)).min(MOST_SHORT);
+        let short = match self.trial()?.experiment {
+            Experiment::Stop { step, approach, is_past: true } => -past_by(model, step, approach),
+            _ => (LEAST_SHORT + Length::from_m(SHORT_BY * sigma)).min(MOST_SHORT),
+        };
         let mut begins = Length::ZERO;
         let mut rest_way = None;
         for hop in ground.hops_ahead(node).take(2 * MOST_AHEAD) {
@@ -271,7 +283,7 @@ impl Calibrator<'_> {
             {
                 self.go_steady(now, step);
             }
-            (Stage::Aiming { at: Some(at) }, _) if now >= *at - COMMAND_TAKES => {
+            (Stage::Aiming { at: Some(at), .. }, _) if now >= *at - COMMAND_TAKES => {
                 self.tell(now, SpeedStep::STAND);
             }
             (Stage::Moving { stop_at }, _) if now >= *stop_at - COMMAND_TAKES => {
@@ -344,10 +356,10 @@ impl Calibrator<'_> {
             | Activity::Turning { at: until } => Some(*until),
             Activity::Trying(trial) => match trial.stage {
                 Stage::RunUp => Some(self.steady_at),
-                Stage::Aiming { at: Some(at) } => Some(at - COMMAND_TAKES),
+                Stage::Aiming { at: Some(at), .. } => Some(at - COMMAND_TAKES),
                 Stage::Moving { stop_at } => Some(stop_at - COMMAND_TAKES),
                 Stage::Braking { until } | Stage::BrakingAgain { until } => Some(until),
-                Stage::Aiming { at: None } | Stage::Steady { .. } | Stage::Crawling => None,
+                Stage::Aiming { at: None, .. } | Stage::Steady { .. } | Stage::Crawling => None,
             },
             Activity::Joining | Activity::Paused | Activity::Finished => None,
         };

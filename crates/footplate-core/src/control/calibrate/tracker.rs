@@ -103,7 +103,11 @@ impl Tracker {
             || locator.locate(ground, model, time).is_none(),
             |log| log > libm::log(LEAST_DENSITY),
         );
-        if is_likely && leads_to(ground.layout, ground.turnouts, last, node, LOOK_PAST) {
+        // The very next contact is believed whenever a train can have got there: contacts that report by themselves do so
+        // anywhere, and forecasts of a train that is not known yet are poor.
+        let is_next = leads_to(ground.layout, ground.turnouts, last, node, 0)
+            && self.in_time(ground.layout, self.last, node, time);
+        if is_next || is_likely && leads_to(ground.layout, ground.turnouts, last, node, LOOK_PAST) {
             self.take(node, time);
             return Verdict::Passed(node);
         }
