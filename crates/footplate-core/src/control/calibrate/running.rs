@@ -19,7 +19,7 @@ const RESERVE: TimeSpan = TimeSpan::from_ms(5_000);
 const LAST_STOP: TimeSpan = TimeSpan::from_ms(4_000);
 
 /// From when a train should stand to when it surely does, reports of its last contact included.
-const AFTER_REST: TimeSpan = TimeSpan::from_ms(400);
+const AFTER_REST: TimeSpan = TimeSpan::from_ms(1_200);
 
 /// A rest is aimed at least this far short of a contact: a train at a crawl has then been moving for a while ...
 const LEAST_SHORT: Length = Length::from_mm(30.0);
