@@ -116,6 +116,12 @@ impl Locator {
         self.train
     }
 
+    /// Whether anybody knows where it is.
+    #[must_use]
+    pub const fn is_located(&self) -> bool {
+        self.node.is_some()
+    }
+
     fn seconds(&self, time: Timestamp) -> f64 {
         (time - self.epoch).as_s()
     }

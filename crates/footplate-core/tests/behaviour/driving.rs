@@ -165,6 +165,18 @@ fn after_turning_around_a_train_is_known_to_the_centimetre_and_stops_in_the_othe
 }
 
 #[test]
+fn a_train_never_runs_off_the_end_of_the_track() {
+    for throttle in [6, 10, 14] {
+        let mut world = ToyRailway::new(24, "E1", 20.0);
+        let mut driver = driver_of(&world, "E1", 20.0);
+        driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
+        world.run(&mut driver, 40.0);
+        assert!(!world.train().is_off_the_track && world.train().speed_mm_per_s < 1.0);
+        assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::TrackEnds { .. })));
+    }
+}
+
+#[test]
 fn a_turnout_is_never_thrown_under_a_train() {
     let mut world = ToyRailway::new(24, "A1", 190.0);
     let mut driver = driver_of(&world, "A1", 190.0);

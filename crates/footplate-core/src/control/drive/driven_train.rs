@@ -1,12 +1,13 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::{DueContact, Ground, Located, Locator, PassedContact, WayPoint};
+use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint};
 use crate::event::{Command, Event, EventKind};
-use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
+use super::expectation::Expectation;
 use super::felt_way::{contacts_until, counted_from, landmark_at};
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
@@ -25,10 +26,6 @@ const REST_MARGIN_PART: f64 = 0.2;
 const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
 /// A command is written within two polls of a few dozen bytes; after this long the line is not what it was.
 const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
-/// A contact is overdue this long after the last of 99.7 % of cases.
-const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
-/// And the train is lost when at least this long has passed, or twice the way there: contacts are missed now and then.
-const LOST: TimeSpan = TimeSpan::from_s(10.0);
 /// A contact this many standard deviations behind a train has certainly been passed, if the train runs as it should.
 const CERTAINLY: f64 = 4.0;
 /// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
@@ -44,12 +41,8 @@ pub(super) struct DrivenTrain {
     pub(super) told: SpeedStep,
     /// What has not left yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
-    /// The next contact as it was expected when something was last known.
-    due: Option<DueContact>,
-    since: Timestamp,
-    overdue_said: bool,
-    /// A contact that should have reported it, and nothing has reported it since.
-    unseen: Option<SensorId>,
+    /// What should come next.
+    pub(super) expected: Expectation,
 }
 
 impl DrivenTrain {
@@ -60,10 +53,7 @@ impl DrivenTrain {
             task: None,
             told: SpeedStep::STAND,
             unsent: None,
-            due: None,
-            since: Timestamp::ZERO,
-            overdue_said: false,
-            unseen: None,
+            expected: Expectation::default(),
         }
     }
 
@@ -90,15 +80,10 @@ impl DrivenTrain {
         !self.stands(ground, now)
     }
 
-    /// A contact that should have reported it long ago: it may never have come there.
-    pub(super) const fn unseen(&self) -> Option<SensorId> {
-        self.unseen
-    }
-
     /// A person says where it is.
     pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
         self.locator.place(now, at, uncertainty);
-        self.unseen = None;
+        self.expected.unseen = None;
         self.expect_next(ground, now);
     }
 
@@ -241,9 +226,9 @@ impl DrivenTrain {
         passed: PassedContact,
         out: &mut Outputs,
     ) {
-        self.unseen = None;
+        self.expected.unseen = None;
         self.expect_next(ground, now);
-        out.say(DriveNotice::Passed { train: self.id(), passed, next: self.due });
+        out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
@@ -273,16 +258,7 @@ impl DrivenTrain {
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
-        [phase, unsent, self.next_doubt()].into_iter().flatten().min()
-    }
-
-    /// When a contact that does not come is overdue, and after that when the train is lost.
-    fn next_doubt(&self) -> Option<Timestamp> {
-        let due = self.due.filter(|_| self.told > SpeedStep::STAND)?;
-        let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
-        let way = due.time - self.since;
-        let lost = LOST.max(way + way);
-        Some(latest + if self.overdue_said { lost } else { OVERDUE })
+        [phase, unsent, self.next_doubt(), self.guard()].into_iter().flatten().min()
     }
 
     pub(super) fn handle_timeout(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
@@ -293,7 +269,14 @@ impl DrivenTrain {
                 self.tell(now, command, out);
             }
         }
-        let Some(task) = self.task else { return self.doubt(now, out) };
+        self.keep_on_track(ground, now, out);
+        if let Some(task) = self.task {
+            self.go_on(ground, now, task, out);
+        }
+        self.doubt(now, out);
+    }
+
+    fn go_on(&mut self, ground: Ground<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
             Phase::Running { plan: Some(plan) } if plan.leaves - LINE_TIME <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
@@ -306,25 +289,6 @@ impl DrivenTrain {
                 self.rested(ground, now, task, promise, out);
             }
             _ => {}
-        }
-        self.doubt(now, out);
-    }
-
-    fn doubt(&mut self, now: Timestamp, out: &mut Outputs) {
-        let (Some(at), Some(due)) = (self.next_doubt(), self.due) else { return };
-        if now < at {
-            return;
-        }
-        if self.overdue_said {
-            self.locator.lose();
-            (self.due, self.unseen) = (None, None);
-            let train = self.id();
-            out.say(DriveNotice::Lost { train });
-            self.give_up(now, Refusal::Lost { train }, out);
-        } else {
-            self.overdue_said = true;
-            self.unseen.get_or_insert(due.sensor);
-            out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
         }
     }
 
@@ -386,22 +350,10 @@ impl DrivenTrain {
         if let Some(located) = located {
             let certain = located.at.way - located.uncertainty * CERTAINLY;
             let passed = contacts_until(ground, &self.model, located.at.node, certain).last();
-            self.unseen = self.unseen.or(passed.map(|(sensor, _)| sensor));
+            self.expected.unseen = self.expected.unseen.or(passed.map(|(sensor, _)| sensor));
         }
         self.task = None;
-        let unseen = self.unseen;
+        let unseen = self.expected.unseen;
         out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
-    }
-
-    /// The next contact and when it is due.
-    pub(super) fn due(&self) -> Option<(SensorId, Timestamp)> {
-        self.due.map(|due| (due.sensor, due.time))
-    }
-
-    /// Looks ahead to the next contact.
-    pub(super) fn expect_next(&mut self, ground: Ground<'_>, now: Timestamp) {
-        self.due = self.locator.next_contact(ground, &self.model, now);
-        self.since = now;
-        self.overdue_said = false;
     }
 }

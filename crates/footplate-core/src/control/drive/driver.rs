@@ -120,6 +120,12 @@ impl Driver {
         self.trains.get(&train).is_some_and(|train| train.stands(self.track.ground(), now))
     }
 
+    /// The step that a train was told last, whether or not that has left yet; 0 for one that is not driven here.
+    #[must_use]
+    pub fn told(&self, train: TrainId) -> SpeedStep {
+        self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.told)
+    }
+
     /// The order that a train is busy with.
     #[must_use]
     pub fn busy(&self, train: TrainId) -> Option<OrderId> {

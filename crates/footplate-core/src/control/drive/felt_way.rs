@@ -64,6 +64,12 @@ pub(super) fn contacts_until<'g>(
         .filter_map(|(hop, [_, end])| Some((hop.sensor?, end)))
 }
 
+/// Where the way ahead of a node ends, and how far that is; `None` on a circuit, and where a turnout is not known.
+pub(super) fn track_end(ground: Ground<'_>, model: &MotionModel, from: NodeId) -> Option<(NodeId, Length)> {
+    let (hop, [_, end]) = felt_hops(ground, model, from).find(|(hop, _)| hop.sensor.is_none())?;
+    Some((hop.to, end))
+}
+
 /// A point of the way as people name it: from the last contact before it, in surveyed lengths.
 pub(super) fn landmark_at(ground: Ground<'_>, model: &MotionModel, point: WayPoint) -> Landmark {
     let mut landmark = Landmark { node: point.node, offset: point.way };

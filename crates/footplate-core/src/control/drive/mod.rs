@@ -9,6 +9,7 @@ mod attribution;
 mod command_time;
 mod driven_train;
 mod driver;
+mod expectation;
 mod felt_way;
 mod known_track;
 mod notice;

@@ -2,7 +2,7 @@
 
 use crate::estimation::{DueContact, PassedContact};
 use crate::event::Command;
-use crate::ids::{SensorId, TrainId, TurnoutId};
+use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
 use crate::units::Length;
@@ -77,6 +77,13 @@ pub enum DriveNotice {
         sensor: SensorId,
         /// By how much.
         by: TimeSpan,
+    },
+    /// The track ends ahead of a train. It has been told to stop.
+    TrackEnds {
+        /// The train.
+        train: TrainId,
+        /// Where.
+        end: NodeId,
     },
     /// Nobody knows any more where a train is. It has been told to stop.
     Lost {

@@ -81,6 +81,13 @@ pub enum Refusal {
         /// The train.
         train: TrainId,
     },
+    /// The track ends ahead of the train, which has been stopped for that.
+    TrackEnds {
+        /// The train.
+        train: TrainId,
+        /// Where.
+        end: String,
+    },
     /// The train still moves, and this is for a train at rest.
     StillMoves {
         /// The train.
@@ -158,6 +165,9 @@ impl fmt::Display for Refusal {
                 f,
                 "nobody knows where train {train} is: let it run over a contact, as with `speed {train} 6`"
             ),
+            Self::TrackEnds { train, end } => {
+                write!(f, "the track ends at `{end}` ahead of train {train}, which was stopped for that")
+            }
             Self::StillMoves { train } => {
                 write!(f, "train {train} still moves: wait until it is at rest")
             }

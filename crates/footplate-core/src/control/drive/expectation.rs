@@ -1,0 +1,130 @@
+//! What should happen next to a train that runs, and what follows when it does not.
+
+use crate::estimation::{DueContact, Ground, WayPoint};
+use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Ratio};
+
+use super::command_time::{CommandTime, command_time};
+use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::felt_way::track_end;
+use super::notice::DriveNotice;
+use super::order::Aim;
+use super::outputs::Outputs;
+use super::refusal::Refusal;
+use super::task::Phase;
+
+/// A contact is overdue this long after the last of 99.7 % of cases.
+const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
+/// And the train is lost when at least this long has passed, or twice the way there: contacts are missed now and then.
+const LOST: TimeSpan = TimeSpan::from_s(10.0);
+/// Where nobody knows which contact comes next, it is lost after this long: the longest way of the known tracks between
+/// two contacts, 1.5 m, at a crawl.
+const LOST_WITHOUT: TimeSpan = TimeSpan::from_s(40.0);
+/// What of a train is ahead of its pickup, and a little: this much of the track is left before its end.
+const BEFORE_END: Length = Length::from_mm(200.0);
+/// How often a train that is stopped for the end of the track may come nearer than that.
+const NEARER: Ratio = Ratio::from_percent(0.1);
+
+/// What is expected of a train, as of when something was last known.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Expectation {
+    /// The next contact.
+    pub(super) due: Option<DueContact>,
+    since: Timestamp,
+    overdue_said: bool,
+    /// A contact that should have reported it, and nothing has reported it since.
+    pub(super) unseen: Option<SensorId>,
+    /// When it has to be told to stop because the track ends, and where.
+    end: Option<(Timestamp, NodeId)>,
+}
+
+impl DrivenTrain {
+    /// A contact that should have reported it long ago: it may never have come there.
+    pub(super) const fn unseen(&self) -> Option<SensorId> {
+        self.expected.unseen
+    }
+
+    /// The next contact and when it is due.
+    pub(super) fn due(&self) -> Option<(SensorId, Timestamp)> {
+        self.expected.due.map(|due| (due.sensor, due.time))
+    }
+
+    /// Looks ahead to the next contact, and to the end of the track.
+    pub(super) fn expect_next(&mut self, ground: Ground<'_>, now: Timestamp) {
+        let due = self.locator.next_contact(ground, &self.model, now);
+        let end = self.end_of_track(ground, now);
+        let unseen = self.expected.unseen;
+        self.expected = Expectation { due, since: now, overdue_said: false, unseen, end };
+    }
+
+    /// When a contact that does not come is overdue, and after that when the train is lost.
+    pub(super) fn next_doubt(&self) -> Option<Timestamp> {
+        if self.told == SpeedStep::STAND {
+            return None;
+        }
+        let Expectation { due, since, overdue_said, .. } = self.expected;
+        let Some(due) = due else {
+            return self.locator.is_located().then_some(since + LOST_WITHOUT);
+        };
+        let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
+        let way = due.time - since;
+        let lost = LOST.max(way + way);
+        Some(latest + if overdue_said { lost } else { OVERDUE })
+    }
+
+    pub(super) fn doubt(&mut self, now: Timestamp, out: &mut Outputs) {
+        if self.next_doubt().is_none_or(|at| now < at) {
+            return;
+        }
+        match self.expected.due {
+            Some(due) if !self.expected.overdue_said => {
+                self.expected.overdue_said = true;
+                self.expected.unseen.get_or_insert(due.sensor);
+                out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+            }
+            _ => {
+                self.locator.lose();
+                self.expected = Expectation { since: now, ..Expectation::default() };
+                let train = self.id();
+                out.say(DriveNotice::Lost { train });
+                self.give_up(now, Refusal::Lost { train }, out);
+            }
+        }
+    }
+
+    /// When the train has to be told to stop so that it stays on the track. Whoever has a plan stops earlier.
+    pub(super) fn guard(&self) -> Option<Timestamp> {
+        let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
+        let (leaves, _) = self.expected.end.filter(|_| self.told > SpeedStep::STAND && !has_plan)?;
+        Some(leaves - LINE_TIME)
+    }
+
+    /// Stops the train where the track ends ahead of it.
+    pub(super) fn keep_on_track(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+        if let (Some(at), Some((_, end))) = (self.guard(), self.expected.end)
+            && at <= now
+        {
+            self.expected.end = None;
+            let (train, name) = (self.id(), ground.layout.node_name(end).into());
+            out.say(DriveNotice::TrackEnds { train, end });
+            self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
+        }
+    }
+
+    fn end_of_track(&self, ground: Ground<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
+        let located = self.located(ground, now).filter(|_| self.told > SpeedStep::STAND)?;
+        let (end, way) = track_end(ground, &self.model, located.at.node)?;
+        let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
+        let earliest = now + LINE_TIME;
+        let found = command_time(earliest, |leaves| {
+            let rest = self.locator.rest_if_stopped(ground, &self.model, leaves)?;
+            Some((rest, self.aimed_beyond(ground, &rest, at, Aim::NotBeyond(NEARER))?))
+        });
+        match found {
+            CommandTime::At(leaves, _) => Some((leaves, end)),
+            CommandTime::TooLate(..) => Some((earliest, end)),
+            CommandTime::Never => None,
+        }
+    }
+}
