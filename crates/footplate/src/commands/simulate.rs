@@ -3,6 +3,7 @@
 mod layout;
 mod line;
 mod recording;
+mod station;
 mod truth;
 
 use std::io::Write;

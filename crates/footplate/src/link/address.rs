@@ -131,7 +131,11 @@ fn times(value: &str) -> Result<f64, String> {
 }
 
 impl SimulatedAddress {
-    fn of(layout: &str) -> Result<Self, String> {
+    /// A layout as it is if nothing more is said.
+    ///
+    /// # Errors
+    /// When no layout is named.
+    pub(crate) fn of(layout: &str) -> Result<Self, String> {
         if layout.is_empty() {
             return Err("`sim:` wants a layout; write sim:track-a or the path of a layout file".into());
         }

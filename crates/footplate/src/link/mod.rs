@@ -4,18 +4,21 @@
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`
 //! open        an address becomes a link
 //! simulated   a virtual station in this process, as fast as it goes or paced
+//! served      a virtual station for other programs, at a network port or a pseudo-terminal
 //! stream      a serial port or a network connection, read by a thread, with the clock of this computer
 //! ```
 
 mod address;
 mod open;
+mod served;
 mod simulated;
 mod stream;
 
 use footplate_core::{TimeSpan, Timestamp};
 
-pub(crate) use address::{Address, Port, SerialAddress, SimulatedAddress, Speed};
+pub(crate) use address::{Address, Port, SerialAddress, SimulatedAddress, Speed, trains};
 pub(crate) use open::{module_count, open, open_simulated, session_settings, station};
+pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use stream::StreamLink;
 

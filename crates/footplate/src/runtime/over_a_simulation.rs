@@ -21,6 +21,10 @@ pub(super) struct Runs {
 }
 
 impl Runs {
+    pub(super) fn none() -> Self {
+        Self { commands: Vec::new(), heard: Vec::new() }
+    }
+
     pub(super) fn two() -> Self {
         let step = |step| SpeedStep::new(step).expect("a step");
         let commands =

@@ -11,6 +11,7 @@ use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
 use footplate_store::{layout_named, write_sensor_log, write_whole};
 
 use super::super::Outcome;
+use super::station::{Place, Wanted, place_named, serve};
 use super::{recording, truth};
 
 /// Let model trains run through a scenario, each on its own.
@@ -18,6 +19,9 @@ use super::{recording, truth};
 /// For every train three files are written to the folder: train-N.csv, a sensor log as `footplate calibrate` and
 /// `footplate predict` read it; train-N-truth.csv, what was behind each line of it and where the train was; and
 /// train-N-truth.json, the true speeds, law, delays and lengths. The same seed writes the same bytes.
+///
+/// With `--station` nothing is written: a simulated 6051 with trains on the layout serves other programs at a network port
+/// or a pseudo-terminal, whose link address is the one line it prints, until Ctrl-C.
 #[derive(Args)]
 #[command(
     after_help = "Example: footplate simulate layout --layout track-a --trains 3 --scenario calibration --seed 7 \
@@ -28,24 +32,33 @@ pub(super) struct Arguments {
     #[arg(long, default_value = "track-a")]
     layout: String,
     /// What is done; `footplate simulate --list` names all.
-    #[arg(long, value_parser = scenario_named)]
-    scenario: Scenario,
+    #[arg(long, value_parser = scenario_named, required_unless_present = "station")]
+    scenario: Option<Scenario>,
     /// How the trains change speed; left out, each train has the next law.
     #[arg(long, value_parser = law_named)]
     law: Option<LawFamily>,
-    /// How many trains.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=999))]
-    trains: u16,
+    /// How many trains, 1 if left out; with `--station` their addresses, 24,58 if left out.
+    #[arg(long)]
+    trains: Option<String>,
     /// The seed of the world.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The folder to write to; made if it is not there.
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(long, required_unless_present = "station")]
+    out: Option<PathBuf>,
     /// Report on the files as JSON, a line for each train.
     #[arg(long)]
     json: bool,
+    /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `pty` for a pseudo-terminal.
+    #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
+    station: Option<Place>,
+    /// How many times faster than real time the station runs.
+    #[arg(long, default_value_t = 1.0, requires = "station")]
+    speed: f64,
 }
+
+/// More trains than have addresses in any form of recording.
+const MOST_TRAINS: u16 = 999;
 
 /// Prints the scenarios and laws.
 pub(super) fn list(output: &mut dyn Write) -> anyhow::Result<()> {
@@ -61,19 +74,47 @@ pub(super) fn list(output: &mut dyn Write) -> anyhow::Result<()> {
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
+        let (Some(scenario), Some(out)) = (self.scenario, &self.out) else {
+            self.serve(&layout, output)?;
+            return Ok(Outcome::Done);
+        };
+        let trains = self.train_count()?;
         let railway = Railway::draw(&layout, self.seed)?;
-        std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("cannot make folder `{}`", self.out.display()))?;
-        for number in 1..=self.trains {
+        std::fs::create_dir_all(out).with_context(|| format!("cannot make folder `{}`", out.display()))?;
+        for number in 1..=trains {
             // Trains of one seed share the rails; seeds of neighbouring worlds share no train.
             let seed = self.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
             let law = self.law.unwrap_or_else(|| nth_law(seed));
-            let simulated = SimulatedRecording::draw(&railway, self.scenario, TrainId(number), law, seed);
-            self.write(&layout, &railway, &simulated, output)?;
+            let simulated = SimulatedRecording::draw(&railway, scenario, TrainId(number), law, seed);
+            let files = Files { out, scenario, json: self.json };
+            files.write(&layout, &railway, &simulated, output)?;
         }
         Ok(Outcome::Done)
     }
 
+    fn train_count(&self) -> anyhow::Result<u16> {
+        let Some(written) = &self.trains else { return Ok(1) };
+        let count = written.parse().ok().filter(|count| (1..=MOST_TRAINS).contains(count));
+        count.ok_or_else(|| anyhow!("`{written}` is no number of trains; write 1 to {MOST_TRAINS}"))
+    }
+
+    fn serve(&self, layout: &Layout, output: &mut dyn Write) -> anyhow::Result<()> {
+        let place = self.station.as_ref().context("say with --station where other programs find it")?;
+        let trains = self.trains.as_deref();
+        let wanted =
+            Wanted { layout: &self.layout, seed: self.seed, trains, law: self.law, speed: self.speed };
+        serve(place, &wanted, layout, output)
+    }
+}
+
+/// Where the files of each train go.
+struct Files<'a> {
+    out: &'a Path,
+    scenario: Scenario,
+    json: bool,
+}
+
+impl Files<'_> {
     fn write(
         &self,
         layout: &Layout,

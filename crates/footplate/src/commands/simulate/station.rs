@@ -1,0 +1,94 @@
+//! `footplate simulate layout --station`: a simulated 6051 for any program that speaks to one.
+
+use std::io::Write;
+use std::sync::mpsc::Receiver;
+
+use anyhow::{Context, anyhow, bail};
+use footplate_core::track::Layout;
+use footplate_sim::LawFamily;
+
+use crate::link::{Incoming, Server, SimulatedAddress, listen_on, open_pseudo_terminal, station, trains};
+use crate::runtime::StopFlag;
+
+/// Where a simulated station is put.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Place {
+    /// At an address of this computer, such as `127.0.0.1:0`; port 0 is any that is free.
+    Tcp(String),
+    /// At a pseudo-terminal.
+    PseudoTerminal,
+}
+
+pub(super) fn place_named(text: &str) -> anyhow::Result<Place> {
+    match text.strip_prefix("tcp:") {
+        Some(address) if address.contains(':') => Ok(Place::Tcp(address.trim_start_matches('/').to_owned())),
+        None if text == "pty" => Ok(Place::PseudoTerminal),
+        _ => Err(anyhow!("write tcp:127.0.0.1:0 for a network port or pty for a pseudo-terminal")),
+    }
+}
+
+/// What is simulated.
+pub(super) struct Wanted<'a> {
+    pub(super) layout: &'a str,
+    pub(super) seed: u64,
+    pub(super) trains: Option<&'a str>,
+    pub(super) law: Option<LawFamily>,
+    pub(super) speed: f64,
+}
+
+/// Serves until somebody stops the program.
+pub(super) fn serve(
+    place: &Place,
+    wanted: &Wanted<'_>,
+    layout: &Layout,
+    output: &mut dyn Write,
+) -> anyhow::Result<()> {
+    let mut address = SimulatedAddress::of(wanted.layout).map_err(|error| anyhow!(error))?;
+    (address.seed, address.law) = (wanted.seed, wanted.law);
+    if let Some(named) = wanted.trains {
+        address.trains = trains(named).map_err(|error| anyhow!(error))?;
+    }
+    if !(wanted.speed > 0.0 && wanted.speed.is_finite()) {
+        bail!("speed {} is no multiple of real time; write --speed 20", wanted.speed);
+    }
+    let station = station(&address, layout)?;
+    let (port, incoming) = open(place)?;
+    let stop = StopFlag::install();
+    let speed = wanted.speed;
+    writeln!(output, "marklin-serial:{port}?pace=fast&speed={speed}")?;
+    output.flush()?;
+    let named: Vec<String> = address.trains.iter().map(ToString::to_string).collect();
+    eprintln!(
+        "a simulated 6051 with trains {} on {}, seed {}; Ctrl-C ends it",
+        named.join(", "),
+        wanted.layout,
+        address.seed
+    );
+    let mut server = Server::new(station, speed, incoming);
+    server.serve(|| stop.is_up());
+    say_what_happened(&server);
+    Ok(())
+}
+
+fn open(place: &Place) -> anyhow::Result<(String, Receiver<Incoming>)> {
+    match place {
+        Place::Tcp(address) => {
+            let (port, incoming) =
+                listen_on(address).with_context(|| format!("cannot listen on {address}"))?;
+            let host = address.rsplit_once(':').map_or(address.as_str(), |(host, _)| host);
+            Ok((format!("tcp://{host}:{port}"), incoming))
+        }
+        Place::PseudoTerminal => open_pseudo_terminal().context("cannot open a pseudo-terminal"),
+    }
+}
+
+fn say_what_happened(server: &Server<'_>) {
+    for mishap in server.station().world().mishaps() {
+        let train = mishap.train.map_or_else(String::new, |train| format!("train {train}: "));
+        eprintln!("at {:.1} s {train}{:?}", mishap.at.as_s(), mishap.kind);
+    }
+    for alarm in server.station().alarms() {
+        let since = alarm.since.as_s();
+        eprintln!("the solenoid of turnout {} was powered for too long, from {since:.1} s", alarm.turnout);
+    }
+}
