@@ -10,4 +10,5 @@ mod marklin_serial_bench;
 mod marklin_serial_line;
 mod marklin_serial_mishaps;
 mod marklin_serial_round_trip;
+mod marklin_serial_transcript;
 mod marklin_serial_vectors;
