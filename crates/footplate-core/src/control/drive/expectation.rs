@@ -60,7 +60,8 @@ impl DrivenTrain {
 
     /// When a contact that does not come is overdue, and after that when the train is lost.
     pub(super) fn next_doubt(&self) -> Option<Timestamp> {
-        if self.told == SpeedStep::STAND {
+        // Nothing is expected of a train that has not heard yet that it should move.
+        if self.told == SpeedStep::STAND || !self.is_told() {
             return None;
         }
         let Expectation { due, since, overdue_said, .. } = self.expected;
