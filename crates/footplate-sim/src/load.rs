@@ -20,7 +20,7 @@ const STALL_BELOW_MM_PER_S: f64 = 50.0;
 const STALL_CHANCE: f64 = 0.15;
 
 /// All influences on the speed of a run, as a factor on the speed of the wheels; `T` is how the train is held.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Load<T> {
     train: T,
     draws: Draws,

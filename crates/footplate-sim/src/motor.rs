@@ -173,6 +173,12 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         self.pending = Some((step, self.train.change_dead_time.as_s()));
     }
 
+    /// A train at rest is told a step and obeys as on an average day.
+    pub(crate) fn start_without_scatter(&mut self, step: SpeedStep) {
+        self.breakaway = Some(self.train.breakaway.as_mm_per_s());
+        self.pending = Some((step, self.train.start_dead_time.as_s()));
+    }
+
     /// How far the wheels still roll until they rest, on level straight track and without scatter, in mm.
     pub(crate) fn way_to_rest_mm(mut self) -> f64 {
         let mut way = 0.0;

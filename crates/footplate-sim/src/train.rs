@@ -4,7 +4,7 @@ use footplate_core::{Acceleration, Approach, Length, Ratio, Speed, SpeedStep, Ti
 
 use crate::draws::{Draws, Purpose};
 use crate::law::{Law, LawFamily};
-use crate::motor::Motor;
+use crate::motor::{Motor, STEP_S};
 use crate::speed_table::{Shape, SpeedTable};
 
 /// How far stops from one speed scatter, over and above what run deviation and command jitter do.
@@ -141,6 +141,29 @@ impl Train {
         let mut motor = Motor::running(self, step, approach);
         motor.command_without_scatter(SpeedStep::STAND);
         Length::from_mm(motor.way_to_rest_mm())
+    }
+
+    /// The way within a time since the decoder had a step, of a train that stood or ran steadily at another, on level
+    /// straight track, in an average run without scatter; integrated, not looked up.
+    #[must_use]
+    pub fn way_after(&self, from: SpeedStep, approach: Approach, to: SpeedStep, within: TimeSpan) -> Length {
+        let mut motor = if from == SpeedStep::STAND {
+            let mut motor = Motor::at_rest(self);
+            motor.start_without_scatter(to);
+            motor
+        } else {
+            let mut motor = Motor::running(self, from, approach);
+            motor.command_without_scatter(to);
+            motor
+        };
+        let steps = (within.as_s().clamp(0.0, 600.0) / STEP_S) as usize;
+        let mut speed = motor.wheel_speed();
+        let way = (0..steps).fold(0.0, |way, _| {
+            let before = speed;
+            speed = motor.advance();
+            way + 0.5 * (before + speed) * STEP_S
+        });
+        Length::from_mm(way)
     }
 }
 

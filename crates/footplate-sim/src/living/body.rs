@@ -46,7 +46,7 @@ pub(crate) enum Met {
 }
 
 /// A train's body.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Body {
     way: VecDeque<Under>,
     /// The leading end of the shoe.
@@ -311,7 +311,11 @@ impl Body {
 }
 
 /// The edge after an edge while turnouts lie as they do.
-fn after(rails: &Rails<'_>, lies: &impl Fn(TurnoutId) -> Option<Leg>, edge: EdgeId) -> Option<EdgeId> {
+pub(crate) fn after(
+    rails: &Rails<'_>,
+    lies: &impl Fn(TurnoutId) -> Option<Leg>,
+    edge: EdgeId,
+) -> Option<EdgeId> {
     match rails.rail(edge)?.ahead {
         Ahead::Edge(next) => Some(next),
         Ahead::Points { turnout, straight, curved } => {

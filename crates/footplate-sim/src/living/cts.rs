@@ -31,7 +31,7 @@ impl CtsSwitch {
 }
 
 /// Whether the station is ready, and when that will change.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Cts {
     switch: CtsSwitch,
     pub(crate) is_up: bool,

@@ -51,7 +51,7 @@ pub(crate) enum Order {
 }
 
 /// One train.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct LiveTrain {
     pub(crate) id: TrainId,
     pub(crate) train: Arc<Train>,

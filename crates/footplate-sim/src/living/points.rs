@@ -22,7 +22,7 @@ struct Turnout {
 }
 
 /// All turnouts of a layout.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Points {
     by_number: Vec<Option<Turnout>>,
     failure: Ratio,

@@ -6,7 +6,7 @@ use footplate_core::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::track::TrueTrack;
 
 /// One direction of travel over a stretch of rail.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Rail {
     pub(crate) length_mm: f64,
     /// Speed on it over speed on a level straight one.
@@ -32,7 +32,7 @@ pub(crate) enum Ahead {
 }
 
 /// All edges of a layout as they really are.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Rails<'l> {
     pub(crate) layout: &'l Layout,
     pub(crate) track: TrueTrack,

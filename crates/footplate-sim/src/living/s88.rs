@@ -22,7 +22,7 @@ struct Change {
 }
 
 /// All contacts and what is remembered of them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct S88 {
     faults: Faults,
     draws: Draws,

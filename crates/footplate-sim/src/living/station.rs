@@ -77,7 +77,7 @@ struct Coil {
 }
 
 /// A living layout behind the bytes of a 6051, on a clock of its own.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct VirtualStation<'l> {
     world: LivingLayout<'l>,
     switches: StationSwitches,

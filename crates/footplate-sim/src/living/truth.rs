@@ -4,11 +4,16 @@ use footplate_core::track::Position;
 use footplate_core::{EdgeId, Length, SensorId, Speed, Timestamp, TrainId};
 
 use crate::contacts::Cause;
-use crate::living::body::Body;
+use crate::living::body::{Body, after};
 use crate::living::live_train::{End, LiveTrain};
 use crate::living::world::LivingLayout;
 use crate::track::TrueTrack;
 use crate::train::Train;
+
+/// Further away than anybody asks (chosen: twice round a large layout).
+const FAR_MM: f64 = 20_000.0;
+/// Positions are told by a contact no further away (chosen: longer than any hop of the course layouts).
+const NEAR_MM: f64 = 5000.0;
 
 /// The truth about a living layout.
 #[derive(Debug, Clone, Copy)]
@@ -105,6 +110,93 @@ impl<'w, 'l> Truth<'w, 'l> {
     #[must_use]
     pub fn track(&self) -> &'w TrueTrack {
         &self.world.rails.track
+    }
+
+    /// How far the leading end of a train's shoe is past where it closes a contact, in true lengths, short of it if
+    /// negative: the way since it came by or, if that is nearer, the way to it as the turnouts lie. Nothing if neither
+    /// is less than 20 m.
+    #[must_use]
+    pub fn past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
+        let found = self.found(train)?;
+        let by = |pass: &&PassTruth| pass.train == Some(train) && pass.sensor == sensor;
+        let passed = self.world.s88.passes.iter().rev().find(by);
+        let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
+        let before = self.way_to(found.body.as_ref()?.place()?, sensor);
+        let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
+        let mm = match (since, before) {
+            (Some(since), Some(before)) => nearer(since, before),
+            (Some(since), None) => since,
+            (None, before) => -before?,
+        };
+        Some(Length::from_mm(mm))
+    }
+
+    /// How long the way from one contact to another feels to a train: the length that it would run on level straight
+    /// rails in the same time. `edges` lead from the one to the other.
+    #[must_use]
+    pub fn felt(&self, train: TrainId, edges: &[EdgeId], from: SensorId, to: SensorId) -> Option<Length> {
+        let feel = self.engine(train)?.curve_feel;
+        let track = self.track();
+        let slower = |edge: &EdgeId| 1.0 + feel * (track.speed_factor(*edge).as_parts() - 1.0);
+        let way: Length = edges.iter().map(|edge| track.length(*edge) / slower(edge)).sum();
+        // Contacts are a few millimetres from their nodes: which rails those lie on makes no difference.
+        let offset = |sensor, edge: Option<&EdgeId>| track.contact_offset(sensor) / edge.map_or(1.0, slower);
+        Some(way - offset(from, edges.first()) + offset(to, edges.last()))
+    }
+
+    /// The same as [`past`](Self::past), as long as it feels to the train; only up to 5 m.
+    #[must_use]
+    pub fn felt_past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
+        let found = self.found(train)?;
+        let place = found.body.as_ref()?.place()?;
+        let contact = self.contact(sensor)?;
+        let feel = found.train.curve_feel;
+        let past = self.felt_way(feel, contact, place);
+        let short = || self.felt_way(feel, place, contact).map(|mm| -mm);
+        past.or_else(short).map(Length::from_mm)
+    }
+
+    /// Where a contact closes.
+    fn contact(&self, sensor: SensorId) -> Option<(EdgeId, f64)> {
+        let layout = self.world.layout();
+        layout.edges().find_map(|(id, _)| {
+            let contacts = &self.world.rails.rail(id)?.contacts;
+            contacts.iter().find(|(_, found)| *found == sensor).map(|(at, _)| (id, *at))
+        })
+    }
+
+    /// The way ahead from one place to another as the turnouts lie and as long as it feels, in mm.
+    fn felt_way(&self, feel: f64, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
+        let rails = &self.world.rails;
+        let lies = |turnout| self.world.points.lies(turnout);
+        let (mut edge, mut begins, mut felt) = (from.0, from.1, 0.0);
+        while felt < NEAR_MM {
+            let rail = rails.rail(edge)?;
+            let slower = 1.0 + feel * (rail.factor - 1.0);
+            if edge == to.0 && begins <= to.1 {
+                return Some(felt + (to.1 - begins) / slower);
+            }
+            felt += ((rail.length_mm - begins) / slower).max(f64::MIN_POSITIVE);
+            (edge, begins) = (after(rails, &lies, edge)?, 0.0);
+        }
+        None
+    }
+
+    /// The true way from a place to where a contact ahead closes, as the turnouts lie, in mm.
+    fn way_to(&self, (edge, offset): (EdgeId, f64), sensor: SensorId) -> Option<f64> {
+        let rails = &self.world.rails;
+        let lies = |turnout| self.world.points.lies(turnout);
+        let (mut edge, mut begins) = (edge, -offset);
+        while begins < FAR_MM {
+            let rail = rails.rail(edge)?;
+            let due = |(at, found): &&(f64, SensorId)| *found == sensor && begins + at > 0.0;
+            if let Some((at, _)) = rail.contacts.iter().find(due) {
+                return Some(begins + at);
+            }
+            begins += rail.length_mm.max(f64::MIN_POSITIVE);
+            edge = after(rails, &lies, edge)?;
+        }
+        None
     }
 
     /// Every standstill so far, in the order in which they began.

@@ -16,7 +16,7 @@ use crate::track::TrueTrack;
 use crate::train::Train;
 
 /// Trains on a layout, and everything that they do to each other. Its time moves only when it is told to.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct LivingLayout<'l> {
     pub(crate) rails: Rails<'l>,
     pub(crate) points: Points,
