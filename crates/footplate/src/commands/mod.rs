@@ -9,7 +9,6 @@ mod command;
 mod compare;
 mod completions;
 mod convert;
-mod demo;
 mod drive;
 mod layout;
 mod log_file;

@@ -1,8 +1,10 @@
 //! `footplate simulate`: worlds whose truth is known.
 
+mod driving;
 mod layout;
 mod line;
 mod recording;
+mod seeds;
 mod station;
 mod truth;
 
@@ -29,6 +31,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum World {
+    Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
 }
@@ -36,6 +39,7 @@ enum World {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         match self.world {
+            Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
             None => {

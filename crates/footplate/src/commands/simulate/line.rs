@@ -4,7 +4,6 @@ mod family;
 mod files;
 mod score_page;
 mod scored_run;
-mod seeds;
 mod world;
 
 use std::io::Write;
@@ -22,9 +21,9 @@ use self::family::Family;
 use self::files::WrittenRun;
 use self::score_page::ScorePage;
 use self::scored_run::{ScoredRun, score};
-use self::seeds::Seeds;
 use self::world::{Scenarios, World};
 use super::super::Outcome;
+use super::seeds::Seeds;
 use crate::progress::with_progress;
 use crate::spread::{all_cores, spread};
 

@@ -1,0 +1,120 @@
+//! `footplate simulate driving`: random trains calibrated and driven in the simulator, and scored by its truth.
+
+mod choice;
+mod figures;
+mod known_train;
+mod page;
+mod trial;
+mod virtual_line;
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use footplate_core::TimeSpan;
+use footplate_core::calibration::SectionIndex;
+use footplate_core::estimation::Ground;
+use footplate_core::track::Layout;
+use footplate_sim::LawFamily;
+use footplate_store::layout_named;
+
+use self::figures::ScoredTrain;
+use self::page::Page;
+use self::trial::{Counts, TRAIN, Trial, ahead, calibrate, world};
+use super::super::Outcome;
+use super::seeds::Seeds;
+use crate::progress::with_progress;
+use crate::spread::{all_cores, spread};
+
+/// Calibrate random trains from nothing known, drive them to exact stops, and score both by the truth.
+///
+/// Each seed is six trains, one for each law of speed change. Beside the calibrated driver the same world is driven by
+/// one that knows the truth, and as published course projects drive.
+#[derive(Args)]
+#[command(after_help = "Example: footplate simulate driving --seeds 1..5 --markdown")]
+pub(super) struct Arguments {
+    /// The layout: the name of a built-in one or a layout file.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// The seed of the trains, or of many: 1..30.
+    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
+    seeds: Seeds,
+    /// Track time that a calibration may take, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
+    budget: u16,
+    /// Write the scores as a page of the documentation.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: bool,
+    /// How many trains at once; without it, as many as there are cores. The result is the same.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// What is asked of each train.
+const COUNTS: Counts = Counts { mid_stops: 16, top_stops: 8, not_beyond: 12, moves: 12 };
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let seeds = self.seeds.iter();
+        let jobs: Vec<(u64, LawFamily)> =
+            seeds.flat_map(|seed| LawFamily::ALL.map(|law| (seed, law))).collect();
+        let budget = TimeSpan::from_s(f64::from(self.budget));
+        let threads = self.threads.unwrap_or_else(all_cores);
+        let trains = with_progress("driving", jobs.len(), |done| {
+            spread(jobs.len(), threads, |at| {
+                let (seed, law) = jobs[at];
+                let scored = score(&layout, seed, law, budget);
+                done.fetch_add(1, Ordering::Relaxed);
+                scored
+            })
+        })?;
+        let page = Page { trains: &trains, asked: self.asked() };
+        if self.json {
+            page.write_json(output)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// What was asked for, as on the command line.
+    fn asked(&self) -> String {
+        let mut asked = format!("--seeds {} --markdown", self.seeds.written());
+        if self.layout != "track-a" {
+            asked = format!("--layout {} {asked}", self.layout);
+        }
+        if self.budget != 300 {
+            asked = format!("--budget {} {asked}", self.budget);
+        }
+        asked
+    }
+}
+
+/// One train: calibrated, and then the same world driven by each.
+fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow::Result<ScoredTrain> {
+    let sections = SectionIndex::of(layout);
+    let mut line = world(layout, seed, law)?;
+    let calibrated = calibrate(layout, &mut line, budget);
+    // What is asked differs from train to train, and is the same whoever drives.
+    let asked = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
+    let way: Vec<_> = ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
+    let ground = Ground { layout, sections: &sections, turnouts: &calibrated.turnouts };
+    let knowing = known_train::known(ground, line.station.world().truth(), TRAIN, &way)?;
+    let mut by = Vec::new();
+    for model in [calibrated.model.clone(), knowing] {
+        let mut world = line.clone();
+        let known = trial::Calibrated { model, ..calibrated.clone() };
+        let mut trial = Trial::new(layout, &mut world, known, asked);
+        trial.run(COUNTS);
+        by.push(trial.results);
+    }
+    let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
+    Ok(ScoredTrain { law, seed, calibration_s, ending, by })
+}

@@ -1,0 +1,297 @@
+//! One train from nothing known to stops and moves, each beside the truth.
+
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::control::{
+    Aim, Calibrator, CalibratorSettings, DriveNotice, Driver, Order, OrderId, StopOrder,
+};
+use footplate_core::estimation::Locator;
+use footplate_core::track::{Landmark, Layout, TurnoutStates};
+use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
+
+use super::choice::Choice;
+use super::virtual_line::VirtualLine;
+
+/// The train's address.
+pub(super) const TRAIN: TrainId = TrainId(24);
+/// Steps of the decoders that all figures are about.
+const HIGHEST: u8 = 14;
+/// A calibration that has not ended by then is taken as it is.
+const CALIBRATION_PATIENCE_S: f64 = 420.0;
+/// An order that is not carried out by then has failed.
+const ORDER_PATIENCE_S: f64 = 60.0;
+/// How often the position is compared with the truth.
+const LOOK: TimeSpan = TimeSpan::from_ms(200);
+/// Mid steps are those with true speeds from here to there, top steps those that are faster, in mm/s: scatter is said
+/// to be 4 mm about 390 and 21 mm about 612 mm/s.
+const MID_MM_PER_S: std::ops::Range<f64> = 200.0..450.0;
+const TOP_FROM_MM_PER_S: f64 = 500.0;
+/// No loop has more contacts (chosen: half of those of Track A).
+const MOST_CONTACTS: usize = 40;
+
+/// How many of each are tried.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counts {
+    pub(super) mid_stops: usize,
+    pub(super) top_stops: usize,
+    /// With each probability.
+    pub(super) not_beyond: usize,
+    pub(super) moves: usize,
+}
+
+/// What is counted of one train.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Results {
+    /// Errors of stops in mm, beyond the target if positive.
+    pub(super) mid: Vec<f64>,
+    pub(super) top: Vec<f64>,
+    /// How far beyond stops ended that should not be beyond, by the probability allowed.
+    pub(super) not_beyond: [Vec<f64>; 2],
+    /// Distances ordered and gone, in mm.
+    pub(super) moves: Vec<[f64; 2]>,
+    /// How often the position was compared with the truth, and lay within the interval.
+    pub(super) looks: [u32; 2],
+    /// Orders that were refused or not carried out.
+    pub(super) failed: u32,
+    pub(super) mishaps: usize,
+    /// Why orders failed.
+    pub(super) failures: Vec<String>,
+}
+
+/// The probabilities of [`Results::not_beyond`], in percent.
+pub(super) const NOT_BEYOND_PERCENT: [f64; 2] = [5.0, 1.0];
+
+/// What a calibration leaves to whoever drives next.
+#[derive(Clone)]
+pub(super) struct Calibrated {
+    pub(super) model: MotionModel,
+    pub(super) locator: Locator,
+    pub(super) turnouts: TurnoutStates,
+    pub(super) seconds: f64,
+    pub(super) ending: String,
+}
+
+/// A world with one train that nothing is known of.
+pub(super) fn world(layout: &Layout, seed: u64, law: LawFamily) -> anyhow::Result<VirtualLine<'_>> {
+    let switches = LivingSwitches { law: Some(law), ..LivingSwitches::well_kept() };
+    let station = VirtualStation::draw(layout, seed, &[TRAIN], &switches)?;
+    Ok(VirtualLine::open(station)?)
+}
+
+/// Calibrates as a person would let it: from nothing, within the budget.
+pub(super) fn calibrate(layout: &Layout, line: &mut VirtualLine<'_>, budget: TimeSpan) -> Calibrated {
+    let highest = SpeedStep::new(HIGHEST).unwrap_or(SpeedStep::STAND);
+    let settings = CalibratorSettings { budget, ..CalibratorSettings::default() };
+    let mut calibrator = Calibrator::new(layout, settings, MotionFit::new(TRAIN, highest));
+    let began = line.now();
+    let patience = began + TimeSpan::from_s(CALIBRATION_PATIENCE_S) + budget;
+    calibrator.handle_start(began);
+    while line.now() < patience && calibrator.ending().is_none() {
+        let _ = line.drive(&mut calibrator, patience);
+    }
+    Calibrated {
+        turnouts: calibrator.turnouts().clone(),
+        locator: calibrator.locator().clone(),
+        seconds: (line.now() - began).as_s(),
+        ending: format!("{:?}", calibrator.ending()),
+        model: calibrator.into_fit().model().clone(),
+    }
+}
+
+/// The start of a machine that begins with the first word it hears.
+trait Begins {
+    fn handle_start(&mut self, now: Timestamp);
+}
+
+impl<M: footplate_core::control::Machine> Begins for M {
+    fn handle_start(&mut self, now: Timestamp) {
+        self.handle_timeout(now);
+    }
+}
+
+/// Drives a calibrated train and compares what comes of it with the truth.
+pub(super) struct Trial<'a, 'l> {
+    pub(super) layout: &'l Layout,
+    pub(super) line: &'a mut VirtualLine<'l>,
+    driver: Driver,
+    choice: Choice,
+    pub(super) results: Results,
+}
+
+impl<'a, 'l> Trial<'a, 'l> {
+    pub(super) fn new(
+        layout: &'l Layout,
+        line: &'a mut VirtualLine<'l>,
+        calibrated: Calibrated,
+        seed: u64,
+    ) -> Self {
+        let mut driver = Driver::new(layout.clone(), calibrated.turnouts);
+        driver.add_located(calibrated.model, calibrated.locator);
+        let results = Results::default();
+        Self { layout, line, driver, choice: Choice::new(seed), results }
+    }
+
+    /// Everything, in turn, as far as the train remains on the rails.
+    pub(super) fn run(&mut self, counts: Counts) {
+        let (mid, top) = (self.steps(MID_MM_PER_S), self.steps(TOP_FROM_MM_PER_S..f64::INFINITY));
+        for _ in 0..counts.mid_stops {
+            let error = self.stop(&mid, Aim::Median);
+            self.results.mid.extend(error);
+        }
+        for _ in 0..counts.top_stops {
+            let error = self.stop(&top, Aim::Median);
+            self.results.top.extend(error);
+        }
+        let all: Vec<SpeedStep> = mid.iter().chain(&top).copied().collect();
+        for (nth, percent) in NOT_BEYOND_PERCENT.into_iter().enumerate() {
+            for _ in 0..counts.not_beyond {
+                let error = self.stop(&all, Aim::NotBeyond(Ratio::from_percent(percent)));
+                self.results.not_beyond[nth].extend(error);
+            }
+        }
+        for _ in 0..counts.moves {
+            self.short_move();
+        }
+        self.results.mishaps = self.line.station.world().mishaps().len();
+    }
+
+    /// Steps whose true speeds lie in a range: a scorer's choice of what to ask, unknown to the driver.
+    fn steps(&self, range: std::ops::Range<f64>) -> Vec<SpeedStep> {
+        let Some(engine) = self.line.station.world().truth().engine(TRAIN) else { return Vec::new() };
+        let speed = |step: &SpeedStep| engine.speeds.speed(*step, Approach::Below).as_mm_per_s();
+        (1..=HIGHEST).filter_map(SpeedStep::new).filter(|step| range.contains(&speed(step))).collect()
+    }
+
+    fn truth(&self) -> Option<TrainTruth> {
+        self.line.station.world().truth().train(TRAIN)
+    }
+
+    /// One stop at a random place ahead, from one of several steps: how far beyond it the train came to rest, in mm.
+    fn stop(&mut self, steps: &[SpeedStep], aim: Aim) -> Option<f64> {
+        if !self.is_sound() {
+            return None;
+        }
+        let target = self.target()?;
+        let step = Some(*self.choice.of(steps)?);
+        let order = StopOrder { train: TRAIN, target, aim, step, next_round: true };
+        let sensor = self.layout.sensor_at(target.node)?;
+        self.carry_out(Order::Stop(order))?;
+        let past = self.line.station.world().truth().past(TRAIN, sensor)?;
+        Some((past - target.offset).as_mm())
+    }
+
+    /// A short move from rest.
+    fn short_move(&mut self) {
+        if !self.is_sound() {
+            return;
+        }
+        let asked = self.choice.between(20.0, 400.0);
+        let Some(before) = self.truth() else { return };
+        let order = Order::Move { train: TRAIN, distance: Length::from_mm(asked) };
+        if self.carry_out(order).is_some()
+            && let Some(after) = self.truth()
+        {
+            self.results.moves.push([asked, (after.odometer - before.odometer).as_mm()]);
+        }
+    }
+
+    fn is_sound(&self) -> bool {
+        self.truth().is_some_and(|truth| !truth.is_wrecked)
+    }
+
+    /// A contact ahead on the way as the turnouts lie, and somewhere between it and the next.
+    fn target(&mut self) -> Option<Landmark> {
+        let ahead = self.ahead();
+        let (node, length) = *self.choice.of(&ahead)?;
+        let offset = self.choice.between(0.0, length);
+        Some(Landmark { node, offset: Length::from_mm(offset) })
+    }
+
+    /// Contacts of the loop that the train is on with the surveyed lengths to the next.
+    fn ahead(&self) -> Vec<(NodeId, f64)> {
+        ahead(self.layout, self.line, self.driver.turnouts())
+    }
+
+    /// Gives an order and waits until the train stands; nothing if it was refused or failed.
+    fn carry_out(&mut self, order: Order) -> Option<()> {
+        let now = self.line.now();
+        let id = match self.driver.order(now, order) {
+            Ok(id) => id,
+            Err(refusal) => {
+                self.results.failed += 1;
+                self.results.failures.push(format!("{refusal:?}"));
+                return None;
+            }
+        };
+        let patience = now + TimeSpan::from_s(ORDER_PATIENCE_S);
+        let done = self.until_done(id, patience);
+        if done.is_none() {
+            self.results.failed += 1;
+            self.results.failures.push(format!("not done: {order:?}"));
+            self.halt();
+        }
+        // Until the train really stands, whatever is believed.
+        let patience = self.line.now() + TimeSpan::from_s(10.0);
+        while self.line.now() < patience && self.truth().is_some_and(|truth| truth.at_rest_since.is_none()) {
+            self.look_on(patience.min(self.line.now() + LOOK));
+        }
+        done
+    }
+
+    fn until_done(&mut self, id: OrderId, patience: Timestamp) -> Option<()> {
+        while self.line.now() < patience && self.is_sound() {
+            match self.look_on(self.line.now() + LOOK) {
+                Some(DriveNotice::Done(finished)) if finished.order == id => return Some(()),
+                Some(DriveNotice::GivenUp { order, why, .. }) if order == id => {
+                    self.results.failures.push(format!("failed: {why:?}"));
+                    return None;
+                }
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Drives on, and compares the position whenever nothing is said.
+    fn look_on(&mut self, until: Timestamp) -> Option<DriveNotice> {
+        let notice = self.line.drive(&mut self.driver, until);
+        if notice.is_none() {
+            self.look();
+        }
+        notice
+    }
+
+    fn look(&mut self) {
+        let now = self.line.now();
+        let Some(located) = self.driver.locate(TRAIN, now) else { return };
+        let Some(sensor) = self.layout.sensor_at(located.at.node) else { return };
+        let Some(past) = self.line.station.world().truth().felt_past(TRAIN, sensor) else { return };
+        let off = (past - located.at.way).as_mm();
+        self.results.looks[0] += 1;
+        self.results.looks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
+    }
+
+    fn halt(&mut self) {
+        let stand = Order::Speed { train: TRAIN, step: SpeedStep::STAND };
+        let _ = self.driver.order(self.line.now(), stand);
+        let until = self.line.now() + TimeSpan::from_s(8.0);
+        while self.line.drive(&mut self.driver, until).is_some() {}
+    }
+}
+
+/// Contacts of the loop that the train is on, with the surveyed lengths to the next.
+pub(super) fn ahead(layout: &Layout, line: &VirtualLine<'_>, turnouts: &TurnoutStates) -> Vec<(NodeId, f64)> {
+    let position = line.station.world().truth().train(TRAIN).and_then(|truth| truth.position);
+    let mut found: Vec<(NodeId, f64)> = Vec::new();
+    let mut node = position.and_then(|at| layout.edge(at.edge)).map(|edge| edge.to);
+    for _ in 0..MOST_CONTACTS {
+        let hop = node.and_then(|node| layout.hops_from(node).find(|hop| hop.is_open(turnouts)));
+        let (Some(hop), Some(from)) = (hop, node) else { break };
+        let is_known = found.iter().any(|(known, _)| *known == from);
+        if layout.sensor_at(from).is_some() && hop.sensor.is_some() && !is_known {
+            found.push((from, hop.length.as_mm()));
+        }
+        node = Some(hop.to);
+    }
+    found
+}

@@ -1,0 +1,80 @@
+//! A machine on a simulated layout: the loop around the bytes of a virtual station, on its clock.
+
+use footplate_core::control::{Machine, Output};
+use footplate_core::{Command, Timestamp};
+use footplate_sim::{FromStation, VirtualStation};
+use footplate_wire::marklin_serial::{EncodeError, Interface, Settings};
+use footplate_wire::{Session, Transmit};
+
+/// S88 modules that the session asks for: the five of the course layouts.
+const MODULES: u8 = 5;
+
+/// A station and the program's side of the line to it; a clone is the same world with another future.
+#[derive(Clone)]
+pub(super) struct VirtualLine<'l> {
+    pub(super) station: VirtualStation<'l>,
+    interface: Interface,
+}
+
+impl<'l> VirtualLine<'l> {
+    /// A line that has just been opened.
+    pub(super) fn open(station: VirtualStation<'l>) -> Result<Self, EncodeError> {
+        let now = station.now();
+        let mut interface = Interface::new(now, Settings::with_cts(MODULES))?;
+        interface.handle_cts(now, station.cts());
+        Ok(Self { station, interface })
+    }
+
+    pub(super) const fn now(&self) -> Timestamp {
+        self.station.now()
+    }
+
+    /// Lets a machine drive until it has something to say or a time has come.
+    pub(super) fn drive<M: Machine>(&mut self, machine: &mut M, until: Timestamp) -> Option<M::Notice> {
+        loop {
+            let now = self.now();
+            if let Some(notice) = self.settle(machine, now) {
+                return Some(notice);
+            }
+            if now >= until {
+                return None;
+            }
+            let timeouts = [machine.next_timeout(), self.interface.next_timeout()];
+            let wake = timeouts.into_iter().flatten().fold(until, Timestamp::min).max(now);
+            match self.station.advance(wake) {
+                Some(FromStation::Byte(byte)) => self.interface.handle_bytes(self.station.now(), &[byte]),
+                Some(FromStation::Cts(up)) => self.interface.handle_cts(self.station.now(), up),
+                None => {
+                    self.interface.handle_timeout(self.station.now());
+                    if machine.next_timeout().is_some_and(|due| due <= self.station.now()) {
+                        machine.handle_timeout(self.station.now());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Carries everything between machine and session that can be carried now.
+    fn settle<M: Machine>(&mut self, machine: &mut M, now: Timestamp) -> Option<M::Notice> {
+        loop {
+            while let Some(transmit) = self.interface.poll_output() {
+                match transmit {
+                    Transmit::Byte(byte) => self.station.write(byte),
+                    Transmit::Event(event) => machine.handle_event(now, &event),
+                    Transmit::Notice(_) => {}
+                }
+            }
+            match machine.poll_output()? {
+                Output::Command(command) => self.tell(command),
+                Output::HoldLine(until) => self.interface.hold_line(until),
+                Output::Watch(sensor) => self.interface.watch(sensor),
+                Output::Notice(notice) => return Some(notice),
+            }
+        }
+    }
+
+    fn tell(&mut self, command: Command) {
+        // Only what no decoder has is refused, and machines know their decoders.
+        let _ = self.interface.handle_command(self.now(), command);
+    }
+}
