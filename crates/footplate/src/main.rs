@@ -5,10 +5,13 @@ mod commands;
 mod counted;
 #[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
 mod link;
+mod live_lines;
 mod progress;
 mod reading;
 #[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
 mod runtime;
+#[allow(dead_code, reason = "the verbs that drive trains live are being written")]
+mod session_journal;
 mod spread;
 
 use std::io::{ErrorKind, Write};
@@ -25,17 +28,16 @@ const BAD_INPUT: u8 = 2;
 #[derive(Parser)]
 #[command(
     version,
-    arg_required_else_help = true,
-    after_help = "Exit status: 0 done, 1 the result falls short, 2 wrong usage or input."
+    after_help = "Without a command: `footplate demo`.\n\nExit status: 0 done, 1 the result falls short, 2 wrong usage or input."
 )]
 struct Footplate {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 fn main() -> ExitCode {
     let mut output = std::io::stdout().lock();
-    let result = Footplate::parse().command.run(&mut output).and_then(|outcome| {
+    let result = Footplate::parse().command.unwrap_or_default().run(&mut output).and_then(|outcome| {
         output.flush()?;
         Ok(outcome)
     });

@@ -3,7 +3,8 @@
 use std::io::Write;
 
 use super::{
-    calibrate, compare, completions, convert, layout, measure, odometry, predict, report, simulate, store,
+    calibrate, compare, completions, convert, demo, layout, measure, odometry, predict, report, simulate,
+    store,
 };
 
 /// Makes the list of verbs from the names of their files.
@@ -34,6 +35,7 @@ verbs! {
     Compare: compare,
     Completions: completions,
     Convert: convert,
+    Demo: demo,
     Layout: layout,
     Measure: measure,
     Odometry: odometry,
@@ -41,6 +43,13 @@ verbs! {
     Report: report,
     Simulate: simulate,
     Store: store,
+}
+
+impl Default for Command {
+    /// What somebody sees who asks for nothing.
+    fn default() -> Self {
+        Self::Demo(demo::Arguments::default())
+    }
 }
 
 /// How a verb ended that was asked rightly.

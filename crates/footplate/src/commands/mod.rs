@@ -9,6 +9,7 @@ mod command;
 mod compare;
 mod completions;
 mod convert;
+mod demo;
 mod drive;
 mod layout;
 mod log_file;

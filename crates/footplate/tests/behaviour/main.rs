@@ -4,6 +4,7 @@
 mod calibrate;
 mod calibrations_are_true;
 mod compare;
+mod demo;
 mod forecasts_hold;
 mod inertial_slides;
 mod layout;

@@ -84,6 +84,10 @@ impl Tongue<'_> {
                 self.sensor(*sensor),
                 by.as_s()
             ),
+            DriveNotice::TrackEnds { train, end } => {
+                let end = self.driver.layout().node_name(*end);
+                format!("the track ends at {end} ahead of train {train}: told to stop")
+            }
             DriveNotice::Lost { train } => {
                 format!("train {train} is lost: told to stop; put it right, then let it pass a contact")
             }

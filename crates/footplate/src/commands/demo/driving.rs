@@ -1,0 +1,213 @@
+//! The second half: a train is driven to places drawn from the seed, and the truth is looked up.
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::control::{
+    DriveNotice, Driver, Finished, Order, OrderId, PlannedStop, Refusal, StopOrder,
+};
+use footplate_core::estimation::{DueContact, Ground, PassedContact};
+use footplate_core::track::{Landmark, Layout};
+use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+
+use footplate_sim::living::PassTruth;
+
+use super::calibrating::{Calibrated, usable};
+use super::outcome::{MadeStop, signed};
+use super::stage::Stage;
+use super::targets::{Dice, steps_to_stop_from, target_ahead};
+
+/// Targets that may be refused before no more are tried.
+const TRIES: usize = 40;
+/// After so long on the railway's clock a stop is not coming any more: a lap at a crawl takes less.
+const PATIENCE: TimeSpan = TimeSpan::from_ms(180_000);
+/// So long after the driver says that a train stands the truth is looked up.
+const STANDS: TimeSpan = TimeSpan::from_ms(2_500);
+
+/// A tour of one train.
+pub(super) struct Tour<'l> {
+    layout: &'l Layout,
+    sections: SectionIndex,
+    train: TrainId,
+    driver: Driver,
+    /// What was passed last, for the picture.
+    passed: String,
+    next: Option<DueContact>,
+    planned: Option<PlannedStop>,
+}
+
+impl<'l> Tour<'l> {
+    pub(super) fn new(layout: &'l Layout, train: TrainId, known: &Calibrated) -> Self {
+        let mut driver = Driver::new(layout.clone(), known.turnouts.clone());
+        driver.add_located(known.fit.model().clone(), known.locator.clone());
+        let sections = SectionIndex::of(layout);
+        Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None }
+    }
+
+    /// Makes so many stops.
+    pub(super) fn run(
+        &mut self,
+        stage: &mut Stage<'_, '_, '_>,
+        known: &Calibrated,
+        stops: usize,
+        dice: &mut Dice,
+    ) -> anyhow::Result<()> {
+        let steps = steps_to_stop_from(dice, &usable(&known.fit), stops);
+        for step in steps {
+            if stage.is_broken() {
+                break;
+            }
+            let Some((order, target)) = self.ask(stage.now(), step, dice) else {
+                stage.screen.mishap(self.train, &format!("nowhere to stop from step {step}"))?;
+                continue;
+            };
+            let name = self.layout.display(target).to_string();
+            self.planned = None;
+            match self.carry_out(stage, order, &name, step)? {
+                Some(finished) => {
+                    let stop = self.truth(stage, target, &name, step, finished);
+                    match stop {
+                        Some(stop) => stage.stopped(stop)?,
+                        None => stage.screen.mishap(self.train, &format!("did not stop at {name}"))?,
+                    }
+                }
+                None => stage.screen.mishap(self.train, &format!("did not stop at {name}"))?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Orders a stop from a step, at a place that is far enough.
+    fn ask(&mut self, now: Timestamp, step: SpeedStep, dice: &mut Dice) -> Option<(OrderId, Landmark)> {
+        let at = self.driver.locate(self.train, now)?.at;
+        let model = self.driver.model(self.train)?;
+        // To speed up takes about as long as to stop, and an even run before the stop makes it better.
+        let mut least = at.way + model.stop(step, Approach::Below).distance * 2.5;
+        for _ in 0..TRIES {
+            let ground =
+                Ground { layout: self.layout, sections: &self.sections, turnouts: self.driver.turnouts() };
+            let target = target_ahead(dice, ground, at.node, least)?;
+            let order = StopOrder { step: Some(step), ..StopOrder::at(self.train, target) };
+            match self.driver.order(now, Order::Stop(order)) {
+                Ok(id) => return Some((id, target)),
+                Err(Refusal::TooNear { beyond, .. }) => {
+                    let again = StopOrder { next_round: true, ..order };
+                    if let Ok(id) = self.driver.order(now, Order::Stop(again)) {
+                        return Some((id, target));
+                    }
+                    least += beyond * 0.5;
+                }
+                Err(_) => {}
+            }
+        }
+        None
+    }
+
+    /// Drives until the order is carried out.
+    fn carry_out(
+        &mut self,
+        stage: &mut Stage<'_, '_, '_>,
+        order: OrderId,
+        target: &str,
+        step: SpeedStep,
+    ) -> anyhow::Result<Option<Finished>> {
+        let until = stage.now() + PATIENCE;
+        let mut finished: Option<Finished> = None;
+        stage.works(self.train, "drives", "");
+        loop {
+            let now = stage.now();
+            if let Some(done) = finished
+                && now >= done.time + STANDS
+            {
+                return Ok(Some(done));
+            }
+            if now > until || stage.is_broken() {
+                return Ok(None);
+            }
+            for notice in stage.go_on(&mut self.driver)? {
+                match notice {
+                    DriveNotice::Done(done) if done.order == order => finished = Some(done),
+                    DriveNotice::GivenUp { order: of, why, .. } if of == order => {
+                        stage.screen.mishap(self.train, &format!("gave up {target}: {why}"))?;
+                        return Ok(None);
+                    }
+                    DriveNotice::Lost { .. } => {
+                        stage.screen.mishap(self.train, "is lost")?;
+                        return Ok(None);
+                    }
+                    DriveNotice::Planned(planned) => self.planned = Some(planned),
+                    DriveNotice::Passed { passed, next, .. } => self.pass(passed, next),
+                    DriveNotice::Overshoots { by, .. } => {
+                        stage.screen.mishap(
+                            self.train,
+                            &format!("is too late for {target}: {:.0} mm beyond", by.as_mm()),
+                        )?;
+                    }
+                    DriveNotice::Unexplained { sensor, .. } => {
+                        let sensor = self.layout.sensor_name(sensor);
+                        stage
+                            .screen
+                            .mishap(self.train, &format!("{sensor} reported, which it cannot have passed"))?;
+                    }
+                    _ => {}
+                }
+            }
+            let detail = self.detail(stage.now(), target, step, finished.is_some());
+            stage.shows(self.train, &detail, None);
+        }
+    }
+
+    fn pass(&mut self, passed: PassedContact, next: Option<DueContact>) {
+        let sensor = self.layout.sensor_name(passed.sensor);
+        self.passed = match (passed.late, passed.short) {
+            (Some([late, _]), Some(short)) => {
+                format!("{sensor} {:+.0} ms {} mm", late.as_ms(), signed(short))
+            }
+            _ => sensor.to_owned(),
+        };
+        self.next = next;
+    }
+
+    fn detail(&self, now: Timestamp, target: &str, step: SpeedStep, stands: bool) -> String {
+        let promise = self.planned.map_or_else(String::new, |planned| {
+            format!("{} … {} mm", signed(planned.promise.low), signed(planned.promise.high))
+        });
+        let next = match (&self.next, &self.planned) {
+            _ if stands => "stands".to_owned(),
+            (_, Some(planned)) if planned.leaves > now && (planned.leaves - now).as_s() < 1.5 => {
+                format!("stops in {:.2} s", (planned.leaves - now).as_s())
+            }
+            (Some(due), _) if due.time > now => {
+                format!("{} in {:.1} s", self.layout.sensor_name(due.sensor), (due.time - now).as_s())
+            }
+            _ => String::new(),
+        };
+        format!("to {target:<10} from step {step:<3} {promise:<15} {next:<16} {}", self.passed)
+    }
+
+    /// Where the train really stands, against the target.
+    fn truth(
+        &self,
+        stage: &Stage<'_, '_, '_>,
+        target: Landmark,
+        name: &str,
+        step: SpeedStep,
+        finished: Finished,
+    ) -> Option<MadeStop> {
+        let truth = stage.railway.world().truth();
+        let train = truth.train(self.train)?;
+        let sensor = self.layout.sensor_at(target.node)?;
+        let mine = |pass: &&PassTruth| pass.train == Some(self.train) && pass.sensor == sensor;
+        let pass = truth.passes().iter().rev().find(mine)?;
+        let past = train.odometer - Length::from_mm(pass.odometer_mm);
+        let promise = finished.promise?;
+        let stood = Landmark { node: target.node, offset: Length::from_mm(past.as_mm().round()) };
+        Some(MadeStop {
+            train: self.train,
+            target: name.to_owned(),
+            step,
+            rest: self.layout.display(stood).to_string(),
+            error: past - target.offset,
+            promised: [promise.low, promise.high],
+            believed: finished.achieved.and_then(|achieved| achieved.error),
+        })
+    }
+}

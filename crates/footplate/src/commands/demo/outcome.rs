@@ -1,0 +1,220 @@
+//! What the demo ends with: where the trains really stood beside what had been promised.
+
+use footplate_core::{Length, SpeedStep, TimeSpan, TrainId};
+use serde_json::{Value, json};
+
+/// A stop as it was asked for, promised, and made.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MadeStop {
+    pub(super) train: TrainId,
+    /// Where it was to stop.
+    pub(super) target: String,
+    /// From which step.
+    pub(super) step: SpeedStep,
+    /// Where it really stood, from the contact of the target.
+    pub(super) rest: String,
+    /// How far beyond the target that is; negative short of it.
+    pub(super) error: Length,
+    /// Between which places 95 of 100 stops were promised to end, counted like `error`.
+    pub(super) promised: [Length; 2],
+    /// Where the program believes that it stands, counted like `error`.
+    pub(super) believed: Option<Length>,
+}
+
+/// A train's calibration, in a line.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Learnt {
+    pub(super) train: TrainId,
+    /// Track time that it took.
+    pub(super) took: TimeSpan,
+    /// The steps that move it, with the speed and how far stops from each are promised to end from where they should,
+    /// in 95 of 100 cases.
+    pub(super) steps: Vec<LearntStep>,
+    /// Stops that were made for it.
+    pub(super) stops: u32,
+    /// Contacts that were passed.
+    pub(super) contacts: u32,
+}
+
+/// What is known of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LearntStep {
+    pub(super) step: SpeedStep,
+    pub(super) mm_per_s: f64,
+    pub(super) stops_within: Length,
+}
+
+impl MadeStop {
+    pub(super) fn is_inside(&self) -> bool {
+        let [low, high] = self.promised;
+        (low..=high).contains(&self.error)
+    }
+
+    pub(super) fn value(&self) -> Value {
+        let [low, high] = self.promised;
+        json!({
+            "train": self.train.0,
+            "target": self.target,
+            "from_step": self.step.get(),
+            "rest": self.rest,
+            "error_mm": tenths(self.error),
+            "promised_low_mm": tenths(low),
+            "promised_high_mm": tenths(high),
+            "believed_error_mm": self.believed.map(tenths),
+            "inside": self.is_inside(),
+        })
+    }
+
+    /// The row of the table, without its last word.
+    pub(super) fn row(&self) -> String {
+        let [low, high] = self.promised;
+        format!(
+            "  {:>5}  {:<12} {:>9}   {:<12} {:>9}   {:>16}   ",
+            self.train,
+            self.target,
+            self.step,
+            self.rest,
+            signed(self.error),
+            format!("{} … {}", signed(low), signed(high)),
+        )
+    }
+
+    /// The stop as a sentence, at the moment when the train stands.
+    pub(super) fn sentence(&self) -> String {
+        let mm = self.error.as_mm().round();
+        let side = if mm < 0.0 { "short of" } else { "beyond" };
+        let [low, high] = self.promised;
+        format!(
+            "train {} stands {:.0} mm {side} {}, from step {} (promised {} … {} mm)",
+            self.train,
+            mm.abs(),
+            self.target,
+            self.step,
+            signed(low),
+            signed(high)
+        )
+    }
+
+    pub(super) fn verdict(&self) -> &'static str {
+        if self.is_inside() { "inside" } else { "outside" }
+    }
+}
+
+/// The head of the table.
+pub(super) fn head() -> String {
+    format!(
+        "  {:>5}  {:<12} {:>9}   {:<12} {:>9}   {:>16}   {}",
+        "train", "target", "from step", "stood at", "error mm", "promised mm", "95 %"
+    )
+}
+
+/// What all stops come to, in a sentence; nothing for none.
+pub(super) fn summary(stops: &[MadeStop]) -> Option<String> {
+    let mut errors: Vec<f64> = stops.iter().map(|stop| stop.error.as_mm().abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    let (median, largest) = (errors.get(errors.len() / 2)?, errors.last()?);
+    let inside = stops.iter().filter(|stop| stop.is_inside()).count();
+    Some(format!(
+        "{inside} of {} stops ended where they were promised to; half of them within {median:.0} mm of the target, all \
+         within {largest:.0} mm.",
+        stops.len()
+    ))
+}
+
+impl Learnt {
+    pub(super) fn value(&self) -> Value {
+        let steps: Vec<Value> = self
+            .steps
+            .iter()
+            .map(|known| {
+                json!({
+                    "step": known.step.get(),
+                    "speed_mm_per_s": (10.0 * known.mm_per_s).round() / 10.0,
+                    "stops_within_mm": tenths(known.stops_within),
+                })
+            })
+            .collect();
+        json!({
+            "train": self.train.0,
+            "track_time_s": (10.0 * self.took.as_s()).round() / 10.0,
+            "stops": self.stops,
+            "contacts": self.contacts,
+            "steps": steps,
+        })
+    }
+
+    /// The same as a sentence.
+    pub(super) fn sentence(&self) -> String {
+        let within = |known: &LearntStep| known.stops_within.as_mm();
+        let best = self.steps.iter().min_by(|one, other| within(one).total_cmp(&within(other)));
+        let (Some(first), Some(last), Some(best)) = (self.steps.first(), self.steps.last(), best) else {
+            return format!("train {} was not calibrated: no step moves it for sure", self.train);
+        };
+        let worst =
+            self.steps.iter().max_by(|one, other| within(one).total_cmp(&within(other))).unwrap_or(last);
+        format!(
+            "train {} learnt in {} of track time ({} contacts, {} stops): steps {} to {}, {:.0} to {:.0} mm/s, \
+             stops to ±{:.0} … ±{:.0} mm",
+            self.train,
+            minutes(self.took),
+            self.contacts,
+            self.stops,
+            first.step,
+            last.step,
+            first.mm_per_s,
+            last.mm_per_s,
+            within(best),
+            within(worst),
+        )
+    }
+}
+
+/// `4:58`.
+pub(super) fn minutes(time: TimeSpan) -> String {
+    let seconds = time.as_s().max(0.0) as u64;
+    format!("{}:{:02}", seconds / 60, seconds % 60)
+}
+
+/// `+4`, `−12`, with a sign that is as wide as a plus.
+pub(super) fn signed(length: Length) -> String {
+    let mm = length.as_mm().round();
+    if mm < 0.0 { format!("−{:.0}", -mm) } else { format!("+{:.0}", mm.abs()) }
+}
+
+fn tenths(length: Length) -> f64 {
+    (10.0 * length.as_mm()).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stop(error_mm: f64) -> MadeStop {
+        MadeStop {
+            train: TrainId(24),
+            target: "C13+120mm".to_owned(),
+            step: SpeedStep::STAND,
+            rest: "C13+124mm".to_owned(),
+            error: Length::from_mm(error_mm),
+            promised: [-9.0, 9.0].map(Length::from_mm),
+            believed: None,
+        }
+    }
+
+    #[test]
+    fn a_stop_is_inside_if_its_error_is_between_what_was_promised() {
+        assert!([-9.0, 0.0, 9.0].iter().all(|error| stop(*error).is_inside()));
+        assert!([-9.1, 9.1].iter().all(|error| !stop(*error).is_inside()));
+        let all = summary(&[stop(2.0), stop(-4.0), stop(12.0)]).unwrap();
+        assert!(
+            all.starts_with("2 of 3 stops") && all.ends_with("within 4 mm of the target, all within 12 mm.")
+        );
+        assert_eq!(summary(&[]), None);
+    }
+
+    #[test]
+    fn numbers_are_written_as_people_read_them() {
+        assert_eq!([-0.4, 0.4, -1.6, 12.0].map(|mm| signed(Length::from_mm(mm))), ["+0", "+0", "−2", "+12"]);
+        assert_eq!([0.0, 59.9, 298.0].map(|s| minutes(TimeSpan::from_s(s))), ["0:00", "0:59", "4:58"]);
+    }
+}

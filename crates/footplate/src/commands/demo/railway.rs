@@ -1,0 +1,167 @@
+//! The virtual railway of the demo: a living layout behind the bytes of a 6051, and the loop that speaks with it.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use footplate_core::control::Machine;
+use footplate_core::track::{Layout, Position};
+use footplate_core::{Command, Event, TimeSpan, Timestamp, TrainId};
+use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
+use footplate_wire::marklin_serial::{Interface, Settings};
+use footplate_wire::{CommandError, LinkNotice};
+
+use crate::link::{Heard, Link, Lost, SimulatedLink, Speed, module_count};
+use crate::runtime::{Attendant, Ended, Recorder, Runtime, StopFlag, Wish};
+use crate::session_journal::SessionJournal;
+
+/// What the runtime hands over to be written down: counted, and kept if there is a journal.
+#[derive(Debug, Default)]
+pub(super) struct Record {
+    pub(super) journal: Option<SessionJournal>,
+    pub(super) events: u64,
+}
+
+/// A record that the runtime and the picture share.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SharedRecord(pub(super) Rc<RefCell<Record>>);
+
+impl Recorder for SharedRecord {
+    fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
+        let mut record = self.0.borrow_mut();
+        record.events += events.len() as u64;
+        match &mut record.journal {
+            Some(journal) => journal.record(events),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A line that counts what goes over it.
+pub(super) struct CountedLink<'l> {
+    line: SimulatedLink<'l>,
+    bytes: u64,
+}
+
+impl Link for CountedLink<'_> {
+    fn now(&self) -> Timestamp {
+        self.line.now()
+    }
+    fn write(&mut self, byte: u8) -> Result<(), Lost> {
+        self.bytes += 1;
+        self.line.write(byte)
+    }
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        let heard = self.line.wait(until);
+        self.bytes += u64::from(matches!(heard, Heard::Byte(_)));
+        heard
+    }
+    fn cts(&self) -> Option<bool> {
+        self.line.cts()
+    }
+    fn patience(&self) -> TimeSpan {
+        self.line.patience()
+    }
+    fn reopen(&mut self) -> Result<(), Lost> {
+        self.line.reopen()
+    }
+}
+
+/// A train in somebody's hand, and where it stood.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InHand {
+    train: TrainId,
+    stood: Option<(Position, End)>,
+}
+
+pub(super) struct Railway<'r, 'l> {
+    runtime: Runtime<'r, CountedLink<'l>>,
+    in_hand: Vec<InHand>,
+}
+
+impl<'r, 'l> Railway<'r, 'l> {
+    /// Trains that nobody knows on a layout that is kept well, all drawn from the seed. The trains are in somebody's hand
+    /// until they are put on the rails.
+    pub(super) fn new(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        speed: Speed,
+        record: &'r mut SharedRecord,
+    ) -> anyhow::Result<Self> {
+        let switches = LivingSwitches { turnouts_set: true, ..LivingSwitches::well_kept() };
+        let station = VirtualStation::draw(layout, seed, trains, &switches)?;
+        let line = CountedLink { line: SimulatedLink::new(station, speed), bytes: 0 };
+        let session = Interface::new(line.now(), Settings::with_cts(module_count(layout)))?;
+        let runtime = Runtime::new(line, session, Some(record), Some(StopFlag::install()));
+        let mut railway = Self { runtime, in_hand: Vec::new() };
+        trains.iter().for_each(|train| railway.lift(*train));
+        Ok(railway)
+    }
+
+    pub(super) fn now(&self) -> Timestamp {
+        self.runtime.link().now()
+    }
+
+    /// Bytes that went over the line, either way.
+    pub(super) fn bytes(&self) -> u64 {
+        self.runtime.link().bytes
+    }
+
+    /// What really is.
+    pub(super) fn world(&self) -> &LivingLayout<'l> {
+        self.runtime.link().line.station().world()
+    }
+
+    /// Takes a train off the rails.
+    pub(super) fn lift(&mut self, train: TrainId) {
+        let stood = self.world().truth().train(train).and_then(|truth| Some((truth.position?, truth.leads)));
+        self.in_hand.push(InHand { train, stood });
+        self.runtime.link_mut().line.station_mut().world_mut().lift(train);
+    }
+
+    /// Puts a train back to where it stood.
+    pub(super) fn put_down(&mut self, train: TrainId) -> anyhow::Result<()> {
+        let Some(place) = self.in_hand.iter().position(|held| held.train == train) else { return Ok(()) };
+        if let (_, Some((position, leads))) = (train, self.in_hand.remove(place).stood) {
+            self.runtime.link_mut().line.station_mut().world_mut().place(train, position, leads)?;
+        }
+        Ok(())
+    }
+
+    /// Goes on until something has happened or a person would want a look; returns what was said. An error if the line
+    /// is lost or somebody interrupts.
+    pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
+        let mut turn = Turn { notices: Vec::new() };
+        match self.runtime.run(machine, &mut turn)? {
+            Ended::Finished => Ok(turn.notices),
+            ended => anyhow::bail!("{ended}"),
+        }
+    }
+
+    /// Stops all trains and takes the power off.
+    pub(super) fn close(&mut self) {
+        let closing = self.runtime.close();
+        if !closing.is_complete() {
+            eprintln!("{closing}");
+        }
+    }
+}
+
+/// Takes part in one turn of the loop.
+struct Turn<N> {
+    notices: Vec<N>,
+}
+
+impl<M: Machine> Attendant<M> for Turn<M::Notice> {
+    fn hear(&mut self, _: Timestamp, notice: M::Notice) {
+        self.notices.push(notice);
+    }
+
+    fn hear_of_line(&mut self, _: Timestamp, _: &LinkNotice) {}
+
+    fn hear_of_refusal(&mut self, _: Timestamp, _: Command, _: CommandError) {}
+
+    fn attend(&mut self, _: Timestamp, _: &mut M) -> Wish {
+        Wish::Finish
+    }
+}

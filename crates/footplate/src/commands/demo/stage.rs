@@ -1,0 +1,179 @@
+//! Where everything happens: the railway, the clock, the journal and the screen, turn by turn.
+
+use std::io;
+use std::time::Duration;
+
+use footplate_core::control::Machine;
+use footplate_core::{Timestamp, TrainId};
+use footplate_sim::living::MishapKind;
+
+use super::outcome::{Learnt, LearntStep, MadeStop};
+use super::railway::{Railway, SharedRecord};
+use super::screen::{Screen, TrainPicture};
+use crate::clock::Stopwatch;
+use crate::link::Speed;
+use crate::session_journal::SessionJournal;
+
+/// The railway, the clock, the journal and the screen.
+pub(super) struct Stage<'r, 'l, 'o> {
+    pub(super) railway: Railway<'r, 'l>,
+    pub(super) screen: Screen<'o>,
+    stopwatch: Stopwatch,
+    speed: Speed,
+    record: SharedRecord,
+    pictures: Vec<TrainPicture>,
+    /// Mishaps that were told.
+    told: usize,
+    broken: bool,
+    pub(super) learnt: Vec<Learnt>,
+    pub(super) stops: Vec<MadeStop>,
+}
+
+impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
+    pub(super) fn new(
+        railway: Railway<'r, 'l>,
+        screen: Screen<'o>,
+        speed: Speed,
+        record: SharedRecord,
+        trains: &[TrainId],
+    ) -> Self {
+        let pictures = trains.iter().map(|train| TrainPicture::waiting(*train, "waits")).collect();
+        let (learnt, stops) = (Vec::new(), Vec::new());
+        let stopwatch = Stopwatch::start();
+        Self { railway, screen, stopwatch, speed, record, pictures, told: 0, broken: false, learnt, stops }
+    }
+
+    pub(super) fn now(&self) -> Timestamp {
+        self.railway.now()
+    }
+
+    /// The time on the wall since the beginning.
+    pub(super) fn wall(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
+    /// Whether something happened that a person would have to set right.
+    pub(super) const fn is_broken(&self) -> bool {
+        self.broken
+    }
+
+    /// One turn; returns what was said.
+    pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
+        let notices = self.railway.go_on(machine)?;
+        self.look_for_mishaps()?;
+        let acknowledged = self.record.0.borrow().journal.as_ref().map(SessionJournal::acknowledged);
+        if let Some(acknowledged) = acknowledged {
+            self.screen.acknowledged(acknowledged)?;
+        }
+        if self.screen.is_due() {
+            self.draw()?;
+        }
+        Ok(notices)
+    }
+
+    /// A train is the one at work, and what it is about.
+    pub(super) fn works(&mut self, train: TrainId, does: &str, detail: &str) {
+        for picture in &mut self.pictures {
+            picture.is_at_work = picture.train == train;
+            if picture.train == train {
+                picture.does = does.to_owned();
+                picture.detail = detail.to_owned();
+            }
+        }
+    }
+
+    /// A train is out of the way.
+    pub(super) fn rests(&mut self, train: TrainId, does: &str) {
+        if let Some(picture) = self.picture_of(train) {
+            picture.is_at_work = false;
+            picture.does = does.to_owned();
+            picture.detail = String::new();
+        }
+    }
+
+    /// What a train is about now, and what is known of it.
+    pub(super) fn shows(&mut self, train: TrainId, detail: &str, steps: Option<Vec<LearntStep>>) {
+        if let Some(picture) = self.picture_of(train) {
+            picture.detail = detail.to_owned();
+            if let Some(steps) = steps {
+                picture.steps = steps;
+            }
+        }
+    }
+
+    /// A train is calibrated.
+    pub(super) fn learnt(&mut self, learnt: Learnt) -> io::Result<()> {
+        self.shows(learnt.train, "", Some(learnt.steps.clone()));
+        self.screen.learnt(&learnt)?;
+        self.learnt.push(learnt);
+        Ok(())
+    }
+
+    /// A train stands where it was told to stop.
+    pub(super) fn stopped(&mut self, stop: MadeStop) -> io::Result<()> {
+        self.screen.stopped(&stop)?;
+        self.stops.push(stop);
+        Ok(())
+    }
+
+    /// Other trains take part from here on: a run of the journal of their own.
+    pub(super) fn begin_run(&mut self) {
+        if let Some(journal) = &mut self.record.0.borrow_mut().journal {
+            journal.begin_run(&[]);
+        }
+    }
+
+    /// Ends the session: everything is written down.
+    pub(super) fn end(&mut self) -> anyhow::Result<()> {
+        self.screen.clear()?;
+        self.railway.close();
+        let journal = self.record.0.borrow_mut().journal.take();
+        if let Some(journal) = journal {
+            let (kept, _) = journal.finish();
+            self.screen.acknowledged(kept.acknowledged)?;
+            if let Some(trouble) = kept.trouble {
+                anyhow::bail!("not all of the session was written down: {trouble}");
+            }
+        }
+        Ok(())
+    }
+
+    fn picture_of(&mut self, train: TrainId) -> Option<&mut TrainPicture> {
+        self.pictures.iter_mut().find(|picture| picture.train == train)
+    }
+
+    fn look_for_mishaps(&mut self) -> io::Result<()> {
+        let new: Vec<_> = self.railway.world().mishaps().iter().skip(self.told).copied().collect();
+        for mishap in new {
+            self.told += 1;
+            self.broken = true;
+            let what = match mishap.kind {
+                MishapKind::Collision { with } => format!("ran into train {with}"),
+                MishapKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
+                MishapKind::Overrun => "ran past the end of its track".to_owned(),
+                MishapKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
+            };
+            match mishap.train {
+                Some(train) => self.screen.mishap(train, &what)?,
+                None => self.screen.mention(&format!("  {what}"))?,
+            }
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self) -> io::Result<()> {
+        let track = self.railway.now().as_s();
+        let speed = match self.speed {
+            Speed::Unpaced => "as fast as it goes".to_owned(),
+            Speed::Times(times) => format!("{times:.0} × real time"),
+        };
+        let session = format!(
+            "{}:{:02} on the railway's clock, {speed}; {} bytes over the line, {} events",
+            track as u64 / 60,
+            track as u64 % 60,
+            self.railway.bytes(),
+            self.record.0.borrow().events
+        );
+        self.screen.picture(&session, &self.pictures)
+    }
+}

@@ -1,0 +1,400 @@
+//! Writes a live session down on a thread of its own, so that whoever drives trains never waits for a disk.
+//!
+//! The loop hands entries over through a queue that is long and has an end. The thread writes down together whatever
+//! has gathered while the disk was busy with the last ones: an entry waits for two commits at most, and none waits for more
+//! to come. What cannot be written is kept and tried again, so a disk that has room again, or another process that ends,
+//! costs nothing; what no longer fits into the queue is lost, counted, and the run broken there.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use anyhow::bail;
+use footplate_core::{Event, Timestamp};
+use footplate_store::{Journal, StoreError, TrainAtStart};
+
+use crate::clock::now;
+use crate::runtime::Recorder;
+
+/// Entries that can wait: twenty minutes of the 50 a second that a busy line brings, in 4 MB.
+const QUEUE: usize = 60_000;
+/// The most that goes to the disk together: so many are written in a few milliseconds, and then acknowledged.
+const MOST_TOGETHER: usize = 2_000;
+/// How long after a failure the disk is tried again, chosen: soon for a person, seldom for a disk.
+const RETRY: Duration = Duration::from_millis(500);
+
+/// What may be done when the queue is full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WhenFull {
+    /// Lose the entry: trains run on a clock that does not wait.
+    Lose,
+    /// Wait for the disk: the clock is simulated and stands still meanwhile.
+    Wait,
+}
+
+/// What is to be done when the session cannot be written down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum IfUnkept {
+    /// Stop the trains: what they do is for the record.
+    Stop,
+    /// Go on, because somebody said so; it is said once.
+    GoOn,
+}
+
+/// A live session on its way to the disk.
+#[derive(Debug)]
+pub(crate) struct SessionJournal {
+    queue: Option<SyncSender<Entry>>,
+    when_full: WhenFull,
+    if_unkept: IfUnkept,
+    /// Whether trouble was said.
+    said: bool,
+    /// Entries lost since the last that was taken: the chain is broken there.
+    broken: Option<Beginning>,
+    beginning: Beginning,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<Journal>>,
+}
+
+/// What the thread says about itself.
+#[derive(Debug, Default)]
+struct Shared {
+    /// No entry will come any more.
+    ended: AtomicBool,
+    acknowledged: AtomicU64,
+    lost: AtomicU64,
+    trouble: Mutex<Option<String>>,
+}
+
+/// How a run begins.
+#[derive(Debug, Clone)]
+struct Beginning {
+    began_at: Option<Timestamp>,
+    trains: Vec<TrainAtStart>,
+}
+
+#[derive(Debug)]
+enum Entry {
+    Event(Event),
+    Run(Beginning),
+}
+
+/// What became of a session in the end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// Entries on the disk.
+    pub(crate) acknowledged: u64,
+    /// Entries that are not.
+    pub(crate) lost: u64,
+    /// Why not.
+    pub(crate) trouble: Option<String>,
+}
+
+impl SessionJournal {
+    /// Takes over a journal that has begun. `began_at` is when the session's clock stood at zero.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub(crate) fn start(
+        journal: Journal,
+        began_at: Option<Timestamp>,
+        when_full: WhenFull,
+        if_unkept: IfUnkept,
+    ) -> std::io::Result<Self> {
+        Self::with_queue(journal, began_at, when_full, if_unkept, QUEUE)
+    }
+
+    fn with_queue(
+        journal: Journal,
+        began_at: Option<Timestamp>,
+        when_full: WhenFull,
+        if_unkept: IfUnkept,
+        length: usize,
+    ) -> std::io::Result<Self> {
+        let (queue, entries) = sync_channel(length);
+        let shared = Arc::new(Shared::default());
+        let of_thread = Arc::clone(&shared);
+        let thread = thread::Builder::new()
+            .name("journal".to_owned())
+            .spawn(move || Writer { journal, shared: of_thread }.run(&entries))?;
+        Ok(Self {
+            queue: Some(queue),
+            when_full,
+            if_unkept,
+            said: false,
+            broken: None,
+            beginning: Beginning { began_at, trains: Vec::new() },
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// Hands an entry over. Does not wait, unless told so.
+    fn hand_over(&mut self, event: &Event) {
+        if let Some(beginning) = self.broken.take()
+            && !self.offer(Entry::Run(beginning.clone()))
+        {
+            self.broken = Some(beginning);
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        if !self.offer(Entry::Event(*event)) {
+            self.broken = Some(self.beginning.clone());
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The chain is broken: a train was lifted, or others take part from here on.
+    pub(crate) fn begin_run(&mut self, trains: &[TrainAtStart]) {
+        self.beginning.trains = trains.to_vec();
+        if !self.offer(Entry::Run(self.beginning.clone())) {
+            self.broken = Some(self.beginning.clone());
+        }
+    }
+
+    /// Whether the queue took it.
+    fn offer(&self, entry: Entry) -> bool {
+        let Some(queue) = &self.queue else { return false };
+        match self.when_full {
+            WhenFull::Wait => queue.send(entry).is_ok(),
+            WhenFull::Lose => match queue.try_send(entry) {
+                Ok(()) => true,
+                Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
+            },
+        }
+    }
+
+    /// How many entries of the session are on the disk by now.
+    pub(crate) fn acknowledged(&self) -> u64 {
+        self.shared.acknowledged.load(Ordering::Acquire)
+    }
+
+    /// Why entries are not written down at present, if they are not.
+    pub(crate) fn trouble(&self) -> Option<String> {
+        let lost = self.shared.lost.load(Ordering::Relaxed);
+        let trouble = self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        match (trouble, lost) {
+            (None, 0) => None,
+            (None, lost) => Some(format!("{lost} events came faster than the disk took them, and are lost")),
+            (Some(trouble), 0) => Some(trouble),
+            (Some(trouble), lost) => Some(format!("{trouble}; {lost} events are lost")),
+        }
+    }
+
+    /// Writes down what still waits, once more even if there was trouble, and says what became of the session.
+    pub(crate) fn finish(mut self) -> (Kept, Option<Journal>) {
+        let journal = self.end();
+        let kept = Kept {
+            acknowledged: self.acknowledged(),
+            lost: self.shared.lost.load(Ordering::Relaxed),
+            trouble: self.trouble(),
+        };
+        (kept, journal)
+    }
+
+    fn end(&mut self) -> Option<Journal> {
+        self.shared.ended.store(true, Ordering::Release);
+        drop(self.queue.take());
+        self.thread.take()?.join().ok()
+    }
+}
+
+/// Entries are handed over before anybody acts on them, and measured once they are
+/// [acknowledged](SessionJournal::acknowledged).
+impl Recorder for SessionJournal {
+    fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
+        events.iter().for_each(|event| self.hand_over(event));
+        match (self.trouble(), self.if_unkept) {
+            (None, _) => self.said = false,
+            (Some(trouble), IfUnkept::Stop) => bail!("the session cannot be written down: {trouble}"),
+            (Some(trouble), IfUnkept::GoOn) if !self.said => {
+                self.said = true;
+                eprintln!("the session is not written down at present, and goes on as asked: {trouble}");
+            }
+            (Some(_), IfUnkept::GoOn) => {}
+        }
+        Ok(())
+    }
+}
+
+impl Drop for SessionJournal {
+    /// Whoever leaves in a hurry still leaves nothing behind that was taken.
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// The thread.
+struct Writer {
+    journal: Journal,
+    shared: Arc<Shared>,
+}
+
+impl Writer {
+    fn run(mut self, entries: &Receiver<Entry>) -> Journal {
+        // Taken and not on the disk yet, in order.
+        let mut pending: Vec<Entry> = Vec::new();
+        loop {
+            // Asked before taking what is there: what comes between the two is seen next time.
+            let ended = self.shared.ended.load(Ordering::Acquire);
+            let ended = gather(entries, &mut pending) || ended && pending.len() >= QUEUE;
+            let written = self.write(&mut pending);
+            self.say(written.err().map(|error| error.to_string()));
+            if ended {
+                let left = pending.drain(..).chain(entries.try_iter());
+                let lost = left.filter(|entry| matches!(entry, Entry::Event(_))).count();
+                self.shared.lost.fetch_add(lost as u64, Ordering::Relaxed);
+                return self.journal;
+            }
+            if !pending.is_empty() {
+                thread::sleep(RETRY);
+            }
+        }
+    }
+
+    /// Writes down what it can, and leaves the rest.
+    fn write(&mut self, pending: &mut Vec<Entry>) -> Result<(), StoreError> {
+        while let Some(first) = pending.first() {
+            if let Entry::Run(beginning) = first {
+                self.journal.begin_run(beginning.began_at, &beginning.trains)?;
+                pending.remove(0);
+                continue;
+            }
+            let events: Vec<Event> = pending
+                .iter()
+                .map_while(|entry| match entry {
+                    Entry::Event(event) => Some(*event),
+                    Entry::Run(_) => None,
+                })
+                .take(MOST_TOGETHER)
+                .collect();
+            let acknowledged = self.journal.append(&events, now())?;
+            self.shared.acknowledged.store(acknowledged, Ordering::Release);
+            pending.drain(..events.len());
+        }
+        Ok(())
+    }
+
+    fn say(&self, trouble: Option<String>) {
+        *self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
+    }
+}
+
+/// Waits for an entry, unless some are pending, and takes all that are there. Says whether none will come any more.
+fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>) -> bool {
+    if pending.is_empty() {
+        match entries.recv() {
+            Ok(entry) => pending.push(entry),
+            Err(_) => return true,
+        }
+    }
+    while pending.len() < QUEUE {
+        match entries.try_recv() {
+            Ok(entry) => pending.push(entry),
+            Err(TryRecvError::Empty) => return false,
+            Err(TryRecvError::Disconnected) => return true,
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use footplate_core::{EventKind, TrainId};
+    use footplate_store::Store;
+    use rusqlite::Connection;
+
+    use super::*;
+
+    fn event(number: u64) -> Event {
+        let time = Timestamp::from_ns(1_000_000 * number as i64);
+        Event { time, kind: EventKind::Reverse { train: TrainId(24) } }
+    }
+
+    fn journal(path: &Path) -> Journal {
+        let store = Store::open_or_create(path).unwrap().with_patience(Duration::from_millis(5)).unwrap();
+        Journal::begin(store, "evening", "track-a", None, &[], now()).unwrap()
+    }
+
+    fn times(path: &Path) -> Vec<Vec<i64>> {
+        let store = Store::open(path).unwrap();
+        let recording = store.recordings(now()).unwrap()[0].key;
+        let runs = store.runs(recording, now()).unwrap();
+        let time = |stored: &footplate_store::StoredEvent| stored.raw.event.time.as_ns() / 1_000_000;
+        runs.iter().map(|run| run.events.iter().map(time).collect()).collect()
+    }
+
+    /// Waits, at most some seconds, until something holds.
+    fn until(holds: impl Fn() -> bool) {
+        for _ in 0..2_000 {
+            if holds() {
+                return;
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+        panic!("it never happened");
+    }
+
+    #[test]
+    fn what_was_handed_over_is_there_in_order_and_in_its_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("railway.db");
+        let mut session =
+            SessionJournal::start(journal(&path), None, WhenFull::Lose, IfUnkept::GoOn).unwrap();
+        (0..5).for_each(|number| session.hand_over(&event(number)));
+        session.begin_run(&[]);
+        (5..5_000).for_each(|number| session.hand_over(&event(number)));
+        until(|| session.acknowledged() == 5_000);
+        let (kept, _) = session.finish();
+        assert_eq!(kept, Kept { acknowledged: 5_000, lost: 0, trouble: None });
+        assert_eq!(times(&path), [(0..5).collect::<Vec<_>>(), (5..5_000).collect()]);
+    }
+
+    #[test]
+    fn trouble_is_said_and_what_waited_is_written_when_it_is_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("railway.db");
+        let mut session =
+            SessionJournal::start(journal(&path), None, WhenFull::Lose, IfUnkept::GoOn).unwrap();
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        session.hand_over(&event(1));
+        until(|| session.trouble().is_some_and(|trouble| trouble.contains("is in use by another process")));
+        session.hand_over(&event(2));
+        assert_eq!(session.acknowledged(), 0);
+        other.execute_batch("ROLLBACK").unwrap();
+        until(|| session.acknowledged() == 2 && session.trouble().is_none());
+        drop(session);
+        assert_eq!(times(&path), [[1, 2]]);
+    }
+
+    #[test]
+    fn a_queue_that_is_full_loses_what_does_not_fit_says_so_and_breaks_the_run_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("railway.db");
+        let mut session =
+            SessionJournal::with_queue(journal(&path), None, WhenFull::Lose, IfUnkept::GoOn, 2).unwrap();
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        session.hand_over(&event(1));
+        until(|| session.trouble().is_some());
+        // Handed over faster than the thread empties its queue: at some number it is full.
+        (2..100_000).for_each(|number| session.hand_over(&event(number)));
+        let lost = session.shared.lost.load(Ordering::Relaxed);
+        assert!(lost > 0);
+        assert!(session.trouble().unwrap().ends_with(&format!("; {lost} events are lost")));
+        other.execute_batch("ROLLBACK").unwrap();
+        until(|| session.acknowledged() + lost == 99_999);
+        session.hand_over(&event(200_000));
+        let (kept, _) = session.finish();
+        assert_eq!((kept.acknowledged, kept.lost), (100_000 - lost, lost));
+        let runs = times(&path);
+        assert!(runs.len() > 1);
+        assert!(runs.iter().all(|run| run.is_sorted_by_key(|time| *time)));
+        assert_eq!(runs.last().unwrap().last(), Some(&200_000));
+    }
+}
