@@ -44,6 +44,18 @@ impl RampedLag {
         (self.twice(time) - self.twice(time - self.ramp)) / self.ramp
     }
 
+    /// The share of the change that the set speed, without the lag, has made at a time (s).
+    #[must_use]
+    pub const fn set_share(&self, time: f64) -> f64 {
+        (time / self.ramp).clamp(0.0, 1.0)
+    }
+
+    /// The time constant `θ` (s).
+    #[must_use]
+    pub const fn lag(&self) -> f64 {
+        self.lag
+    }
+
     /// Mean time by which the change is late against one at once: T/2 + θ, in s.
     #[must_use]
     pub const fn delay(&self) -> f64 {

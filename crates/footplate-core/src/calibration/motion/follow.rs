@@ -14,8 +14,8 @@
 
 use super::model::MotionModel;
 use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
-use super::segment::Segment;
 pub(crate) use super::segment::Told;
+use super::segment::{Pace, Segment};
 
 const B: usize = 0;
 const E: usize = 1;
@@ -95,7 +95,7 @@ impl Following {
     }
 
     fn rest_time(&self) -> f64 {
-        if self.segment.from == 0.0 { self.segment.begins } else { self.segment.settled() }
+        if self.segment.from.speed == 0.0 { self.segment.begins } else { self.segment.settled() }
     }
 
     /// Takes all that has taken effect by a time into the state.
@@ -122,11 +122,12 @@ impl Following {
         // A train at rest has run its whole way to rest, whenever it is told the next step.
         let time = if from_rest { f64::INFINITY } else { begins };
         let (way, slope) = self.way_and_slope(time);
-        let speed = if from_rest { 0.0 } else { self.segment.speed(begins - self.x[H]) };
+        let pace = if from_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
+        let speed = pace.speed;
         self.transform(slope);
         self.x[B] = way;
         let answers = model.answers();
-        self.segment = Segment::of(&told, &answers, speed);
+        self.segment = Segment::of(&told, &answers, pace);
         self.segment.begins = begins;
         (self.step, self.from) = (told.to, told.from);
         for letter in [H, Z] {
@@ -171,7 +172,7 @@ impl Following {
     }
 
     const fn is_still(&self) -> bool {
-        self.segment.from == 0.0 && self.segment.to == 0.0
+        self.segment.from.speed == 0.0 && self.segment.to == 0.0
     }
 
     /// Moves the origin along a slope: `b` takes in all of it.
@@ -228,7 +229,7 @@ impl Following {
             return None;
         }
         let (mean, slope) = later.way_and_slope(f64::INFINITY);
-        let speed = later.segment.from * libm::exp(later.x[E]);
+        let speed = later.segment.from.speed * libm::exp(later.x[E]);
         let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);

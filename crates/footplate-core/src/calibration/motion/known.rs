@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use super::model::{Counts, MotionModel, StepUse};
 use super::parameters::{Answers, DOWN, HYSTERESIS, START_DELAY, UP, hysteresis_at, speed_at};
-use super::segment::{Segment, Told};
+use super::segment::{Pace, Segment, Told};
 use super::spread::Spread;
 use super::unknowns::Columns;
 use crate::ids::{SpeedStep, TrainId};
@@ -103,6 +103,6 @@ impl MotionModel {
 fn displacement_of(answers: &Answers<'_>, from: SpeedStep, to: SpeedStep) -> f64 {
     let told = Told { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
     let speed = answers.speed(usize::from(from.get()), false);
-    let segment = Segment::of(&told, answers, speed);
-    (segment.from - segment.to) * segment.begins + segment.displacement()
+    let segment = Segment::of(&told, answers, Pace::steady(speed));
+    (speed - segment.to) * segment.begins + segment.displacement()
 }

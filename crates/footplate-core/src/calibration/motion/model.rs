@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
 use super::priors::section_variance;
 use super::scatter::usual_scatter;
-use super::segment::{Segment, Told};
+use super::segment::{Pace, Segment, Told};
 use super::spread::Spread;
 use crate::calibration::SectionIndex;
 use crate::estimate::Estimate;
@@ -160,7 +160,7 @@ impl MotionModel {
         let told = Told { sent: 0.0, from: step.get(), to: 0, at_rest: false };
         let stop = |answers: &Answers<'_>| {
             let speed = answers.speed(usize::from(step.get()), above);
-            let segment = Segment::of(&told, answers, speed);
+            let segment = Segment::of(&told, answers, Pace::steady(speed));
             (speed * segment.begins + segment.way_to_rest(), segment.settled())
         };
         let (distance, time) = stop(&self.answers());
@@ -184,7 +184,8 @@ impl MotionModel {
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
         let answers = self.answers();
         let told = Told { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
-        let segment = Segment::of(&told, &answers, answers.speed(usize::from(from.get()), false));
+        let pace = Pace::steady(answers.speed(usize::from(from.get()), false));
+        let segment = Segment::of(&told, &answers, pace);
         TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
     }
 

@@ -59,7 +59,7 @@ pub(super) fn trip_rows(
     let mut numbers = x[..columns.lasting].to_vec();
     let here = outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments);
     let doubts = doubts(trip, &own, &segments);
-    let stop_speed = segments.last().map_or(0.0, |segment| segment.from);
+    let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
 
     let mut slopes: Vec<(usize, Outcome)> = Vec::new();
     for column in involved(trip, highest) {

@@ -28,12 +28,30 @@ impl Told {
     }
 }
 
+/// How fast a train runs, and how fast its decoder would have it run at the same moment (m/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pace {
+    pub(super) speed: f64,
+    pub(super) set: f64,
+}
+
+impl Pace {
+    /// Of a train that has been running, or standing, for long.
+    pub(super) const fn steady(speed: f64) -> Self {
+        Self { speed, set: speed }
+    }
+}
+
 /// A change of speed that has taken effect, with distance counted from there.
+///
+/// It begins where the last one was interrupted: the set speed goes on from where it was, and the train, which is behind
+/// it by its lag, catches up with it. Letters as in [`RampedLag`]: with `u` the set speed and `v` the speed when the change
+/// took effect, the way is `u τ + (u′ − u) R(τ) + (v − u) θ (1 − e^(−τ/θ))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Segment {
     /// When it took effect (s, on the clock of the run).
     pub(super) begins: f64,
-    pub(super) from: f64,
+    pub(super) from: Pace,
     pub(super) to: f64,
     shape: RampedLag,
     /// Way that the law leaves over.
@@ -46,43 +64,65 @@ const SETTLED: f64 = 0.03;
 impl Segment {
     /// A train at rest, or running steadily since ever.
     pub(super) const fn steady(begins: f64, speed: f64) -> Self {
-        Self { begins, from: speed, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0 }
+        let from = Pace::steady(speed);
+        Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0 }
     }
 
-    /// What a command makes of a train that runs at `speed` (m/s) when it takes effect.
-    pub(super) fn of(told: &Told, answers: &Answers<'_>, speed: f64) -> Self {
+    /// What a command makes of a train that goes at a pace when it takes effect.
+    pub(super) fn of(told: &Told, answers: &Answers<'_>, from: Pace) -> Self {
         let to = answers.speed(usize::from(told.to), told.above());
-        let steps = f64::from(told.to) - f64::from(told.from);
-        let change = to - speed;
+        let change = to - from.set;
+        // Of the steps, those that the set speed still has to go.
+        let whole = (to - answers.speed(usize::from(told.from), false)).abs();
+        let part = if whole > 0.0 { (change.abs() / whole).min(1.0) } else { 1.0 };
+        let steps = part * (f64::from(told.to) - f64::from(told.from));
         let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
         let shape = RampedLag::new(ramp, lag);
         // The shape cannot be less than nothing; the way that follows from the numbers is kept linear in them.
-        let cut = (speed - to) * (lag + 0.5 * ramp - shape.delay());
+        let cut = -change * (lag + 0.5 * ramp - shape.delay());
         let residual = if told.to == 0 {
-            answers.stop_residual(speed)
+            answers.stop_residual(from.set)
         } else if told.at_rest {
             answers.start_residual(to)
         } else {
             0.0
         };
-        Self { begins: told.effect(answers), from: speed, to, shape, residual: residual + cut }
+        Self { begins: told.effect(answers), from, to, shape, residual: residual + cut }
+    }
+
+    /// The part of being behind the set speed at the beginning that is left.
+    fn behind(&self, since: f64) -> f64 {
+        libm::exp(-since / self.shape.lag())
     }
 
     /// Way (m) run since it took effect; before that, at the speed before.
     pub(super) fn way(&self, time: f64) -> f64 {
         let since = time - self.begins;
+        let Pace { speed, set } = self.from;
         if since <= 0.0 {
-            return self.from * since;
+            return speed * since;
         }
-        self.from * since
-            + (self.to - self.from) * self.shape.area(since)
+        let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
+        set * since
+            + (self.to - set) * self.shape.area(since)
+            + caught_up
             + self.residual * self.shape.share(since)
     }
 
     /// Speed (m/s).
     pub(super) fn speed(&self, time: f64) -> f64 {
         let since = time - self.begins;
-        if since <= 0.0 { self.from } else { self.from + (self.to - self.from) * self.shape.share(since) }
+        let Pace { speed, set } = self.from;
+        if since <= 0.0 {
+            return speed;
+        }
+        set + (self.to - set) * self.shape.share(since) + (speed - set) * self.behind(since)
+    }
+
+    /// Speed and set speed.
+    pub(super) fn pace(&self, time: f64) -> Pace {
+        let set = self.from.set + (self.to - self.from.set) * self.shape.set_share(time - self.begins);
+        Pace { speed: self.speed(time), set }
     }
 
     /// The share of the change that is done.
@@ -97,11 +137,12 @@ impl Segment {
 
     /// The whole way of a stop (m).
     pub(super) fn way_to_rest(&self) -> f64 {
-        self.from * self.shape.delay() + self.residual
+        self.displacement()
     }
 
     /// By how much the way once it is settled differs from that of a change at once (m).
     pub(super) fn displacement(&self) -> f64 {
-        (self.from - self.to) * self.shape.delay() + self.residual
+        let Pace { speed, set } = self.from;
+        (set - self.to) * self.shape.delay() + (speed - set) * self.shape.lag() + self.residual
     }
 }

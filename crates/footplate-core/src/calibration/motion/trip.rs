@@ -85,7 +85,7 @@ impl Trip {
                 effect += own.late_start;
             }
             let effect = effect.max(last.begins);
-            let mut next = Segment::of(told, answers, last.speed(effect));
+            let mut next = Segment::of(told, answers, last.pace(effect));
             next.begins = effect;
             segments.push(next);
             last = next;
