@@ -50,6 +50,12 @@ impl RampedLag {
         (time / self.ramp).clamp(0.0, 1.0)
     }
 
+    /// The duration `T` of the ramp (s).
+    #[must_use]
+    pub const fn ramp(&self) -> f64 {
+        self.ramp
+    }
+
     /// The time constant `θ` (s).
     #[must_use]
     pub const fn lag(&self) -> f64 {

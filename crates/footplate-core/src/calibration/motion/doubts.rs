@@ -5,7 +5,9 @@
 //! their nodes add.
 
 use super::model::MotionModel;
-use super::parameters::{Answers, DOWN, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at};
+use super::parameters::{
+    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
+};
 
 impl MotionModel {
     /// Variance of ln of the steady speed at a step.
@@ -33,8 +35,11 @@ impl MotionModel {
     /// One standard deviation (m) of the way to rest from a speed (m/s), for what is not known of the law.
     pub(crate) fn stop_doubt(&self, speed: f64) -> f64 {
         let [(low, left), (high, right)] = nodes_about(speed);
-        let [delay, lag, kappa, rho] = self.law_slopes(DOWN, speed, 0.0);
-        let slopes = [delay, lag, kappa, rho, (STOP_NODES + low, left), (STOP_NODES + high, right)];
+        let [delay, (lag, by_lag), kappa, rho] = self.law_slopes(DOWN, speed, 0.0);
+        let (friction_by_lag, by_friction) = self.friction_slopes(speed);
+        let (lag, friction) = ((lag, by_lag - friction_by_lag), (FRICTION, -by_friction));
+        let nodes = [(STOP_NODES + low, left), (STOP_NODES + high, right)];
+        let slopes = [delay, lag, kappa, rho, friction, nodes[0], nodes[1]];
         libm::sqrt(self.spread.variance_along(&slopes))
     }
 
@@ -62,6 +67,17 @@ impl MotionModel {
             (first + 2, change * change.abs()),
             (first + 3, 0.5 * change * steps.abs()),
         ]
+    }
+
+    /// Slopes of what friction takes of a stop, `f θ² ln(1 + u)` with `u = A/(f θ)`, in lag and friction; as if nothing drove
+    /// from the beginning, which is when it takes the most.
+    fn friction_slopes(&self, speed: f64) -> (f64, f64) {
+        let answers = self.answers();
+        let (lag, _) = answers.lag_and_ramp(false, speed, 0.0);
+        let (lag, friction) = (lag.max(1e-3), answers.friction());
+        let u = speed / (friction * lag);
+        let (log, part) = (libm::log1p(u), u / (1.0 + u));
+        (friction * lag * (2.0 * log - part), lag * lag * (log - part))
     }
 
     /// The step whose speed is nearest; 0 for standstill.

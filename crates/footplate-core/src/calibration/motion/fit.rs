@@ -13,7 +13,8 @@ use alloc::vec::Vec;
 
 use super::chain::Chain;
 use super::model::{MotionModel, StepUse};
-use super::priors::add_priors;
+use super::parameters::SPEEDS;
+use super::priors::priors;
 use super::rows::{Linear, trip_rows};
 use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
@@ -24,16 +25,15 @@ use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
 
 /// Steps after which an iteration that has not settled is taken as it is.
-const MOST_ITERATIONS: usize = 12;
+const MOST_ITERATIONS: usize = 15;
+/// A step is shortened by half so often before the point counts as the best.
+const MOST_HALVINGS: usize = 6;
 /// A step of ln speed no longer than this is believed at once: beyond it the laws bend too much.
 const LONGEST_STEP: f64 = 0.6;
 /// A step that changes no number by more than this (in its unit) was the last.
 const SETTLED: f64 = 2e-4;
 /// In so many iterations all rows count in full: the places at which trips began are not yet known then.
 const ALL_BELIEVED: usize = 3;
-/// Residuals beyond this many standard deviations count linearly (Huber, 1964).
-const HUBER: f64 = 2.5;
-
 /// Collects what one train does and fits its [`MotionModel`] to all of it.
 #[derive(Debug, Clone)]
 pub struct MotionFit {
@@ -91,46 +91,59 @@ impl MotionFit {
         let trips = &self.chain.trips;
         let columns = Columns::of(trips, highest);
         let mut x = self.start(&columns);
-        let mut solution = None;
-        let mut scale = 1.0;
-        for iteration in 0..MOST_ITERATIONS {
-            let mut equations = NormalEquations::new(columns.all);
-            add_priors(&mut equations, &columns, trips, sections, &x, highest);
-            let mut squares = Squares::default();
+        let known = priors(&columns, trips, sections, &x, highest);
+        let rows_at = |x: &[f64], scale: f64, with_slopes: bool| {
             let mut rows: Vec<Linear> = Vec::new();
             for place in 0..trips.len() {
-                trip_rows(trips, place, &columns, &x, highest, scale, &mut rows);
+                trip_rows(trips, place, &columns, x, highest, scale, with_slopes, &mut rows);
             }
+            rows
+        };
+        let mut scale = 1.0;
+        let mut rows = rows_at(&x, scale, true);
+        let mut equations = NormalEquations::new(columns.all);
+        for iteration in 0..MOST_ITERATIONS {
+            let believes_all = iteration < ALL_BELIEVED;
+            equations = NormalEquations::new(columns.all);
+            known.add_to(&mut equations);
             for row in &rows {
-                let size = row.residual.abs() / libm::sqrt(row.variance);
-                let weight = if size > HUBER && iteration >= ALL_BELIEVED { HUBER / size } else { 1.0 };
                 // The row is about the step from here; its terms are about the numbers themselves.
                 let here: f64 = row.terms.iter().map(|(column, slope)| slope * x[*column]).sum();
-                equations.add(&row.terms, here - row.residual, row.variance / weight);
-                if row.is_stop {
-                    squares.take(row.residual * row.residual / row.variance * scale * scale);
-                }
-            }
-            if iteration >= ALL_BELIEVED {
-                scale = squares.scale();
+                equations.add(&row.terms, here - row.residual, row.variance / row.weight(believes_all));
             }
             let Some(next) = equations.values() else { return };
-            let longest = (0..columns.all).fold(0.0_f64, |longest, i| {
-                let change = (next[i] - x[i]).abs();
-                if is_logarithm(i, highest, &columns) { longest.max(change) } else { longest }
-            });
-            let part = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
+            let cost = |x: &[f64], rows: &[Linear]| {
+                known.cost(x) + rows.iter().map(|row| row.cost(believes_all)).sum::<f64>()
+            };
+            let before = cost(&x, &rows);
+            let logarithms = SPEEDS..SPEEDS + highest;
+            let longest = logarithms.map(|i| (next[i] - x[i]).abs()).fold(0.0, f64::max);
+            let mut part = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
             let mut moved = 0.0_f64;
-            for i in 0..columns.all {
-                let by = part * (next[i] - x[i]);
-                moved = moved.max(if i < columns.lasting { by.abs() } else { 0.0 });
-                x[i] += by;
+            for _ in 0..MOST_HALVINGS {
+                let tried: Vec<f64> =
+                    x.iter().zip(&next).map(|(from, to)| from + part * (to - from)).collect();
+                if cost(&tried, &rows_at(&tried, scale, false)) < before {
+                    let lasting = x.iter().zip(&tried).take(columns.lasting);
+                    moved = lasting.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
+                    x = tried;
+                    break;
+                }
+                part *= 0.5;
             }
-            if (moved < SETTLED && iteration > ALL_BELIEVED) || iteration + 1 == MOST_ITERATIONS {
-                solution = equations.solve();
-                break;
+            rows = rows_at(&x, scale, true);
+            if !believes_all {
+                let mut squares = Squares::default();
+                for row in rows.iter().filter(|row| row.is_stop) {
+                    squares.take(row.residual * row.residual / row.variance * scale * scale);
+                }
+                scale = squares.scale();
+                if moved < SETTLED {
+                    break;
+                }
             }
         }
+        let solution = equations.solve();
         self.last = x.clone();
         let Some(solution) = solution else { return };
         self.model.learn(&columns, &x, &solution, scale, trips, self.date);
@@ -153,11 +166,6 @@ impl MotionFit {
     pub const fn model(&self) -> &MotionModel {
         &self.model
     }
-}
-
-fn is_logarithm(column: usize, highest: usize, columns: &Columns) -> bool {
-    let first = super::parameters::SPEEDS;
-    (first..first + highest).contains(&column) && column < columns.lasting
 }
 
 /// How much stops scatter against what trains usually do.
@@ -196,7 +204,7 @@ impl MotionFit {
         let _ = sections;
         for (place, trip) in trips.iter().enumerate() {
             let mut rows: Vec<Linear> = Vec::new();
-            trip_rows(trips, place, &columns, x, highest, 1.0, &mut rows);
+            trip_rows(trips, place, &columns, x, highest, 1.0, false, &mut rows);
             let _ = writeln!(
                 s,
                 "trip {place} cont {} rest {} begins {:.2} run {:?} p {:.3} late {:.3} told {:?} dev {:?} ch {:?}",

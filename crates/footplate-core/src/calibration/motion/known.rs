@@ -73,7 +73,7 @@ impl MotionModel {
         let columns = Columns::of(&[], count);
         let mut equations = NormalEquations::new(columns.all);
         let sections = crate::calibration::SectionIndex::none();
-        super::priors::add_priors(&mut equations, &columns, &[], &sections, &self.values, count);
+        super::priors::priors(&columns, &[], &sections, &self.values, count).add_to(&mut equations);
         let tight = KNOWN_TO * KNOWN_TO;
         for (index, [below, above]) in known.speeds.iter().take(count).enumerate() {
             let (step, speed) = (index + 1, below.as_m_per_s().max(KNOWN_TO));

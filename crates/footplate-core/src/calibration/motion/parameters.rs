@@ -14,8 +14,10 @@ pub(super) const UP: usize = 1;
 pub(super) const DOWN: usize = 5;
 /// Delay of a start from rest.
 pub(super) const START_DELAY: usize = 9;
+/// Slowing down by friction alone, when nothing drives (m/s²).
+pub(super) const FRICTION: usize = 10;
 /// What stops from these speeds are longer than the law says, by node.
-pub(super) const STOP_NODES: usize = 10;
+pub(super) const STOP_NODES: usize = 11;
 /// The same for starts: how much farther a train has got once it runs.
 pub(super) const START_NODES: usize = STOP_NODES + NODES;
 /// ln of the steady speeds from below, from step 1 on.
@@ -30,7 +32,8 @@ const NODE_SPACING: f64 = 0.1;
 ///
 /// Hysteresis: 13 to 31 mm/s in 7 of 8 published tables. Delays of running trains: 0.16 to 0.26 s from the stop command
 /// to the first slowing (trains 45, 47, 49); of starts up to 1.0 s. Lags up to 1.5 s, rates from 130 to 980 mm/s²
-/// (κ = 1/2a), momentum from 0 to 0.35 s a step (CV 3 and 4 up to 6).
+/// (κ = 1/2a), momentum from 0 to 0.35 s a step (CV 3 and 4 up to 6). Friction ends
+/// stops that would else never end: within 3.3 s on trains 47 and 49.
 pub(super) const PRIOR: [(f64, f64); STOP_NODES] = [
     (0.018, 0.010),
     (0.18, 0.06),
@@ -42,6 +45,7 @@ pub(super) const PRIOR: [(f64, f64); STOP_NODES] = [
     (1.6, 1.6),
     (0.04, 0.08),
     (0.55, 0.35),
+    (0.015, 0.008),
 ];
 
 /// Top speed of all published trains on 14 steps: 0.57 to 0.65 m/s; on others nobody knows better.
@@ -114,6 +118,9 @@ pub(super) fn nodes_about(speed: f64) -> [(usize, f64); 2] {
     [(low, 1.0 - part), (low + 1, part)]
 }
 
+/// No train rolls for ever (m/s²): a tenth of a wheel on a level rail.
+const LEAST_FRICTION: f64 = 1e-3;
+
 /// How a train answers, read from a vector of numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Answers<'v> {
@@ -157,6 +164,11 @@ impl<'v> Answers<'v> {
     /// Delay from command to effect of a train at rest (s).
     pub(super) fn start_delay(&self) -> f64 {
         self.at(START_DELAY).max(0.0)
+    }
+
+    /// Slowing down by friction alone (m/s²).
+    pub(super) fn friction(&self) -> f64 {
+        self.at(FRICTION).max(LEAST_FRICTION)
     }
 
     /// Lag and ramp (s) of a change by so much speed over so many steps, as the numbers have them: either may come out

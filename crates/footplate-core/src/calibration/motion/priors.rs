@@ -44,20 +44,50 @@ pub(super) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
 }
 
-/// Adds all of it.
-pub(super) fn add_priors(
-    equations: &mut NormalEquations,
+/// Sums of numbers that are known beforehand, each give or take.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Priors {
+    rows: Vec<(Vec<(usize, f64)>, f64, f64)>,
+}
+
+impl Priors {
+    fn add(&mut self, terms: &[(usize, f64)], value: f64, variance: f64) {
+        self.rows.push((terms.to_vec(), value, variance));
+    }
+
+    /// Adds all of them.
+    pub(super) fn add_to(&self, equations: &mut NormalEquations) {
+        for (terms, value, variance) in &self.rows {
+            equations.add(terms, *value, *variance);
+        }
+    }
+
+    /// The sum of squares, over variances, by which numbers miss them.
+    pub(super) fn cost(&self, x: &[f64]) -> f64 {
+        let off = |terms: &[(usize, f64)], value: f64| {
+            terms.iter().map(|(column, slope)| slope * at(x, *column)).sum::<f64>() - value
+        };
+        self.rows
+            .iter()
+            .map(|(terms, value, variance)| off(terms, *value) * off(terms, *value) / variance)
+            .sum()
+    }
+}
+
+/// All of it.
+pub(super) fn priors(
     columns: &Columns,
     trips: &[Trip],
     sections: &SectionIndex,
     x: &[f64],
     highest: usize,
-) {
+) -> Priors {
+    let mut equations = Priors::default();
     for (column, (mean, deviation)) in PRIOR.iter().enumerate() {
         equations.add(&[(column, 1.0)], *mean, deviation * deviation);
     }
     for first in [STOP_NODES, START_NODES] {
-        add_nodes(equations, first);
+        add_nodes(&mut equations, first);
     }
     for step in 1..=highest {
         let (mean, deviation) = speed_prior(step, highest);
@@ -106,6 +136,7 @@ pub(super) fn add_priors(
             equations.add(&[(columns.change(place, trip, told), 1.0)], 0.0, error * error);
         }
     }
+    equations
 }
 
 fn at(x: &[f64], column: usize) -> f64 {
@@ -113,7 +144,7 @@ fn at(x: &[f64], column: usize) -> f64 {
 }
 
 /// The nodes of what a law leaves over, alike where their speeds are: rows of the inverse of the covariance's root.
-fn add_nodes(equations: &mut NormalEquations, first: usize) {
+fn add_nodes(equations: &mut Priors, first: usize) {
     for (node, terms) in whitened().iter().enumerate() {
         let terms: Vec<(usize, f64)> =
             terms.iter().take(node + 1).enumerate().map(|(i, weight)| (first + i, *weight)).collect();

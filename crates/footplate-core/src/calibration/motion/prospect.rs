@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use super::model::MotionModel;
 use super::parameters::Answers;
 use super::priors::{LATE_START, TRIP_DEVIATION};
-use super::segment::{Segment, Told};
+use super::segment::{Pace, Segment, Told};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
@@ -55,16 +55,15 @@ pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
         return 0.0;
     }
     told.sent = 0.0;
-    let speed = start.speed(effect);
-    start.way(effect) + Segment::of(&told, answers, speed).way_to_rest()
+    start.way(effect) + Segment::of(&told, answers, start.pace(effect)).way_to_rest()
 }
 
 fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
-    Segment::of(&Told { sent: 0.0, from: step, to: 0, at_rest: false }, answers, speed)
+    Segment::of(&Told { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
 }
 
 fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
-    Segment::of(&Told { sent: 0.0, from: 0, to: step, at_rest: true }, answers, 0.0)
+    Segment::of(&Told { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
 }
 
 /// The time (s) at which something that only grows reaches a value, by halving.

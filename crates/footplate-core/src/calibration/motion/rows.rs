@@ -25,6 +25,26 @@ pub(super) struct Linear {
     pub(super) is_stop: bool,
 }
 
+/// Residuals beyond this many standard deviations count linearly (Huber, 1964).
+const HUBER: f64 = 2.5;
+
+impl Linear {
+    fn size(&self) -> f64 {
+        self.residual.abs() / libm::sqrt(self.variance)
+    }
+
+    /// How much it counts.
+    pub(super) fn weight(&self, believes_all: bool) -> f64 {
+        if believes_all { 1.0 } else { (HUBER / self.size()).min(1.0) }
+    }
+
+    /// What its residual costs.
+    pub(super) fn cost(&self, believes_all: bool) -> f64 {
+        let size = self.size();
+        if believes_all || size <= HUBER { size * size } else { HUBER * (2.0 * size - HUBER) }
+    }
+}
+
 /// Steps of the numerical derivatives, in the unit of each number: small against its doubt.
 fn step_of(column: usize) -> f64 {
     if column < SPEEDS { 1e-4 } else { 1e-5 }
@@ -51,6 +71,7 @@ pub(super) fn trip_rows(
     x: &[f64],
     highest: usize,
     scale: f64,
+    with_slopes: bool,
     rows: &mut Vec<Linear>,
 ) {
     let Some(trip) = trips.get(place) else { return };
@@ -62,7 +83,8 @@ pub(super) fn trip_rows(
     let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
 
     let mut slopes: Vec<(usize, Outcome)> = Vec::new();
-    for column in involved(trip, highest) {
+    let involved = if with_slopes { involved(trip, highest) } else { Vec::new() };
+    for column in involved {
         let step = step_of(column);
         numbers[column] += step;
         slopes.push((column, outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments)));
@@ -71,17 +93,18 @@ pub(super) fn trip_rows(
     let answers = Answers::new(&numbers, highest);
     let mut moved = own.clone();
     let step = 1e-4;
-    if trip.told.first().is_some_and(|told| told.at_rest) {
+    if with_slopes && trip.told.first().is_some_and(|told| told.at_rest) {
         moved.late_start += step;
         slopes.push((columns.late_start(place), outcome(trip, &answers, &moved, &mut segments)));
         moved.late_start = own.late_start;
     }
-    for piece in 0..trip.pieces.len() {
+    let (pieces, told) = if with_slopes { (trip.pieces.len(), trip.told.len()) } else { (0, 0) };
+    for piece in 0..pieces {
         moved.deviations[piece] += step;
         slopes.push((columns.deviation(place, piece), outcome(trip, &answers, &moved, &mut segments)));
         moved.deviations[piece] = own.deviations[piece];
     }
-    for told in 0..trip.told.len() {
+    for told in 0..told {
         moved.changes[told] += step;
         slopes.push((columns.change(place, trip, told), outcome(trip, &answers, &moved, &mut segments)));
         moved.changes[told] = own.changes[told];

@@ -56,6 +56,39 @@ pub(crate) struct Segment {
     shape: RampedLag,
     /// Way that the law leaves over.
     residual: f64,
+    braking: Option<Rolling>,
+}
+
+/// The end of a stop: nothing drives any more, friction slows the train, and it comes to rest.
+///
+/// With `A` the speed when the set speed is down, `f` friction and `x` the time since then, `v = A e^(−x/θ) −
+/// f θ (1 − e^(−x/θ))`, which is zero at `x = θ ln(1 + A/(f θ))`, and friction has taken `f θ² ln(1 + A/(f θ))` from the way
+/// but for what the lag had left of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Rolling {
+    friction: f64,
+    /// Since the stop took effect (s), ...
+    begins: f64,
+    /// ... and from then to rest.
+    lasts: f64,
+}
+
+impl Rolling {
+    /// What friction has taken of the speed, and of the way, so long after the stop took effect.
+    fn taken(&self, since: f64, lag: f64) -> (f64, f64) {
+        let time = (since - self.begins).clamp(0.0, self.lasts);
+        let gone = -libm::expm1(-time / lag);
+        (self.friction * lag * gone, self.friction * lag * (time - lag * gone))
+    }
+
+    /// What friction has taken of the whole way, with what the lag alone would still have run.
+    fn loss(&self, lag: f64) -> f64 {
+        self.friction * lag * self.lasts
+    }
+
+    fn ends(&self) -> f64 {
+        self.begins + self.lasts
+    }
 }
 
 /// Share of a change that counts as none: 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
@@ -65,7 +98,7 @@ impl Segment {
     /// A train at rest, or running steadily since ever.
     pub(super) const fn steady(begins: f64, speed: f64) -> Self {
         let from = Pace::steady(speed);
-        Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0 }
+        Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
     }
 
     /// What a command makes of a train that goes at a pace when it takes effect.
@@ -87,7 +120,20 @@ impl Segment {
         } else {
             0.0
         };
-        Self { begins: told.effect(answers), from, to, shape, residual: residual + cut }
+        let begins = told.effect(answers);
+        let mut segment = Self { begins, from, to, shape, residual: residual + cut, braking: None };
+        if told.to == 0 {
+            segment.braking = Some(segment.rolling(answers.friction()));
+        }
+        segment
+    }
+
+    /// The end of a stop.
+    fn rolling(&self, friction: f64) -> Rolling {
+        let (ramp, lag) = (self.shape.ramp(), self.shape.lag());
+        let left = self.speed(self.begins + ramp).max(0.0);
+        let lasts = lag * libm::log1p(left / (friction * lag));
+        Rolling { friction, begins: ramp, lasts }
     }
 
     /// The part of being behind the set speed at the beginning that is left.
@@ -102,11 +148,13 @@ impl Segment {
         if since <= 0.0 {
             return speed * since;
         }
+        if let Some(rolling) = self.braking.filter(|rolling| since >= rolling.ends()) {
+            return self.way_of_stop(rolling);
+        }
         let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
-        set * since
-            + (self.to - set) * self.shape.area(since)
-            + caught_up
-            + self.residual * self.shape.share(since)
+        let taken = self.braking.map_or(0.0, |rolling| rolling.taken(since, self.shape.lag()).1);
+        set * since + (self.to - set) * self.shape.area(since) + caught_up + self.residual * self.done(since)
+            - taken
     }
 
     /// Speed (m/s).
@@ -116,7 +164,13 @@ impl Segment {
         if since <= 0.0 {
             return speed;
         }
-        set + (self.to - set) * self.shape.share(since) + (speed - set) * self.behind(since)
+        let taken = match self.braking {
+            Some(rolling) if since >= rolling.ends() => return 0.0,
+            Some(rolling) => rolling.taken(since, self.shape.lag()).0,
+            None => 0.0,
+        };
+        (set + (self.to - set) * self.shape.share(since) + (speed - set) * self.behind(since) - taken)
+            .max(0.0)
     }
 
     /// Speed and set speed.
@@ -127,17 +181,30 @@ impl Segment {
 
     /// The share of the change that is done.
     pub(super) fn share(&self, time: f64) -> f64 {
-        self.shape.share(time - self.begins)
+        self.done(time - self.begins)
+    }
+
+    /// A stop is done at rest, which friction brings before the lag alone would.
+    fn done(&self, since: f64) -> f64 {
+        match self.braking {
+            Some(rolling) if since >= rolling.ends() => 1.0,
+            Some(rolling) => (self.shape.share(since) / self.shape.share(rolling.ends())).min(1.0),
+            None => self.shape.share(since),
+        }
     }
 
     /// When the change is done but for a last bit (s, on the clock of the run).
     pub(super) fn settled(&self) -> f64 {
-        self.begins + self.shape.settled(SETTLED)
+        self.begins + self.braking.map_or_else(|| self.shape.settled(SETTLED), |rolling| rolling.ends())
     }
 
     /// The whole way of a stop (m).
     pub(super) fn way_to_rest(&self) -> f64 {
-        self.displacement()
+        self.braking.map_or_else(|| self.displacement(), |rolling| self.way_of_stop(rolling))
+    }
+
+    fn way_of_stop(&self, rolling: Rolling) -> f64 {
+        self.displacement() - rolling.loss(self.shape.lag())
     }
 
     /// By how much the way once it is settled differs from that of a change at once (m).
