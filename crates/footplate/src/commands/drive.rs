@@ -1,10 +1,192 @@
 //! `footplate drive`: trains told what to do, line by line, and what comes of it.
-#![allow(dead_code)]
 
 mod conductor;
 mod instruction;
+mod learning;
 mod parse;
+mod result_line;
 mod script;
 mod spoken;
+mod stage;
 mod told;
+mod trains;
+mod truth;
 mod words;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use footplate_core::control::Driver;
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{TrainId, TurnoutId};
+use footplate_store::{Store, layout_named};
+use footplate_wire::marklin_serial::Interface;
+
+use self::conductor::{Conductor, Giver};
+use self::instruction::HELP;
+use self::learning::Learning;
+use self::parse::Known;
+use self::result_line::result_line;
+use self::script::read_script;
+use self::spoken::Spoken;
+use self::stage::{Stage, ended, lines_of_stdin};
+use self::trains::{KnownTrains, Sources};
+use self::truth::{Beginnings, Referee};
+use super::Outcome;
+use super::predict::turnout_state;
+use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
+use crate::runtime::{Ended, Runtime, StopFlag};
+
+/// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
+///
+/// Without `--script` lines are read from standard input, at a prompt if that is a terminal; `help` lists what can be
+/// said. Each contact that a train passes is printed with what had been predicted; each stop with what was promised.
+/// However the program ends, all trains are told to stand and the power is taken from the track first.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  footplate drive --link sim:track-a?seed=7 --store railway.db
+  footplate drive --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db --script evening.txt --json")]
+pub(crate) struct Arguments {
+    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or marklin-serial:tcp://host:port.
+    #[arg(long, value_name = "URL")]
+    link: Address,
+    /// The layout: the name of a built-in one or a layout file; a simulated link brings its own.
+    #[arg(long)]
+    layout: Option<String>,
+    /// The store that knows the trains; what they do is written down there.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+    /// What is known of a train, as a file of its own; may be repeated.
+    #[arg(long = "model", value_name = "FILE")]
+    models: Vec<PathBuf>,
+    /// Drive this train, too, even if nothing is known of it; may be repeated.
+    #[arg(long = "train", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=80))]
+    trains: Vec<u16>,
+    /// How a turnout lies when the session begins, such as 6=straight; may be repeated.
+    #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
+    turnouts: Vec<(TurnoutId, Leg)>,
+    /// Lines to carry out, one after the other; a train ends one order before it begins the next.
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+    /// Print a line of JSON for every finished order; all else goes to standard error.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = self.layout()?;
+        let store = self.store.as_deref().map(Store::open).transpose()?;
+        let mut named: BTreeSet<TrainId> = self.trains.iter().copied().map(TrainId).collect();
+        if let Address::Simulated(simulated) = &self.link {
+            named.extend(&simulated.trains);
+        }
+        let known =
+            KnownTrains::gather(&layout, &Sources { files: &self.models, store: store.as_ref(), named })?;
+        let conductor = self.conductor(&layout, known)?;
+        // A person at the prompt lives in real time; a script need not.
+        let pace = if self.script.is_some() { Speed::Unpaced } else { Speed::Times(1.0) };
+        match &self.link {
+            Address::Simulated(simulated) => {
+                let link = open_simulated(simulated, &layout, pace)?;
+                self.drive(&layout, link, conductor, output)
+            }
+            Address::Serial(_) => {
+                let link = open(&self.link, &layout, pace)?;
+                self.drive(&layout, link, conductor, output)
+            }
+        }
+    }
+
+    /// The layout: the one that was named, or the simulated one.
+    fn layout(&self) -> anyhow::Result<Layout> {
+        let named = match (&self.layout, &self.link) {
+            (Some(named), _) => named,
+            (None, Address::Simulated(simulated)) => &simulated.layout,
+            (None, Address::Serial(_)) => {
+                bail!("which layout is it? Name it with `--layout track-a` or `--layout my-layout.toml`")
+            }
+        };
+        Ok(layout_named(named)?.layout)
+    }
+
+    fn conductor(&self, layout: &Layout, known: KnownTrains) -> anyhow::Result<Conductor> {
+        let mut turnouts = known.turnouts;
+        for (turnout, leg) in &self.turnouts {
+            if layout.branch(*turnout).is_none() {
+                bail!("--turnout: {} has no turnout {turnout}", layout.name());
+            }
+            turnouts.set(*turnout, *leg);
+        }
+        for train in &known.unknown {
+            eprintln!(
+                "nothing is known of train {train}: stops will be as uncertain as their promises say; `footplate \
+                 calibrate` learns how it moves"
+            );
+        }
+        let highest: BTreeMap<_, _> =
+            known.models.iter().map(|(train, model)| (*train, model.highest())).collect();
+        let (giver, steps) = match &self.script {
+            Some(path) => (Giver::Script, read_script(path, Known { layout, trains: &highest })?),
+            None => (Giver::Person, Vec::new()),
+        };
+        let mut driver = Driver::new(layout.clone(), turnouts);
+        known.models.into_values().for_each(|model| driver.add_train(model));
+        Ok(Conductor::new(driver, Learning::new(layout, known.fits), giver, steps))
+    }
+
+    fn drive<L: Link>(
+        &self,
+        layout: &Layout,
+        link: L,
+        mut conductor: Conductor,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<Outcome>
+    where
+        L: Referee,
+    {
+        let settings = session_settings(&self.link, &link, layout);
+        let session = Interface::new(link.now(), settings)?;
+        let lines = self.script.is_none().then(lines_of_stdin);
+        let mut stage = Stage::new(lines, self.json);
+        if self.script.is_none() && !self.json {
+            stage.say(HELP, "");
+        }
+        let mut runtime = Runtime::new(link, session, None, Some(StopFlag::install()));
+        let mut beginnings = Beginnings::default();
+        let ending = loop {
+            let ending = runtime.run(&mut conductor, &mut stage)?;
+            for spoken in std::mem::take(&mut stage.for_referee) {
+                if let Spoken::Begun(train) = spoken {
+                    beginnings.note(runtime.link(), train);
+                }
+                if let Some(ended) = ended(&spoken).filter(|_| self.json) {
+                    let truth = beginnings.error(runtime.link(), layout, ended);
+                    writeln!(output, "{}", result_line(layout, ended, truth))?;
+                    output.flush()?;
+                }
+            }
+            if stage.is_over || !matches!(ending, Ended::Finished) {
+                break ending;
+            }
+        };
+        let closing = runtime.close();
+        drop(runtime);
+        if !closing.is_complete() {
+            eprintln!("{closing}");
+        }
+        match ending {
+            Ended::Finished if conductor.fell_short() => Ok(Outcome::FallsShort),
+            Ended::Finished => Ok(Outcome::Done),
+            Ended::Interrupted => {
+                eprintln!("interrupted; {closing}");
+                Ok(Outcome::FallsShort)
+            }
+            lost => Err(anyhow!("{lost}")),
+        }
+    }
+}

@@ -120,7 +120,7 @@ impl Arguments {
 }
 
 /// Reads `6=straight`.
-fn turnout_state(text: &str) -> Result<(TurnoutId, Leg), String> {
+pub(super) fn turnout_state(text: &str) -> Result<(TurnoutId, Leg), String> {
     let wanted =
         || format!("`{text}` should be the number of a turnout and its leg, such as 6=straight or 7=curved");
     let (number, leg) = text.split_once('=').ok_or_else(wanted)?;

@@ -8,6 +8,7 @@ use footplate_core::control::{
 use footplate_core::{Event, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::instruction::{HELP, Instruction, Until};
+use super::learning::Learning;
 use super::parse::Known;
 use super::script::{Step, step};
 use super::spoken::{Ended, Spoken, Target};
@@ -31,6 +32,7 @@ pub(super) enum Giver {
 #[derive(Debug)]
 pub(super) struct Conductor {
     driver: Driver,
+    learning: Learning,
     giver: Giver,
     steps: VecDeque<Step>,
     /// No more will come.
@@ -54,7 +56,7 @@ struct Wait {
 }
 
 impl Conductor {
-    pub(super) fn new(driver: Driver, giver: Giver, steps: Vec<Step>) -> Self {
+    pub(super) fn new(driver: Driver, learning: Learning, giver: Giver, steps: Vec<Step>) -> Self {
         let highest = |train| {
             driver
                 .model(train)
@@ -63,6 +65,7 @@ impl Conductor {
         let trains = driver.trains().map(|train| (train, highest(train))).collect();
         Self {
             driver,
+            learning,
             giver,
             steps: steps.into(),
             complete: giver == Giver::Script,
@@ -109,7 +112,8 @@ impl Conductor {
     }
 
     fn say(&mut self, line: String) {
-        self.outputs.push_back(Output::Notice(Spoken::Line(line)));
+        let status = self.tongue().status(self.looked);
+        self.outputs.push_back(Output::Notice(Spoken::Line { text: line, status }));
     }
 
     fn since_begin(&self, time: Timestamp) -> TimeSpan {
@@ -229,6 +233,7 @@ impl Conductor {
             achieved: None,
             error: None,
             promise: None,
+            unseen: None,
             at: self.since_begin(time),
             refused: None,
         }
@@ -252,11 +257,18 @@ impl Conductor {
         }
         match notice {
             DriveNotice::Passed { train, passed, .. } => {
+                self.learning.passed(*train, &self.driver, passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
                 }
             }
-            DriveNotice::Done(finished) => self.done(finished),
+            DriveNotice::Done(finished) => {
+                self.done(finished);
+                self.learn(now, finished);
+            }
+            DriveNotice::Lost { train } | DriveNotice::TurnoutLiesOtherwise { train, .. } => {
+                self.learning.interrupt(*train);
+            }
             DriveNotice::Thrown { order: Some(order), .. } => {
                 if let Some(step) = self.pending.remove(order) {
                     let ended = self.ended(now, &step);
@@ -284,9 +296,25 @@ impl Conductor {
             achieved: achieved.map(name),
             error: achieved.and_then(|achieved| achieved.error),
             promise: finished.promise,
+            unseen: finished.unseen.map(|sensor| self.tongue().sensor(sensor).to_owned()),
             ..self.ended(finished.time, &step)
         };
         self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+    }
+}
+
+impl Conductor {
+    /// What trains taught is used from the next order on. Only while all of them stand, so that nobody waits for it.
+    fn learn(&mut self, now: Timestamp, finished: &Finished) {
+        if finished.unseen.is_some() {
+            self.learning.interrupt(finished.train);
+        }
+        let trains: Vec<TrainId> = self.trains.keys().copied().collect();
+        if trains.iter().all(|train| self.driver.stands(*train, now))
+            && let Some(model) = self.learning.model(finished.train)
+        {
+            self.driver.set_model(model);
+        }
     }
 }
 
@@ -295,6 +323,7 @@ impl Machine for Conductor {
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.driver.handle_event(now, event);
+        self.learning.take(&self.driver, event);
         self.go_on(now);
     }
 

@@ -7,8 +7,13 @@ use footplate_core::{Length, TimeSpan, TrainId};
 /// Something to be said.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Spoken {
-    /// For people.
-    Line(String),
+    /// For people, and what could stand below it: where trains are.
+    Line {
+        /// The line.
+        text: String,
+        /// Where trains are, shortly.
+        status: String,
+    },
     /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
     Begun(TrainId),
     /// An order has ended.
@@ -34,6 +39,8 @@ pub(super) struct Ended {
     pub(super) promise: Option<Promise>,
     /// When, since the session began.
     pub(super) at: TimeSpan,
+    /// A contact that should have reported the train and did not.
+    pub(super) unseen: Option<String>,
     /// Why it was not carried out.
     pub(super) refused: Option<String>,
 }

@@ -29,7 +29,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
 }
 
 impl Tongue<'_> {
-    fn sensor(&self, sensor: SensorId) -> &str {
+    pub(super) fn sensor(&self, sensor: SensorId) -> &str {
         self.driver.layout().sensor_name(sensor)
     }
 
@@ -59,6 +59,17 @@ impl Tongue<'_> {
             format!("{speed:.0} \u{b1} {doubt:.0} mm/s at step {}", located.step)
         };
         format!("train {train}: {place} \u{b1} {half:.0} mm (95 %), {moves}")
+    }
+
+    /// Where all trains are, for a line that is looked at while something else is written.
+    pub(super) fn status(&self, now: Timestamp) -> String {
+        let train = |train: TrainId| {
+            let Some(located) = self.driver.locate(train, now) else { return format!("{train} ?") };
+            let place = self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
+            let (speed, half) = (located.speed.as_mm_per_s(), 1.959_964 * located.uncertainty.as_mm());
+            format!("{train} {place} \u{b1}{half:.0} mm {speed:.0} mm/s")
+        };
+        self.driver.trains().map(train).collect::<Vec<_>>().join(", ")
     }
 
     /// A notice as one line, if there is anything to say.
@@ -158,7 +169,8 @@ const fn leg(curved: bool) -> &'static str {
     if curved { "curved" } else { "straight" }
 }
 
-fn said(command: &Command) -> String {
+/// A command in words.
+pub(super) fn said(command: &Command) -> String {
     match command {
         Command::Speed { train, step } => format!("step {step} for train {train}"),
         Command::Reverse { train } => format!("turn around, train {train}"),

@@ -1,0 +1,61 @@
+//! What trains teach while they are driven.
+
+use std::collections::BTreeMap;
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::control::Driver;
+use footplate_core::estimation::PassedContact;
+use footplate_core::track::Layout;
+use footplate_core::{Event, EventKind, Report, TrainId};
+
+/// Fits that go on from what was known at the beginning.
+#[derive(Debug)]
+pub(super) struct Learning {
+    fits: BTreeMap<TrainId, MotionFit>,
+    sections: SectionIndex,
+}
+
+impl Learning {
+    pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
+        let fits = fits.into_iter().map(|fit| (fit.model().train(), fit)).collect();
+        Self { fits, sections: SectionIndex::of(layout) }
+    }
+
+    /// A command to a train has left.
+    pub(super) fn take(&mut self, driver: &Driver, event: &Event) {
+        if let EventKind::Speed { train, .. } | EventKind::Reverse { train } = event.kind {
+            self.learn(train, driver, event);
+        }
+    }
+
+    /// A contact was judged to have been closed by a train. Where it was before is not known if it was just found.
+    pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedContact) {
+        if passed.late.is_none() {
+            self.interrupt(train);
+        }
+        let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
+        let event = Event { time: passed.window.until, kind: EventKind::Sensor(report) };
+        self.learn(train, driver, &event);
+    }
+
+    fn learn(&mut self, train: TrainId, driver: &Driver, event: &Event) {
+        if let Some(fit) = self.fits.get_mut(&train) {
+            fit.take(driver.layout(), driver.turnouts(), event);
+        }
+    }
+
+    /// What a train did last follows from nothing that is known.
+    pub(super) fn interrupt(&mut self, train: TrainId) {
+        if let Some(fit) = self.fits.get_mut(&train) {
+            fit.interrupt();
+        }
+    }
+
+    /// What is known of a train by now. Takes a while: not for between two reports.
+    pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
+        let fit = self.fits.get_mut(&train)?;
+        fit.refit(&self.sections);
+        Some(fit.model().clone())
+    }
+}

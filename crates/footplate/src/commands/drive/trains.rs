@@ -1,0 +1,137 @@
+//! Which trains are driven, and what is known of how they move.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
+use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::{SpeedStep, TrainId};
+use footplate_store::{MotionFile, MotionReplay, Store};
+
+use crate::clock::now;
+
+/// Addresses of a 6050 or 6051.
+const ADDRESSES: std::ops::RangeInclusive<u16> = 1..=80;
+/// The highest step of its decoders.
+const HIGHEST: u8 = 14;
+
+/// Trains as they are known when a session begins.
+#[derive(Debug, Default)]
+pub(super) struct KnownTrains {
+    pub(super) models: BTreeMap<TrainId, MotionModel>,
+    /// What they follow from, where that is known, to go on from.
+    pub(super) fits: Vec<MotionFit>,
+    pub(super) turnouts: TurnoutStates,
+    /// Trains of which nothing is known.
+    pub(super) unknown: Vec<TrainId>,
+}
+
+/// Where to look for trains.
+pub(super) struct Sources<'s> {
+    /// Files of motion models.
+    pub(super) files: &'s [PathBuf],
+    pub(super) store: Option<&'s Store>,
+    /// Trains to drive whether or not anything is known of them.
+    pub(super) named: BTreeSet<TrainId>,
+}
+
+impl KnownTrains {
+    /// # Errors
+    /// A file or the store cannot be read, a model is of another layout, or there is no train at all.
+    pub(super) fn gather(layout: &Layout, sources: &Sources<'_>) -> anyhow::Result<Self> {
+        let mut known = Self::default();
+        for path in sources.files {
+            let file = MotionFile::read(path)?;
+            known.add(layout, &file, &path.display().to_string())?;
+        }
+        for train in ADDRESSES.map(TrainId) {
+            if let Some(store) = sources.store
+                && !known.models.contains_key(&train)
+            {
+                known.add_of_store(layout, store, train, sources.named.contains(&train))?;
+            }
+        }
+        for train in &sources.named {
+            if !known.models.contains_key(train) {
+                let fit = MotionFit::new(*train, highest());
+                known.models.insert(*train, fit.model().clone());
+                known.fits.push(fit);
+                known.unknown.push(*train);
+            }
+        }
+        if known.models.is_empty() {
+            bail!(
+                "there is no train to drive: name one with `--train 24`, or what is known of one with `--store` or \
+                 `--model`"
+            );
+        }
+        Ok(known)
+    }
+
+    fn add(&mut self, layout: &Layout, file: &MotionFile, place: &str) -> anyhow::Result<()> {
+        if file.layout != layout.name() {
+            bail!("{place}: the model of train {} is of layout {}, not of {}", file.train, file.layout, layout.name());
+        }
+        let model = file.model(layout).with_context(|| place.to_owned())?;
+        self.models.insert(model.train(), model);
+        Ok(())
+    }
+
+    /// What a store knows: the model kept last, and the events it follows from, to learn on.
+    fn add_of_store(
+        &mut self,
+        layout: &Layout,
+        store: &Store,
+        train: TrainId,
+        is_named: bool,
+    ) -> anyhow::Result<()> {
+        let at = now();
+        let kept = MotionFile::of_store(store, train, at)?.filter(|kept| kept.layout == layout.name());
+        let place = || format!("{}, motion model of train {train}", store.path().display());
+        if let Some(kept) = &kept {
+            self.add(layout, kept, &place())?;
+        } else if !is_named {
+            return Ok(());
+        }
+        let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
+        if replay.is_empty() {
+            return Ok(());
+        }
+        let mut fit = replay.fit;
+        if let Some(model) = self.models.get(&train) {
+            // Which steps move it follows from experiments, not from the events alone.
+            for step in (1..=HIGHEST).filter_map(SpeedStep::new) {
+                if model.uses(step) != StepUse::Untried {
+                    fit.note_use(step, model.uses(step));
+                }
+            }
+        } else {
+            self.models.insert(train, fit.model().clone());
+        }
+        self.fits.push(fit);
+        for (turnout, _) in layout.turnouts() {
+            if let Some(leg) = replay.turnouts.get(turnout) {
+                self.turnouts.set(turnout, leg);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps what was learnt.
+    ///
+    /// # Errors
+    /// The store cannot be written.
+    pub(super) fn keep(path: &Path, layout: &Layout, models: &[MotionModel]) -> anyhow::Result<()> {
+        let mut store = Store::open(path)?;
+        let at = now();
+        for model in models {
+            MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;
+        }
+        Ok(())
+    }
+}
+
+fn highest() -> SpeedStep {
+    SpeedStep::new(HIGHEST).unwrap_or_default()
+}
