@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::{
-    calibrate, compare, completions, convert, demo, layout, measure, odometry, predict, report, simulate,
+    calibrate, compare, completions, convert, demo, drive, layout, measure, odometry, predict, report, simulate,
     store,
 };
 
@@ -36,6 +36,7 @@ verbs! {
     Completions: completions,
     Convert: convert,
     Demo: demo,
+    Drive: drive,
     Layout: layout,
     Measure: measure,
     Odometry: odometry,

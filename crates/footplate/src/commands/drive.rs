@@ -12,9 +12,10 @@ mod told;
 mod trains;
 mod truth;
 mod words;
+mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
@@ -29,20 +30,22 @@ use self::conductor::{Conductor, Giver};
 use self::instruction::HELP;
 use self::learning::Learning;
 use self::parse::Known;
-use self::result_line::result_line;
+use self::result_line::ResultLine;
 use self::script::read_script;
 use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
+use self::written::Written;
 use super::Outcome;
 use super::predict::turnout_state;
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
-use crate::runtime::{Ended, Runtime, StopFlag};
+use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 
 /// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
 ///
-/// Without `--script` lines are read from standard input, at a prompt if that is a terminal; `help` lists what can be
+/// Without `--script` lines are read from standard input, at a prompt if that is a terminal, where a new order takes the
+/// place of the one before; `help` lists what can be
 /// said. Each contact that a train passes is printed with what had been predicted; each stop with what was promised.
 /// However the program ends, all trains are told to stand and the power is taken from the track first.
 #[derive(Args)]
@@ -80,13 +83,14 @@ pub(crate) struct Arguments {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = self.layout()?;
-        let store = self.store.as_deref().map(Store::open).transpose()?;
+        let store = self.store.as_deref().map(Store::open_or_create).transpose()?;
         let mut named: BTreeSet<TrainId> = self.trains.iter().copied().map(TrainId).collect();
         if let Address::Simulated(simulated) = &self.link {
             named.extend(&simulated.trains);
         }
         let known =
             KnownTrains::gather(&layout, &Sources { files: &self.models, store: store.as_ref(), named })?;
+        drop(store);
         let conductor = self.conductor(&layout, known)?;
         // A person at the prompt lives in real time; a script need not.
         let pace = if self.script.is_some() { Speed::Unpaced } else { Speed::Times(1.0) };
@@ -132,11 +136,16 @@ impl Arguments {
             known.models.iter().map(|(train, model)| (*train, model.highest())).collect();
         let (giver, steps) = match &self.script {
             Some(path) => (Giver::Script, read_script(path, Known { layout, trains: &highest })?),
-            None => (Giver::Person, Vec::new()),
+            None if std::io::stdin().is_terminal() => (Giver::Person, Vec::new()),
+            None => (Giver::Script, Vec::new()),
         };
         let mut driver = Driver::new(layout.clone(), turnouts);
         known.models.into_values().for_each(|model| driver.add_train(model));
-        Ok(Conductor::new(driver, Learning::new(layout, known.fits), giver, steps))
+        let mut conductor = Conductor::new(driver, Learning::new(layout, known.fits), giver, steps);
+        if self.script.is_some() {
+            conductor.complete();
+        }
+        Ok(conductor)
     }
 
     fn drive<L: Link>(
@@ -153,10 +162,12 @@ impl Arguments {
         let session = Interface::new(link.now(), settings)?;
         let lines = self.script.is_none().then(lines_of_stdin);
         let mut stage = Stage::new(lines, self.json);
-        if self.script.is_none() && !self.json {
+        if conductor.listens_to_a_person() && !self.json {
             stage.say(HELP, "");
         }
-        let mut runtime = Runtime::new(link, session, None, Some(StopFlag::install()));
+        let mut written = self.store.as_deref().map(|store| Written::begin(store, layout)).transpose()?;
+        let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
+        let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let mut beginnings = Beginnings::default();
         let ending = loop {
             let ending = runtime.run(&mut conductor, &mut stage)?;
@@ -166,7 +177,7 @@ impl Arguments {
                 }
                 if let Some(ended) = ended(&spoken).filter(|_| self.json) {
                     let truth = beginnings.error(runtime.link(), layout, ended);
-                    writeln!(output, "{}", result_line(layout, ended, truth))?;
+                    writeln!(output, "{}", serde_json::to_string(&ResultLine::of(layout, ended, truth))?)?;
                     output.flush()?;
                 }
             }
@@ -178,6 +189,10 @@ impl Arguments {
         drop(runtime);
         if !closing.is_complete() {
             eprintln!("{closing}");
+        }
+        if let Some(store) = &self.store {
+            drop(written);
+            KnownTrains::keep(store, layout, &conductor.learnt())?;
         }
         match ending {
             Ended::Finished if conductor.fell_short() => Ok(Outcome::FallsShort),

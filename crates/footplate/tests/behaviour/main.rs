@@ -5,6 +5,7 @@ mod calibrate;
 mod calibrations_are_true;
 mod compare;
 mod demo;
+mod drive;
 mod forecasts_hold;
 mod inertial_slides;
 mod layout;

@@ -321,6 +321,10 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
+        // From now on it stands, whatever a better model may make of its way to here.
+        if let Some(located) = self.located(ground, now) {
+            self.locator.place(now, located.at, located.uncertainty);
+        }
         match task.goal {
             Goal::Reverse(_) => {
                 self.task = Some(Task { phase: Phase::Turning, ..task });

@@ -1,6 +1,7 @@
 //! Drives trains to where they are ordered, report by report.
 
 use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 use crate::calibration::motion::{MotionModel, StepUse};
 use crate::control::{Machine, Output};
@@ -42,8 +43,8 @@ pub struct Driver {
     outputs: Outputs,
     /// When each contact was last seen closed.
     closed: BTreeMap<SensorId, Timestamp>,
-    /// Turnouts that were told how to lie and have not been yet, by which order.
-    throwing: BTreeMap<TurnoutId, OrderId>,
+    /// Turnouts that were asked for and have not been told yet, by which order.
+    throwing: Vec<(TurnoutId, OrderId)>,
     orders: u32,
 }
 
@@ -56,7 +57,7 @@ impl Driver {
             trains: BTreeMap::new(),
             outputs: Outputs::default(),
             closed: BTreeMap::new(),
-            throwing: BTreeMap::new(),
+            throwing: Vec::new(),
             orders: 0,
         }
     }
@@ -219,15 +220,26 @@ impl Driver {
             }
             self.outputs.command(Command::Turnout { turnout: partner, curved: false });
         }
-        self.throwing.insert(turnout, order);
+        self.throwing.push((turnout, order));
         self.outputs.command(Command::Turnout { turnout, curved });
         Ok(())
     }
 
     fn turnout_left(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
         self.track.turnouts.set(turnout, Leg::from_curved(curved));
-        let order = self.throwing.remove(&turnout);
-        self.outputs.say(DriveNotice::Thrown { order, turnout, curved });
+        let out = &mut self.outputs;
+        let mut is_asked = false;
+        // Whoever asked for it is answered; a line may say once what was asked twice.
+        self.throwing.retain(|(asked, order)| {
+            if *asked == turnout {
+                is_asked = true;
+                out.say(DriveNotice::Thrown { order: Some(*order), turnout, curved });
+            }
+            *asked != turnout
+        });
+        if !is_asked {
+            out.say(DriveNotice::Thrown { order: None, turnout, curved });
+        }
         self.ways_changed(now);
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
     Achieved, DriveNotice, Driver, Finished, Machine, Order, OrderId, Output, Refusal,
 };
@@ -22,7 +23,7 @@ const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
 /// Who gives the instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Giver {
-    /// A file: a train ends one order before it begins the next.
+    /// A file, or another program: a train ends one order before it begins the next.
     Script,
     /// A person: a new order takes the place of the one before.
     Person,
@@ -68,7 +69,7 @@ impl Conductor {
             learning,
             giver,
             steps: steps.into(),
-            complete: giver == Giver::Script,
+            complete: false,
             trains,
             wait: None,
             pending: BTreeMap::new(),
@@ -80,13 +81,20 @@ impl Conductor {
         }
     }
 
-    pub(super) const fn driver(&self) -> &Driver {
-        &self.driver
+    /// Whether somebody sits there who may not know what can be said.
+    pub(super) fn listens_to_a_person(&self) -> bool {
+        self.giver == Giver::Person
     }
 
     /// Whether an order was refused or given up.
     pub(super) const fn fell_short(&self) -> bool {
         self.fell_short
+    }
+
+    /// What trains taught.
+    pub(super) fn learnt(&mut self) -> Vec<MotionModel> {
+        let trains: Vec<TrainId> = self.trains.keys().copied().collect();
+        trains.into_iter().filter_map(|train| self.learning.model(train)).collect()
     }
 
     /// A person wrote a line.
@@ -95,7 +103,7 @@ impl Conductor {
         match step(line, known) {
             Ok(heard) => {
                 // Who says something else has waited long enough.
-                if heard.is_some() {
+                if heard.is_some() && self.giver == Giver::Person {
                     self.wait = None;
                 }
                 self.steps.extend(heard);
@@ -106,9 +114,8 @@ impl Conductor {
     }
 
     /// No more lines will come: what is under way is ended.
-    pub(super) fn complete(&mut self, now: Timestamp) {
+    pub(super) const fn complete(&mut self) {
         self.complete = true;
-        self.go_on(now);
     }
 
     fn say(&mut self, line: String) {
@@ -131,13 +138,7 @@ impl Conductor {
         self.hand_on(now);
         while !self.is_over && self.may_go_on(now) {
             let Some(step) = self.steps.front() else { break };
-            let busy = match step.instruction {
-                Instruction::Order(order) => {
-                    order.train().is_some_and(|train| self.driver.busy(train).is_some())
-                }
-                _ => false,
-            };
-            if busy && self.giver == Giver::Script {
+            if self.giver == Giver::Script && self.must_wait(step) {
                 break;
             }
             if let Some(step) = self.steps.pop_front() {
@@ -148,6 +149,18 @@ impl Conductor {
         let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.is_empty();
         if self.complete && idle && !self.is_over {
             self.end();
+        }
+    }
+
+    /// In a script a train ends one order before it begins the next, and what follows a turnout follows it.
+    fn must_wait(&self, step: &Step) -> bool {
+        let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
+        match step.instruction {
+            Instruction::Order(order) => {
+                let is_busy = order.train().is_some_and(|train| self.driver.busy(train).is_some());
+                is_busy || !is_turnout(step) && self.pending.values().any(is_turnout)
+            }
+            _ => false,
         }
     }
 
@@ -167,6 +180,14 @@ impl Conductor {
             };
         if met {
             self.wait = None;
+        } else if let Until::AtRest(train) = wait.until
+            && self.driver.busy(train).is_none()
+            && self.driver.told(train) > SpeedStep::STAND
+        {
+            self.wait = None;
+            self.fell_short = true;
+            self.say(format!("train {train} has been told nothing that would bring it to rest; going on"));
+            return true;
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= WAIT_LIMIT {
             self.wait = None;
             self.fell_short = true;
@@ -187,6 +208,14 @@ impl Conductor {
                 }
                 Err(why) => self.refuse(now, &step, &why),
             },
+            Instruction::Straighten => {
+                let turnouts: Vec<_> = self.driver.layout().turnouts().map(|(turnout, _)| turnout).collect();
+                for (place, turnout) in turnouts.into_iter().rev().enumerate() {
+                    let instruction = Instruction::Order(Order::Turnout { turnout, curved: false });
+                    let part = Step { text: step.text.clone(), instruction, is_part: place > 0 };
+                    self.steps.push_front(part);
+                }
+            }
             Instruction::Where(Some(train)) => {
                 let line = self.tongue().whereabouts(train, now);
                 self.say(line);
@@ -270,7 +299,7 @@ impl Conductor {
                 self.learning.interrupt(*train);
             }
             DriveNotice::Thrown { order: Some(order), .. } => {
-                if let Some(step) = self.pending.remove(order) {
+                if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
                     let ended = self.ended(now, &step);
                     self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
                 }
@@ -337,6 +366,9 @@ impl Machine for Conductor {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
+        if self.began.is_none() {
+            return Some(Timestamp::ZERO);
+        }
         let now_and_then = self.wait.map(|wait| match wait.until {
             Until::Passed(span) => wait.since + span,
             Until::AtRest(_) => self.looked + LOOK_AGAIN,

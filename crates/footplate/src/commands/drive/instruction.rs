@@ -8,6 +8,8 @@ use footplate_core::{SensorId, TimeSpan, TrainId};
 pub(super) enum Instruction {
     /// Something for the driver.
     Order(Order),
+    /// All turnouts straight, one after the other.
+    Straighten,
     /// Where is a train, or all of them?
     Where(Option<TrainId>),
     /// Go on with the next line later.
@@ -36,6 +38,7 @@ pub(super) const HELP: &str = "\
 speed 24 8                        run train 24 at step 8; step 0 brings it to rest
 reverse 24 [at step 8]            come to rest, turn around [and run at step 8]
 turnout 11 curved                 throw turnout 11 (curved or straight)
+turnout all straight              so that it is known how all of them lie
 stop 24 at C13+120mm              come to rest with the pickup 120 mm past contact C13
      [at step 8]                  ... from step 8
      [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most

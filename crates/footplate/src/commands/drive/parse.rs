@@ -42,6 +42,10 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             };
             Instruction::Order(Order::Reverse { train, then })
         }
+        "turnout" if words.take("all") => {
+            words.expect("straight")?;
+            Instruction::Straighten
+        }
         "turnout" => {
             let turnout = words.turnout()?;
             Instruction::Order(Order::Turnout { turnout, curved: words.leg()? })
@@ -129,7 +133,7 @@ impl<'t> Words<'_, 't, '_> {
     }
 
     fn turnout(&mut self) -> Result<TurnoutId, Mistake> {
-        let (word, number) = self.number("the number of a turnout, such as 11")?;
+        let (word, number) = self.number("`all` or the number of a turnout, such as 11")?;
         let turnout = TurnoutId(number);
         if self.known.layout.branch(turnout).is_some() {
             return Ok(turnout);
@@ -333,6 +337,7 @@ mod tests {
         assert_eq!(wait("wait 24 at rest"), Until::AtRest(train));
         assert_eq!(wait("wait 24 located"), Until::Located(train));
         assert!(matches!(wait("wait 24 at C13"), Until::At(TrainId(24), _)));
+        assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
         assert_eq!(read("where"), Ok(Some(Instruction::Where(None))));
         assert_eq!(read("  # nothing but a remark"), Ok(None));
     }

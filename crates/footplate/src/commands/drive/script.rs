@@ -16,6 +16,8 @@ pub(super) struct Step {
     /// As it was written, without remarks and spaces around.
     pub(super) text: String,
     pub(super) instruction: Instruction,
+    /// Only a part of what was written, and not the last: nothing is said when it has been done.
+    pub(super) is_part: bool,
 }
 
 /// Reads a script.
@@ -46,5 +48,5 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
 /// Reads one line.
 pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::words::Mistake> {
     let text = line.split('#').next().unwrap_or_default().trim();
-    Ok(parse(line, known)?.map(|instruction| Step { text: text.to_owned(), instruction }))
+    Ok(parse(line, known)?.map(|instruction| Step { text: text.to_owned(), instruction, is_part: false }))
 }

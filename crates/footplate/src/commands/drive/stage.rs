@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
+use footplate_core::control::Machine as _;
 use footplate_core::{Command, Timestamp};
 use footplate_wire::{CommandError, LinkNotice};
 
@@ -58,7 +59,8 @@ impl Screen {
 impl Stage {
     /// `lines`: what a person writes. `json`: the output is for results, and people look at standard error.
     pub(super) fn new(lines: Option<Receiver<String>>, json: bool) -> Self {
-        let prompts = lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
+        let prompts =
+            lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
         let screen = Screen { to_errors: json, prompts };
         Self { lines, screen, for_referee: Vec::new(), is_over: false }
     }
@@ -94,7 +96,8 @@ impl Attendant<Conductor> for Stage {
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => {
                     self.lines = None;
-                    conductor.complete(now);
+                    conductor.complete();
+                    conductor.handle_timeout(now);
                 }
             }
         }

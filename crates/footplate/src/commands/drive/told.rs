@@ -18,7 +18,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
     match instruction {
         Instruction::Order(Order::Speed { .. }) => "speed",
         Instruction::Order(Order::Reverse { .. }) => "reverse",
-        Instruction::Order(Order::Turnout { .. }) => "turnout",
+        Instruction::Order(Order::Turnout { .. }) | Instruction::Straighten => "turnout",
         Instruction::Order(Order::Stop(_)) => "stop",
         Instruction::Order(Order::Move { .. }) => "move",
         Instruction::Where(_) => "where",
@@ -65,7 +65,8 @@ impl Tongue<'_> {
     pub(super) fn status(&self, now: Timestamp) -> String {
         let train = |train: TrainId| {
             let Some(located) = self.driver.locate(train, now) else { return format!("{train} ?") };
-            let place = self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
+            let place =
+                self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
             let (speed, half) = (located.speed.as_mm_per_s(), 1.959_964 * located.uncertainty.as_mm());
             format!("{train} {place} \u{b1}{half:.0} mm {speed:.0} mm/s")
         };

@@ -71,7 +71,12 @@ impl KnownTrains {
 
     fn add(&mut self, layout: &Layout, file: &MotionFile, place: &str) -> anyhow::Result<()> {
         if file.layout != layout.name() {
-            bail!("{place}: the model of train {} is of layout {}, not of {}", file.train, file.layout, layout.name());
+            bail!(
+                "{place}: the model of train {} is of layout {}, not of {}",
+                file.train,
+                file.layout,
+                layout.name()
+            );
         }
         let model = file.model(layout).with_context(|| place.to_owned())?;
         self.models.insert(model.train(), model);
@@ -123,7 +128,7 @@ impl KnownTrains {
     /// # Errors
     /// The store cannot be written.
     pub(super) fn keep(path: &Path, layout: &Layout, models: &[MotionModel]) -> anyhow::Result<()> {
-        let mut store = Store::open(path)?;
+        let mut store = Store::open_or_create(path)?;
         let at = now();
         for model in models {
             MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;

@@ -1,0 +1,168 @@
+//! `footplate drive` does what a script says, says what came of it, and refuses what cannot be before a train moves.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::program::{Run, footplate};
+
+const LINK: &str = "sim:track-a?seed=7&faults=none&trains=24";
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("drive").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    folder
+}
+
+fn drive(name: &str, link: &str, script: &str, more: &[&str]) -> Run {
+    let path = folder(name).join("script.txt");
+    std::fs::write(&path, script).expect("a test file");
+    let path = path.display().to_string();
+    footplate(&[&["drive", "--link", link, "--script", &path], more].concat())
+}
+
+fn lines(run: &Run) -> Vec<Value> {
+    run.output.lines().map(|line| serde_json::from_str(line).expect(line)).collect()
+}
+
+const EVENING: &str = "\
+# an evening with a train that nobody knows
+turnout all straight
+speed 24 9
+wait 24 located
+stop 24                      # anywhere
+wait 24 at rest
+where
+stop 24 at C13+120mm
+stop 24 at E7+200mm at step 9
+move 24 60mm
+stop 24 at C13+120mm not-beyond 5%
+reverse 24
+stop 24 at C14+100mm
+";
+
+#[test]
+fn every_order_ends_with_a_line_that_says_what_was_promised_and_what_came_of_it() {
+    let run = drive("evening", LINK, EVENING, &["--json"]);
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    let lines = lines(&run);
+    let commands: Vec<_> = lines.iter().map(|line| line["command"].as_str().expect("a verb")).collect();
+    assert_eq!(
+        commands,
+        ["turnout", "speed", "speed", "stop", "stop", "move", "stop", "reverse", "stop"],
+        "{}",
+        run.output
+    );
+    for line in lines.iter().filter(|line| !line["target"].is_null()) {
+        let number = |field: &str| line[field].as_f64().expect(field);
+        let (low, high) = (number("promised_low_mm"), number("promised_high_mm"));
+        let truth = number("true_error_mm");
+        assert!(low < high && line["achieved"].is_string() && number("t_s") > 0.0, "{line}");
+        // One in twenty may end outside, and none far outside.
+        let slack = 0.5 * (high - low);
+        assert!((low - slack..=high + slack).contains(&truth), "{line}");
+        assert!(number("error_mm").abs() < high - low, "{line}");
+    }
+    // What trains do is learnt while they do it: the last stop is promised more narrowly than the first.
+    let width = |line: &Value| {
+        line["promised_high_mm"].as_f64().unwrap_or(0.0) - line["promised_low_mm"].as_f64().unwrap_or(0.0)
+    };
+    assert!(width(&lines[8]) < 0.7 * width(&lines[3]), "{} {}", lines[8], lines[3]);
+    // People see each contact with what had been predicted, and where the train is.
+    for says in [" late (", "predicted ", "; next ", "will be told to stop", "(95 %), at rest", "promised"] {
+        assert!(run.errors.contains(says), "{says}: {}", run.errors);
+    }
+}
+
+#[test]
+fn the_same_seed_and_script_print_the_same_bytes() {
+    let run = || drive("again", LINK, EVENING, &["--json"]).output;
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn what_was_learnt_is_kept_in_the_store_and_known_the_next_time() {
+    let store = folder("store").join("railway.db").display().to_string();
+    let first = drive("first", LINK, EVENING, &["--json", "--store", &store]);
+    assert_eq!(first.status, 0, "{}", first.errors);
+    assert!(first.errors.contains("nothing is known of train 24"));
+    let again = drive("second", LINK, EVENING, &["--json", "--store", &store]);
+    assert_eq!(again.status, 0, "{}", again.errors);
+    assert!(!again.errors.contains("nothing is known"), "{}", again.errors);
+    let width = |run: &Run| {
+        let line = &lines(run)[3];
+        line["promised_high_mm"].as_f64().expect("a number")
+            - line["promised_low_mm"].as_f64().expect("a number")
+    };
+    assert!(width(&again) < width(&first), "{} against {}", width(&again), width(&first));
+}
+
+#[test]
+fn a_script_is_checked_whole_before_anything_moves() {
+    let script = "speed 24 8\nsped 24 8\nstop 24 at C133\nstop 25 at C13\nstop 24 at EX1+50mm\nspeed 24 99\n";
+    let run = drive("mistakes", LINK, script, &[]);
+    assert_eq!((run.status, run.output.as_str()), (2, ""));
+    for says in [
+        "line 2, column 1: `sped` is nothing to do: did you mean `speed`?",
+        "line 3, column 12: no place of track-a is called `C133`",
+        "did you mean `C13`?",
+        "line 4, column 6: `25` is no train that is driven here: 24",
+        "line 5, column 12: `EX1+50mm` is off the track: the track ends at `EX1`",
+        "line 6, column 10: `99` should be a step from 0 to 14",
+    ] {
+        assert!(run.errors.contains(says), "{says}: {}", run.errors);
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_said_with_what_could_be_and_ends_with_status_1() {
+    let script = "turnout all straight\nspeed 24 10\nwait 24 at E7\nstop 24 at E7+60mm\nstop 24\n";
+    let run = drive("too-near", LINK, script, &["--json"]);
+    assert_eq!(run.status, 1, "{}{}", run.output, run.errors);
+    let refused = lines(&run).into_iter().find(|line| line["refused"].is_string()).expect("one is refused");
+    let why = refused["refused"].as_str().expect("a reason");
+    assert!(why.starts_with("`E7+60mm` is nearer than the train can stop: the nearest place is `"), "{why}");
+    assert!(why.contains("mm beyond it"), "{why}");
+    let unknown = drive("unknown-turnout", LINK, "speed 24 8\nwait 24 located\nstop 24 at A1\n", &[]);
+    assert_eq!(unknown.status, 1);
+    assert!(unknown.output.contains("refused `stop 24 at A1`: no way"), "{}", unknown.output);
+}
+
+#[test]
+fn wrong_usage_is_named_and_ends_with_status_2() {
+    let wrong = |arguments: &[&str], says: &str| {
+        let run = footplate(&[&["drive"], arguments].concat());
+        assert_eq!((run.status, run.output.as_str()), (2, ""), "{arguments:?}");
+        assert!(run.errors.contains(says), "{says}: {}", run.errors);
+    };
+    wrong(&["--link", "cable:1"], "marklin-serial:");
+    wrong(&["--link", "sim:nowhere"], "nowhere");
+    wrong(&["--link", LINK, "--script", "no-such.txt"], "no-such.txt");
+    wrong(&["--link", LINK, "--turnout", "99=curved"], "--turnout: track-a has no turnout 99");
+    wrong(&["--link", "marklin-serial:/dev/ttyUSB0"], "which layout is it?");
+    let nobody = ["--link", "marklin-serial:/dev/ttyUSB0", "--layout", "track-a"];
+    wrong(&nobody, "there is no train to drive: name one with `--train 24`");
+}
+
+#[test]
+fn lines_from_standard_input_are_carried_out_and_trains_stand_in_the_end() {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_footplate"))
+        .args(["drive", "--link", &format!("{LINK}&speed=200")])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut input = program.stdin.take().expect("it listens");
+    input
+        .write_all(b"help\nspeed 24\nturnout 14 straight\nspeed 24 9\nwait 24 located\nquit\n")
+        .expect("it listens");
+    let done = program.wait_with_output().expect("it ends");
+    let output = String::from_utf8(done.stdout).expect("text");
+    assert!(done.status.success(), "{output}{}", String::from_utf8_lossy(&done.stderr));
+    assert!(output.contains("column 10: a step from 0 to 14 is missing after `24`"), "{output}");
+    assert!(output.contains("found"), "{output}");
+}
