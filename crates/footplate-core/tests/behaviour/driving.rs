@@ -1,5 +1,6 @@
 //! A driver brings trains to rest where they are ordered, says beforehand what it cannot do, and never waits for a
 //! report that may not come.
+#![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
 use footplate_core::{Command, Length, Ratio, SensorId, TrainId, TurnoutId};

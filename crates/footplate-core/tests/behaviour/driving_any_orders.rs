@@ -1,4 +1,5 @@
 //! Whatever is ordered and whatever is reported, a driver neither panics nor plans beyond a target.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use std::sync::OnceLock;
 

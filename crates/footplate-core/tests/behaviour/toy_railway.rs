@@ -5,6 +5,7 @@
 //! A1 -200- 1                      2 -200- D1 --- 900 --- A1      EN1 -300- E1 -800- F1 -900- EX2
 //!          +-- 520 -- C1 -- 450 --+
 //! ```
+#![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;

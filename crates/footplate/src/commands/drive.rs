@@ -148,16 +148,13 @@ impl Arguments {
         Ok(conductor)
     }
 
-    fn drive<L: Link>(
+    fn drive<L: Link + Referee>(
         &self,
         layout: &Layout,
         link: L,
         mut conductor: Conductor,
         output: &mut dyn Write,
-    ) -> anyhow::Result<Outcome>
-    where
-        L: Referee,
-    {
+    ) -> anyhow::Result<Outcome> {
         let settings = session_settings(&self.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
         let lines = self.script.is_none().then(lines_of_stdin);

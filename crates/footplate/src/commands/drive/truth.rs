@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::track::{Landmark, Layout, TurnoutStates};
+use footplate_core::track::Layout;
 use footplate_core::{Length, TrainId};
 
 use super::spoken::{Ended, Target};
@@ -25,26 +25,7 @@ impl Referee for SimulatedLink<'_> {
     fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length> {
         let Target::Place(place) = target else { return None };
         let sensor = layout.sensor_at(place.node)?;
-        let world = self.station().world();
-        let truth = world.truth();
-        let now = truth.train(train)?;
-        let passes = truth.passes().iter().rev();
-        let pass = passes.filter(|pass| pass.train == Some(train)).find(|pass| pass.sensor == sensor);
-        let since = pass.map(|pass| now.odometer - Length::from_mm(pass.odometer_mm));
-        // A train that stopped short of the contact has it ahead, if not by its true distance then nearly.
-        let ahead = || {
-            let lies = layout.turnouts().filter_map(|(turnout, _)| Some((turnout, world.lies(turnout)?)));
-            let contact = Landmark { node: place.node, offset: Length::ZERO };
-            let turnouts: TurnoutStates = lies.collect();
-            let contact = layout.locate(contact, &turnouts).ok()?;
-            layout.distance_ahead(now.position?, contact, &turnouts)
-        };
-        let past = match (since, ahead()) {
-            (Some(since), Some(ahead)) if since <= ahead => since,
-            (_, Some(ahead)) => -ahead,
-            (since, None) => since?,
-        };
-        Some(past - place.offset)
+        Some(self.station().world().truth().past(train, sensor)? - place.offset)
     }
 }
 
