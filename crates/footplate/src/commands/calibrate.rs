@@ -1,6 +1,8 @@
-//! `footplate calibrate`: recordings in, speeds, laws, stops and lengths with their uncertainty out.
+//! `footplate calibrate`: recordings in, or a train on a layout, and speeds, laws, stops and lengths with their uncertainty
+//! out.
 
 mod explain;
+mod live;
 mod table;
 
 use std::io::Write;
@@ -9,7 +11,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Args;
 use footplate_core::track::Layout;
-use footplate_core::{Timestamp, TrainId};
+use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::{
     Batch, CalibrationFile, CalibrationKind, Import, MODEL_VERSION, NewCalibration, Recording, Store,
     layout_named, write_whole,
@@ -18,22 +20,37 @@ use footplate_store::{
 use super::Outcome;
 use super::log_file::LogFile;
 use crate::clock::{Moment, now};
+use crate::link::Address;
 use explain::Question;
 
-/// Calibrate trains from recorded sensor reports.
+/// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
-/// Prints speeds by throttle step, the laws by which each train changes speed, stopping distances and corrected
-/// lengths, every number with one standard deviation and the number of measurements behind it.
+/// With --link, the train is found wherever it stands, driven by a plan that is made as it goes on, and left standing
+/// within the budget: speeds and stops by throttle step, and how sure they are. From recordings: speeds, the laws by which
+/// each train changes speed, stopping distances and corrected lengths. Every number has one standard deviation and the
+/// number of measurements behind it.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
+  footplate calibrate --link sim:track-a?seed=7 --layout track-a --train 24 --store railway.db
+  footplate calibrate --link marklin-serial:/dev/ttyUSB0 --layout track-a --train 24 --budget 5m --store railway.db
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
   footplate calibrate --from session.csv --layout track-a --store railway.db
   footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
 pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
-    #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present = "store")]
+    #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present_any = ["store", "link"])]
     from: Vec<PathBuf>,
+    /// Drive the train over this link: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or
+    /// marklin-serial:tcp://host:port.
+    #[arg(long, value_name = "URL", conflicts_with_all = ["from", "as_of", "explain"], requires = "train")]
+    link: Option<Address>,
+    /// Track time that driving may take, such as 5m or 90s.
+    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = live::budget)]
+    budget: TimeSpan,
+    /// Begin from nothing, even if the store knows the train already.
+    #[arg(long, requires = "link")]
+    afresh: bool,
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: String,
@@ -60,6 +77,19 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if let (Some(link), Some(train)) = (&self.link, self.train) {
+            let session = live::Session {
+                link,
+                layout: &self.layout,
+                train: TrainId(train),
+                budget: self.budget,
+                is_afresh: self.afresh,
+                store: self.store.as_deref(),
+                out: self.out.as_deref(),
+                is_json: self.json,
+            };
+            return session.run(output);
+        }
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
@@ -116,7 +146,7 @@ fn keep(file: &CalibrationFile, store: &mut Store, as_of: Timestamp) -> anyhow::
     Ok(())
 }
 
-fn write_calibration(file: &CalibrationFile, path: &std::path::Path) -> anyhow::Result<()> {
+fn write_calibration(file: &impl serde::Serialize, path: &std::path::Path) -> anyhow::Result<()> {
     let text = match path.extension().and_then(|ending| ending.to_str()) {
         Some("toml") => toml::to_string_pretty(file)?,
         Some("json") => serde_json::to_string_pretty(file)?,

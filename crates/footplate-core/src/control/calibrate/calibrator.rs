@@ -3,14 +3,14 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
-use super::accuracy::{StepAccuracy, usable_steps};
+use super::accuracy::{StepAccuracy, steps, usable_steps};
 use super::activity::Activity;
 use super::notice::{CalibrationNotice, Ending, Mishap, Progress};
-use super::planner::{Planner, Stance};
+use super::planner::{KNOWN_FROM, Planner, Stance};
 use super::settings::CalibratorSettings;
 use super::tracker::{Tracker, Verdict};
 use crate::calibration::SectionIndex;
-use crate::calibration::motion::{MotionFit, MotionModel};
+use crate::calibration::motion::{MotionFit, MotionModel, StepUse};
 use crate::control::{Machine, Output};
 use crate::estimation::{Ground, Locator};
 use crate::event::{Approach, Command, Event, EventKind, Report};
@@ -56,6 +56,8 @@ pub struct Calibrator<'l> {
     pub(super) started: Option<Timestamp>,
     pub(super) finished: Option<Ending>,
     pub(super) ending: Option<Ending>,
+    /// Whether it was said that lengths differ.
+    pub(super) has_told_lengths: bool,
     watched: Option<SensorId>,
     outputs: VecDeque<Output<CalibrationNotice>>,
 }
@@ -64,8 +66,9 @@ impl<'l> Calibrator<'l> {
     /// A calibration of the train that a fit is about: from nothing, or on from what it knows already. It begins with
     /// the first `handle_…`.
     #[must_use]
-    pub fn new(layout: &'l Layout, settings: CalibratorSettings, fit: MotionFit) -> Self {
+    pub fn new(layout: &'l Layout, settings: CalibratorSettings, mut fit: MotionFit) -> Self {
         let train = fit.model().train();
+        note_what_moved(&mut fit);
         Self {
             layout,
             sections: SectionIndex::of(layout),
@@ -91,6 +94,7 @@ impl<'l> Calibrator<'l> {
             started: None,
             finished: None,
             ending: None,
+            has_told_lengths: false,
             watched: None,
             outputs: VecDeque::new(),
         }
@@ -289,6 +293,20 @@ impl<'l> Calibrator<'l> {
         if let Some(node) = self.tracker.last() {
             self.on_passage(now, node);
         }
+    }
+}
+
+/// Steps at which contacts were passed in earlier sessions move the train.
+fn note_what_moved(fit: &mut MotionFit) {
+    let moved: Vec<SpeedStep> = steps(fit.model())
+        .filter(|step| fit.model().uses(*step) == StepUse::Untried)
+        .filter(|step| {
+            let contacts = |approach| fit.model().speed(*step, approach).count;
+            contacts(Approach::Below) + contacts(Approach::Above) >= KNOWN_FROM
+        })
+        .collect();
+    for step in moved {
+        fit.note_use(step, StepUse::Moves);
     }
 }
 

@@ -10,7 +10,7 @@ use super::points::{end_within, held_turnouts, wanted_legs, way_from};
 use crate::event::{Approach, Command, Event};
 use crate::ids::{NodeId, SpeedStep, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Leg;
+use crate::track::{Circuit, Leg};
 use crate::units::{Length, Speed};
 
 /// Contacts that hang report within this, with every module polled.
@@ -33,6 +33,9 @@ const MOST_TURNS: u8 = 3;
 
 /// A turnout moves within this, and the command before it has left within that.
 const THROWN_WITHIN: TimeSpan = TimeSpan::from_ms(700);
+
+/// Experiments begin when the turnouts lie right on so much of the way: the longest stop and the hop before it.
+const SET_AHEAD: Length = Length::from_mm(2_500.0);
 
 /// A turnout that was found on the wrong leg this often is taken as it lies.
 const JAMMED_AFTER: u8 = 2;
@@ -156,9 +159,7 @@ impl Calibrator<'_> {
     /// thrown by now.
     pub(super) fn go_on_if_set(&mut self, now: Timestamp, node: NodeId) {
         let Some(circuit) = &self.circuit else { return };
-        let is_set = wanted_legs(self.layout, circuit, node)
-            .iter()
-            .all(|(id, leg)| self.turnouts.get(*id) == Some(*leg));
+        let is_set = self.is_set_ahead(circuit, node);
         if is_set && circuit.lead.is_empty() {
             self.begin_next(now);
         } else if is_set && self.is_on_lap(node) {
@@ -167,6 +168,18 @@ impl Calibrator<'_> {
             }
             self.begin_next(now);
         }
+    }
+
+    /// Whether the turnouts on the next metres lie as the circuit needs them; those behind are thrown in passing.
+    fn is_set_ahead(&self, circuit: &Circuit, node: NodeId) -> bool {
+        let mut left = SET_AHEAD;
+        let hops = way_from(self.layout, circuit, node).filter_map(|id| self.layout.hop(id));
+        let near = hops.take_while(|hop| {
+            let is_near = left > Length::ZERO;
+            left += -hop.length;
+            is_near
+        });
+        near.flat_map(|hop| hop.needs).all(|need| self.turnouts.get(need.turnout) == Some(need.leg))
     }
 
     fn is_on_lap(&self, node: NodeId) -> bool {

@@ -1,5 +1,7 @@
 //! What to do when a train stalls, is lifted or lost, and when a turnout did not move.
 
+use alloc::vec::Vec;
+
 use super::activity::{Activity, Stage};
 use super::calibrator::Calibrator;
 use super::notice::{CalibrationNotice, Ending, Mishap};
@@ -8,8 +10,8 @@ use crate::estimation::PassedContact;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Leg;
-use crate::units::Speed;
+use crate::track::{HopId, Leg};
+use crate::units::{Length, Speed};
 
 /// A contact is late when it is this much later than expected ...
 const LATE: TimeSpan = TimeSpan::from_ms(1_500);
@@ -28,6 +30,18 @@ const MOST_PUSHES: u8 = 2;
 
 /// Before a lost train is looked for, it stands; whoever lifted it may put it down meanwhile.
 const WAIT_FOR_LOST: TimeSpan = TimeSpan::from_ms(6_000);
+
+/// A length is off by more than a survey explains when it is so many of its standard deviations off, ...
+const ODD: f64 = 4.0;
+
+/// ... and by more than curves and dirt make of it (published factors of edges: most within 10 %) ...
+const ODD_PART: f64 = 0.12;
+
+/// ... and surely so, in standard deviations of what is felt.
+const SURE: f64 = 3.0;
+
+/// One such hop may be a mistake of the survey.
+const FEWEST_ODD: usize = 2;
 
 impl Calibrator<'_> {
     /// Works out by when the next contact has to come.
@@ -126,6 +140,29 @@ impl Calibrator<'_> {
         let failures = self.failures.entry(turnout).or_default();
         *failures = failures.saturating_add(1);
         self.report_mishap(Mishap::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
+    }
+
+    /// Says once if several hops of the lap take times that their surveyed lengths cannot explain.
+    pub(super) fn check_lengths(&mut self) {
+        let Some(circuit) = self.circuit.as_ref().filter(|_| !self.has_told_lengths) else { return };
+        let model = self.fit.model();
+        let survey = self.layout.survey().uncertainty;
+        let hops: Vec<(HopId, Length, Length)> = circuit
+            .lap
+            .iter()
+            .filter_map(|id| self.layout.hop(*id))
+            .filter_map(|hop| {
+                let [felt, doubt] = model.length(&self.sections, &hop);
+                let off = (felt - hop.length).abs();
+                let is_sure = off > SURE * doubt;
+                let is_odd = off > ODD * survey && off > ODD_PART * hop.length;
+                (is_sure && is_odd).then_some((hop.id, hop.length, felt))
+            })
+            .collect();
+        if hops.len() >= FEWEST_ODD {
+            self.has_told_lengths = true;
+            self.report_mishap(Mishap::LengthsDiffer { hops });
+        }
     }
 
     /// The train stops for good.

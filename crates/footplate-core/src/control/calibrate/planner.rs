@@ -22,7 +22,7 @@ const SLOWEST_WORTH_TRYING: Speed = Speed::from_mm_per_s(40.0);
 const SLOWEST_CRAWL: Speed = Speed::from_mm_per_s(70.0);
 
 /// Contacts at a step after which its speed needs no staircase any more.
-const KNOWN_FROM: u32 = 2;
+pub(super) const KNOWN_FROM: u32 = 2;
 
 /// Steps from which a step is approached from above, or from below: far enough to show, near enough to be quick.
 const RUN_UP: u8 = 2;

@@ -327,6 +327,7 @@ impl Calibrator<'_> {
         let (experiment, begun, before) = (trial.experiment, trial.begun, trial.before);
         self.planner.note(&experiment);
         self.fit.refit(&self.sections);
+        self.check_lengths();
         let after = self.line(before.step, before.approach);
         self.say(CalibrationNotice::Done(Done { experiment, took: now - begun, before, after }));
         self.begin_next(now);

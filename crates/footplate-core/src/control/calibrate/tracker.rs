@@ -178,7 +178,8 @@ fn leads_to(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, to: NodeId,
 /// the way, and how it lay.
 fn other_leg(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<(TurnoutId, Leg)> {
     let unknown = TurnoutStates::unknown();
-    let way = ground.layout.reaches(from, &unknown, 1).find(|way| way.to == to)?;
+    // Without a silent contact between: two things at once that seldom happen are rather a spurious report.
+    let way = ground.layout.reaches(from, &unknown, 0).find(|way| way.to == to)?;
     let hops = way.hops().iter().filter_map(|id| ground.layout.hop(*id));
     let mut needs = hops.flat_map(|hop| hop.needs.iter());
     needs.find(|need| !ground.turnouts.allow(**need)).map(|need| (need.turnout, need.leg))

@@ -1,0 +1,233 @@
+//! `footplate calibrate --link`: a train is found, driven by a plan that is made as it goes on, and left standing.
+
+mod ended;
+mod figures;
+mod kept;
+mod told;
+mod watcher;
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{anyhow, bail};
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::{MotionFit, StepUse};
+use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
+use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_store::{MotionFile, MotionReplay, Store, layout_named};
+use footplate_wire::marklin_serial::Interface;
+
+use self::ended::{Why, outcome_of};
+use self::kept::Written;
+use self::watcher::Watcher;
+use super::write_calibration;
+use crate::clock::now;
+use crate::commands::Outcome;
+use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
+use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
+
+/// The highest step of the decoders that a 6051 can talk to.
+const HIGHEST_STEP: u8 = 14;
+
+/// The shortest session that finds a train and learns anything (s) ...
+const SHORTEST_S: f64 = 20.0;
+/// ... and one that nobody wants to wait for.
+const LONGEST_S: f64 = 24.0 * 3_600.0;
+
+/// Reads a span of track time such as `5m`, `90s` or `1h`.
+pub(super) fn budget(text: &str) -> Result<TimeSpan, String> {
+    let (digits, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let seconds = match unit.trim() {
+        "s" | "" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3_600.0,
+        _ => return Err(format!("`{unit}` is no unit of time: write 90s, 5m or 1h")),
+    };
+    let number = digits.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+    let span = number.map(|number| number * seconds).ok_or("write a time such as 90s, 5m or 1h")?;
+    if !(SHORTEST_S..=LONGEST_S).contains(&span) {
+        return Err(format!("a calibration takes from {SHORTEST_S:.0} s to a day: write 5m for a full one"));
+    }
+    Ok(TimeSpan::from_s(span))
+}
+
+/// What was asked for.
+pub(super) struct Session<'a> {
+    pub(super) link: &'a Address,
+    pub(super) layout: &'a str,
+    pub(super) train: TrainId,
+    pub(super) budget: TimeSpan,
+    pub(super) is_afresh: bool,
+    pub(super) store: Option<&'a Path>,
+    pub(super) out: Option<&'a Path>,
+    pub(super) is_json: bool,
+}
+
+/// A session that is over.
+struct Driven<'l> {
+    calibrator: Calibrator<'l>,
+    /// When.
+    at: Timestamp,
+    mishaps: u32,
+    why: Why,
+}
+
+impl Session<'_> {
+    /// Drives, tells, keeps.
+    pub(super) fn run(&self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(self.layout)?.layout;
+        // A simulated railway is what its address says, whatever people believe it to be.
+        let real = match self.link {
+            Address::Simulated(simulated) => layout_named(&simulated.layout)?.layout,
+            Address::Serial(_) => layout.clone(),
+        };
+        if let Address::Simulated(simulated) = self.link
+            && !simulated.trains.contains(&self.train)
+        {
+            let there: Vec<String> = simulated.trains.iter().map(ToString::to_string).collect();
+            bail!(
+                "train {} is not on the simulated layout, where there are trains {}: choose one of them, or put it \
+                 there with `&trains={}`",
+                self.train,
+                there.join(", "),
+                self.train
+            );
+        }
+        match self.link {
+            Address::Simulated(simulated) => {
+                let mut link = open_simulated(simulated, &real, Speed::Unpaced)?;
+                // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
+                for other in simulated.trains.iter().filter(|other| **other != self.train) {
+                    eprintln!("train {other} is taken off the simulated rails meanwhile");
+                    link.station_mut().world_mut().lift(*other);
+                }
+                self.drive(&layout, link, output)
+            }
+            Address::Serial(_) => self.drive(&layout, open(self.link, &real, Speed::Unpaced)?, output),
+        }
+    }
+
+    fn drive<L: Link>(&self, layout: &Layout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let (fit, turnouts) = self.known(layout)?;
+        let mut written = match self.store {
+            Some(path) => Some(Written::begin(path, layout, self.train)?),
+            None => None,
+        };
+        let settings = session_settings(self.link, &link, layout);
+        let session = Interface::new(link.now(), settings)?;
+        let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
+
+        let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
+        let mut calibrator = Calibrator::new(layout, settings, fit);
+        calibrator.set_turnouts(turnouts);
+        let mut watcher = Watcher::new(layout, self.train, self.budget);
+        let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
+        let ended = runtime.run(&mut calibrator, &mut watcher);
+        let at = runtime.link().now();
+        let closing = runtime.close();
+        drop(runtime);
+        watcher.end();
+        if !closing.is_complete() {
+            eprintln!("{closing}");
+        }
+        if let Some(written) = written {
+            written.end();
+        }
+        let why = match ended {
+            Err(error) => Why::NotRecorded(error),
+            Ok(Ended::Finished) => match watcher.other_layout {
+                Some(other) => Why::OtherLayout { other: other.to_owned() },
+                None => calibrator.ending().cloned().map_or(Why::Interrupted, Why::Ended),
+            },
+            Ok(Ended::Interrupted) => Why::Interrupted,
+            Ok(lost) => Why::Lost(lost.to_string()),
+        };
+        let mishaps = watcher.mishaps;
+        self.conclude(layout, Driven { calibrator, at, mishaps, why }, output)
+    }
+
+    /// Keeps what was learnt, whatever ended it, and tells it.
+    fn conclude(
+        &self,
+        layout: &Layout,
+        session: Driven<'_>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<Outcome> {
+        let Driven { calibrator, at, mishaps, why } = session;
+        let took = calibrator.progress(at).elapsed;
+        let accuracy = calibrator.accuracy();
+        let mut fit = calibrator.into_fit();
+        fit.refit(&SectionIndex::of(layout));
+        let made = now();
+        let file = MotionFile::of(layout, fit.model(), Some(made));
+        if why.is_trusted() {
+            if let Some(path) = self.store {
+                file.keep(&mut Store::open(path)?, made, made)?;
+            }
+            if let Some(path) = self.out {
+                write_calibration(&file, path)?;
+            }
+        }
+        let figures =
+            figures::Figures { layout, train: self.train, took, accuracy: &accuracy, mishaps, why: &why };
+        if self.is_json {
+            figures.write_json(output)?;
+        } else {
+            figures.write_table(output)?;
+        }
+        match why {
+            Why::NotRecorded(error) => Err(error),
+            Why::Lost(lost) => Err(anyhow!("{lost}")),
+            why => Ok(outcome_of(&why)),
+        }
+    }
+
+    /// What is known of the train and the turnouts from earlier sessions, so that this one goes on from there.
+    fn known(&self, layout: &Layout) -> anyhow::Result<(MotionFit, TurnoutStates)> {
+        let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or_default();
+        let nothing = (MotionFit::new(self.train, highest), TurnoutStates::unknown());
+        let Some(path) = self.store.filter(|path| path.exists() && !self.is_afresh) else {
+            return Ok(nothing);
+        };
+        let store = Store::open(path)?;
+        let replay = MotionReplay::of_store(layout, &store, self.train, highest, now())?;
+        if replay.is_empty() {
+            return Ok(nothing);
+        }
+        eprintln!(
+            "going on from {} runs of train {} that the store holds; --afresh begins from nothing",
+            replay.runs, self.train
+        );
+        let mut fit = replay.fit;
+        let kept =
+            MotionFile::of_store(&store, self.train, now())?.filter(|kept| kept.layout == layout.name());
+        if let Some(model) = kept.map(|kept| kept.model(layout)).transpose()? {
+            // Which steps do not move it follows from what was tried, not from the events alone.
+            let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
+            for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {
+                fit.note_use(step, model.uses(step));
+            }
+        }
+        // Turnouts may have been thrown by hand since.
+        Ok((fit, TurnoutStates::unknown()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_is_read_as_people_write_it() {
+        for (text, seconds) in
+            [("5m", 300.0), ("90s", 90.0), ("300", 300.0), ("1.5 min", 90.0), ("1h", 3_600.0)]
+        {
+            assert_eq!(budget(text).map(TimeSpan::as_s), Ok(seconds), "{text}");
+        }
+        assert_eq!(budget("5 weeks").unwrap_err(), "`weeks` is no unit of time: write 90s, 5m or 1h");
+        assert_eq!(budget("soon").unwrap_err(), "`soon` is no unit of time: write 90s, 5m or 1h");
+        assert!(budget("1s").unwrap_err().contains("from 20 s to a day"));
+        assert!(budget("-5m").is_err() && budget("").is_err() && budget("NaN").is_err());
+    }
+}

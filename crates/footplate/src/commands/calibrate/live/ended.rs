@@ -1,0 +1,81 @@
+//! Why a session ended, in words and as an exit status.
+
+use std::fmt::{Display, Formatter, Result as FmtResult};
+
+use footplate_core::control::calibrate::Ending;
+
+use crate::commands::Outcome;
+
+/// Why it ended.
+#[derive(Debug)]
+pub(super) enum Why {
+    /// By itself.
+    Ended(Ending),
+    /// Somebody pressed Ctrl-C, or a signal came.
+    Interrupted,
+    /// The times between contacts are those of another layout.
+    OtherLayout { other: String },
+    /// The line or the station is gone.
+    Lost(String),
+    /// The store could not be written.
+    NotRecorded(anyhow::Error),
+}
+
+impl Why {
+    /// Whether what was learnt may be kept as knowledge of the train on this layout.
+    pub(super) const fn is_trusted(&self) -> bool {
+        !matches!(
+            self,
+            Self::OtherLayout { .. }
+                | Self::Ended(Ending::WrongLayout { .. } | Ending::NotFound | Ending::NoCircuit)
+        )
+    }
+
+    /// One word for programs.
+    pub(super) const fn word(&self) -> &'static str {
+        match self {
+            Self::Ended(Ending::Budget) => "budget",
+            Self::Ended(Ending::NothingToGain) => "nothing-to-gain",
+            Self::Ended(Ending::Told) | Self::Interrupted => "interrupted",
+            Self::Ended(Ending::NotFound) => "not-found",
+            Self::Ended(Ending::NoCircuit) => "no-circuit",
+            Self::Ended(Ending::WrongLayout { .. }) | Self::OtherLayout { .. } => "wrong-layout",
+            Self::Lost(_) => "link-lost",
+            Self::NotRecorded(_) => "not-recorded",
+        }
+    }
+}
+
+impl Display for Why {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        match self {
+            Self::Ended(Ending::Budget) => f.write_str("the budget is used"),
+            Self::Ended(Ending::NothingToGain) => f.write_str("nothing is left that would be worth its time"),
+            Self::Ended(Ending::Told) | Self::Interrupted => f.write_str("interrupted; what was learnt is kept"),
+            Self::Ended(Ending::NotFound) => f.write_str(
+                "the train was not found: no contact reported at any step. Does it stand on the track, is it under \
+                 power, and is it the right number?",
+            ),
+            Self::Ended(Ending::NoCircuit) => f.write_str(
+                "no circuit can be reached from where the train is: put it on a track that leads round",
+            ),
+            Self::Ended(Ending::WrongLayout { .. }) => {
+                f.write_str("the contacts report in an order that this layout does not allow: it is another one")
+            }
+            Self::OtherLayout { other } => write!(
+                f,
+                "the times between contacts are those of {other}: give `--layout {other}` if that is the layout"
+            ),
+            Self::Lost(lost) => f.write_str(lost),
+            Self::NotRecorded(error) => write!(f, "{error:#}"),
+        }
+    }
+}
+
+/// A calibration that used its time, or needed less, is done; all else falls short.
+pub(super) const fn outcome_of(why: &Why) -> Outcome {
+    match why {
+        Why::Ended(Ending::Budget | Ending::NothingToGain) => Outcome::Done,
+        _ => Outcome::FallsShort,
+    }
+}

@@ -1,0 +1,108 @@
+//! What a calibration says, in words.
+
+use footplate_core::control::calibrate::{CalibrationNotice, Done, Experiment, Mishap, Phase, Progress, Why};
+use footplate_core::track::Layout;
+
+/// A line that is worth keeping; nothing for what only moves a bar.
+pub(super) fn line(layout: &Layout, notice: &CalibrationNotice) -> Option<String> {
+    Some(match notice {
+        CalibrationNotice::Found { node, step } => {
+            format!("found: it passed {} at step {step}", layout.node_name(*node))
+        }
+        CalibrationNotice::Circuit(circuit) => {
+            let legs: Vec<String> =
+                circuit.legs.iter().map(|(turnout, leg)| format!("{turnout} {leg}")).collect();
+            format!(
+                "circuit: {} contacts in {:.2} m, turnouts {}",
+                circuit.lap.len(),
+                circuit.length.as_m(),
+                legs.join(", ")
+            )
+        }
+        CalibrationNotice::TurnsAround { node } => {
+            format!("behind {} no circuit can be reached: it turns around", layout.node_name(*node))
+        }
+        CalibrationNotice::Begins { experiment, why: Why::MostPerSecond { gain, takes } } => format!(
+            "{experiment}: should take {:.0} s and lower the doubts by {gain:.1} scatters squared",
+            takes.as_s()
+        ),
+        CalibrationNotice::Begins { .. } => return None,
+        CalibrationNotice::Done(done) => measured(done),
+        CalibrationNotice::Mishap(mishap) => format!("! {}", happened(layout, mishap)),
+        CalibrationNotice::Progress(_) | CalibrationNotice::Finished { .. } => return None,
+    })
+}
+
+fn measured(done: &Done) -> String {
+    let (before, after) = (&done.before, &done.after);
+    let took = done.took.as_s();
+    match done.experiment {
+        Experiment::Speed { .. } => format!(
+            "  {}: {:.0} ± {:.1} mm/s, in {took:.0} s",
+            done.experiment,
+            after.speed.value.as_mm_per_s(),
+            after.speed.uncertainty.as_mm_per_s()
+        ),
+        Experiment::Stop { .. } | Experiment::Move { .. } => format!(
+            "  {}: {:.0} ± {:.0} mm (was ± {:.0}), in {took:.0} s",
+            done.experiment,
+            after.stop.distance.as_mm(),
+            after.stop.doubt.as_mm(),
+            before.stop.doubt.as_mm()
+        ),
+    }
+}
+
+fn happened(layout: &Layout, mishap: &Mishap) -> String {
+    match mishap {
+        Mishap::Stalled { step } => format!("it stalled at step {step}, which is not relied upon from here"),
+        Mishap::Missed { count, before } => {
+            format!("{count} contact(s) before {} did not report", layout.sensor_name(*before))
+        }
+        Mishap::Unexplained { sensor } => {
+            format!("{} reported, where the train cannot be", layout.sensor_name(*sensor))
+        }
+        Mishap::WrongLeg { turnout, wanted } => {
+            format!("turnout {turnout} does not lie {wanted} as it was told; told again")
+        }
+        Mishap::Moved { from, to } => format!(
+            "it is at {} and cannot have run there from {}: was it lifted?",
+            layout.node_name(*to),
+            from.map_or("?", |from| layout.node_name(from))
+        ),
+        Mishap::Lost { last } => format!(
+            "no contact for too long after {}: it stands, and is looked for again",
+            last.map_or("?", |last| layout.node_name(last))
+        ),
+        Mishap::LengthsDiffer { hops } => {
+            let each = hops.iter().filter_map(|(hop, surveyed, felt)| {
+                let hop = layout.hop(*hop)?;
+                let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
+                Some(format!("{from} to {to} {:.0} instead of {:.0} mm", felt.as_mm(), surveyed.as_mm()))
+            });
+            format!("lengths are not those of the layout: {}", each.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+/// The line beside the bar: what it is about, and how well stops are known by now.
+pub(super) fn state(progress: &Progress) -> String {
+    let about = match &progress.phase {
+        Phase::Finding => "looking for the train".to_owned(),
+        Phase::Joining => "on the way to a circuit".to_owned(),
+        Phase::Experiment(experiment) => experiment.to_string(),
+        Phase::Paused => "paused".to_owned(),
+        Phase::Ending => "coming to rest".to_owned(),
+        Phase::Finished => "done".to_owned(),
+    };
+    let middle = progress.accuracy.get(progress.accuracy.len() / 2);
+    let reached = middle.map(|line| {
+        format!(
+            "; step {}: stop ±{:.0} mm (95 %), speed ±{:.1} %",
+            line.step,
+            line.stop_within().as_mm(),
+            line.speed_within().as_parts() * 100.0
+        )
+    });
+    about + &reached.unwrap_or_default()
+}
