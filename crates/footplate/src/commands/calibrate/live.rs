@@ -19,7 +19,6 @@ use footplate_store::{MotionFile, MotionReplay, Store, layout_named};
 use footplate_wire::marklin_serial::Interface;
 
 use self::ended::{Why, outcome_of};
-use self::kept::Written;
 use self::watcher::Watcher;
 use super::write_calibration;
 use crate::clock::now;
@@ -111,7 +110,7 @@ impl Session<'_> {
     fn drive<L: Link>(&self, layout: &Layout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let (fit, turnouts) = self.known(layout)?;
         let mut written = match self.store {
-            Some(path) => Some(Written::begin(path, layout, self.train)?),
+            Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now())?),
             None => None,
         };
         let settings = session_settings(self.link, &link, layout);
@@ -132,7 +131,7 @@ impl Session<'_> {
             eprintln!("{closing}");
         }
         if let Some(written) = written {
-            written.end();
+            kept::end(written);
         }
         let why = match ended {
             Err(error) => Why::NotRecorded(error),

@@ -3,35 +3,41 @@
 use std::path::Path;
 
 use footplate_core::track::Layout;
-use footplate_core::{Event, TrainId};
+use footplate_core::{Timestamp, TrainId};
 use footplate_store::{Journal, Store};
 
 use crate::clock::{local, now};
-use crate::runtime::Recorder;
+use crate::link::Address;
+use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
 
-/// A journal as the loop's recorder.
-pub(super) struct Written(Journal);
-
-impl Written {
-    /// Begins a session of a train in a store.
-    ///
-    /// # Errors
-    /// The store cannot be written.
-    pub(super) fn begin(path: &Path, layout: &Layout, train: TrainId) -> anyhow::Result<Self> {
-        let at = now();
-        let name = format!("calibration of train {train}, {}", local(at));
-        let store = Store::open_or_create(path)?;
-        Ok(Self(Journal::begin(store, &name, layout.name(), Some(at), &[], at)?))
-    }
-
-    pub(super) fn end(self) {
-        drop(self.0.end());
-    }
+/// Begins a session of a train in a store; the line's clock stands at `at`.
+///
+/// # Errors
+/// The store cannot be written.
+pub(super) fn begin(
+    path: &Path,
+    layout: &Layout,
+    train: TrainId,
+    link: &Address,
+    at: Timestamp,
+) -> anyhow::Result<SessionJournal> {
+    let now = now();
+    let began_at = now + (Timestamp::ZERO - at);
+    let name = format!("calibration of train {train}, {}", local(now));
+    let store = Store::open_or_create(path)?;
+    let journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
+    // A simulated clock stands still for a slow disk; trains on a real track do not.
+    let when_full = match link {
+        Address::Simulated(_) => WhenFull::Wait,
+        Address::Serial(_) => WhenFull::Lose,
+    };
+    Ok(SessionJournal::start(journal, Some(began_at), when_full, IfUnkept::Stop)?)
 }
 
-impl Recorder for Written {
-    fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
-        self.0.append(events, now())?;
-        Ok(())
+/// Writes down what still waits, and says if anything is lost.
+pub(super) fn end(journal: SessionJournal) {
+    let (kept, _) = journal.finish();
+    if let Some(trouble) = kept.trouble {
+        eprintln!("the session was not written down to its end: {trouble}");
     }
 }
