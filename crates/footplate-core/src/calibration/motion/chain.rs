@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use super::parameters::Answers;
 use super::segment::Told;
 use super::trip::{Trip, TripContact};
 use crate::calibration::SectionIndex;
@@ -41,16 +42,14 @@ impl Chain {
         self.last_sensor = None;
     }
 
-    /// A command to the train. `rests_after` says how long a stop from a step takes to be over.
-    pub(super) fn tell(&mut self, time: Timestamp, step: SpeedStep, rests_after: f64) {
+    /// A command to the train. Whether it stands by then is judged by how it answers as far as is known.
+    pub(super) fn tell(&mut self, time: Timestamp, step: SpeedStep, answers: &Answers<'_>) {
         let sent = self.seconds(time);
         let (from, to) = (self.step, step.get());
         if to == from {
             return;
         }
-        let stopped_at =
-            self.trips.last().and_then(|trip| trip.told.last()).map_or(f64::NEG_INFINITY, |told| told.sent);
-        let at_rest = from == 0 && sent - stopped_at > rests_after;
+        let at_rest = from == 0 && self.trips.last().is_none_or(|trip| trip.rests_at(answers) <= sent);
         if from == 0 && (at_rest || self.trips.is_empty()) {
             if let Some(last) = self.trips.last_mut().filter(|_| self.unbroken) {
                 last.came_to_rest = true;
@@ -102,12 +101,6 @@ impl Chain {
         });
         trip.pass(TripContact { time, variance: interval * interval / 12.0, way: length, sections });
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
-    }
-
-    /// The step from which the train was told to stop last.
-    pub(super) fn stopped_from(&self) -> SpeedStep {
-        let told = self.trips.last().and_then(|trip| trip.told.last());
-        told.and_then(|told| SpeedStep::new(told.from)).unwrap_or(SpeedStep::STAND)
     }
 }
 

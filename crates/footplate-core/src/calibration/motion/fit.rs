@@ -66,8 +66,7 @@ impl MotionFit {
                 self.chain.pass(layout, sections, turnouts, event);
             }
             EventKind::Speed { train, step } if train == self.model.train() => {
-                let rests_after = self.model.settles_within(self.chain.stopped_from(), SpeedStep::STAND);
-                self.chain.tell(event.time, step, rests_after.as_s());
+                self.chain.tell(event.time, step, &self.model.answers());
             }
             EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
             _ => return,

@@ -73,6 +73,18 @@ impl Trip {
         self.contacts.push(contact);
     }
 
+    /// When the train rests, if it was told to stop last (s).
+    pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
+        let own = Own {
+            late_start: 0.0,
+            deviations: alloc::vec![0.0; self.pieces.len()],
+            changes: alloc::vec![0.0; self.told.len()],
+        };
+        let mut segments = Vec::new();
+        self.segments(answers, &own, &mut segments);
+        segments.last().filter(|last| last.to == 0.0).map_or(f64::INFINITY, Segment::settled)
+    }
+
     /// The changes of speed one after the other, the state before the first command included.
     pub(super) fn segments(&self, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) {
         segments.clear();
