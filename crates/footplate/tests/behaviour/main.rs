@@ -17,6 +17,7 @@ mod predict;
 mod program;
 mod report;
 mod simulate;
+mod simulate_driving;
 mod simulate_line;
 mod simulated;
 mod store;

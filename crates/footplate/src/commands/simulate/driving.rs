@@ -1,6 +1,7 @@
 //! `footplate simulate driving`: random trains calibrated and driven in the simulator, and scored by its truth.
 
 mod choice;
+mod course_project;
 mod figures;
 mod known_train;
 mod page;
@@ -19,9 +20,10 @@ use footplate_core::track::Layout;
 use footplate_sim::LawFamily;
 use footplate_store::layout_named;
 
+use self::course_project::CourseProject;
 use self::figures::ScoredTrain;
 use self::page::Page;
-use self::trial::{Counts, TRAIN, Trial, ahead, calibrate, world};
+use self::trial::{Counts, Plan, TRAIN, Trial, ahead, calibrate, world};
 use super::super::Outcome;
 use super::seeds::Seeds;
 use crate::progress::with_progress;
@@ -115,6 +117,9 @@ fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow
         trial.run(COUNTS);
         by.push(trial.results);
     }
+    let mut world = line.clone();
+    let plan = Plan::new(&world, asked);
+    by.push(CourseProject::new(layout, &mut world, calibrated.turnouts).run(plan, COUNTS));
     let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
     Ok(ScoredTrain { law, seed, calibration_s, ending, by })
 }

@@ -184,3 +184,35 @@ fn scatter_scale(engine: &Train, model: &MotionModel) -> f64 {
         .collect();
     ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::calibration::SectionIndex;
+    use footplate_core::track::TurnoutStates;
+    use footplate_sim::LawFamily;
+
+    use super::super::trial::{TRAIN, world};
+    use super::*;
+
+    #[test]
+    fn what_the_oracle_says_of_a_train_is_true() {
+        let layout = footplate_store::layout_named("track-a").unwrap().layout;
+        let (sections, turnouts) = (SectionIndex::of(&layout), TurnoutStates::unknown());
+        let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+        for law in LawFamily::ALL {
+            let line = world(&layout, 3, law).unwrap();
+            let truth = line.station.world().truth();
+            let engine = truth.engine(TRAIN).unwrap();
+            let model = known(ground, truth, TRAIN, &[]).unwrap();
+            for step in steps(engine.speeds.highest()).skip(4) {
+                let speed = engine.speeds.speed(step, Approach::Below);
+                let found = model.speed(step, Approach::Below).value;
+                // Half warm: no train is more than 2.5 % slower than warm, nor faster.
+                assert!((0.97..1.01).contains(&(found / speed)), "{law} {step}: {found:?} for {speed:?}");
+                let really = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+                let said = model.stop(step, Approach::Below).distance;
+                assert!((said - really).abs().as_mm() < 25.0, "{law} {step}: {said:?} for {really:?}");
+            }
+        }
+    }
+}

@@ -21,7 +21,8 @@ const LEGEND: &str = "\
 from 500 mm/s on (top); *moves* are of 20 to 400 mm. Errors are true millimetres, median / 95th percentile. The *oracle* is
 the same driver with a model made of the truth: what remains is what nobody can know, scatter of stops first of all. The
 *course project* does what published projects do: a constant speed a step, stopping distances by bisection, v²/2a in
-between, no feedback from errors, a position counted on from the last report.
+between (for moves, too: tables of those that some projects have are left out), no feedback from errors, a position counted
+on from the last report; it may measure for as long as it likes.
 ";
 
 const LEGEND_NOT_BEYOND: &str = "\

@@ -20,12 +20,16 @@ const HIGHEST: u8 = 14;
 const CALIBRATION_PATIENCE_S: f64 = 420.0;
 /// An order that is not carried out by then has failed.
 const ORDER_PATIENCE_S: f64 = 60.0;
+/// A train that was told to stop stands after this, in s.
+const STANDS_WITHIN_S: f64 = 8.0;
 /// How often the position is compared with the truth.
 const LOOK: TimeSpan = TimeSpan::from_ms(200);
 /// Mid steps are those with true speeds from here to there, top steps those that are faster, in mm/s: scatter is said
 /// to be 4 mm about 390 and 21 mm about 612 mm/s.
 const MID_MM_PER_S: std::ops::Range<f64> = 200.0..450.0;
 const TOP_FROM_MM_PER_S: f64 = 500.0;
+/// How far short moves are, in mm.
+const SHORT_MOVES_MM: std::ops::Range<f64> = 20.0..400.0;
 /// No loop has more contacts (chosen: half of those of Track A).
 const MOST_CONTACTS: usize = 40;
 
@@ -109,12 +113,59 @@ impl<M: footplate_core::control::Machine> Begins for M {
     }
 }
 
+/// What is asked of a train: the same whoever drives, as long as the train stands at the same places.
+pub(super) struct Plan {
+    choice: Choice,
+    /// Steps by their true speeds: a scorer's choice of what to ask, unknown to the driver.
+    pub(super) mid: Vec<SpeedStep>,
+    pub(super) top: Vec<SpeedStep>,
+}
+
+impl Plan {
+    pub(super) fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
+        let truth = line.station.world().truth();
+        let steps = |range: std::ops::Range<f64>| {
+            let speed = |step: SpeedStep| {
+                truth
+                    .engine(TRAIN)
+                    .map_or(0.0, |engine| engine.speeds.speed(step, Approach::Below).as_mm_per_s())
+            };
+            let all = (1..=HIGHEST).filter_map(SpeedStep::new);
+            all.filter(|step| range.contains(&speed(*step))).collect()
+        };
+        Self {
+            choice: Choice::new(seed),
+            mid: steps(MID_MM_PER_S),
+            top: steps(TOP_FROM_MM_PER_S..f64::INFINITY),
+        }
+    }
+
+    /// A contact ahead on the way as the turnouts lie, somewhere between it and the next, and one of several steps.
+    pub(super) fn stop(
+        &mut self,
+        layout: &Layout,
+        line: &VirtualLine<'_>,
+        turnouts: &TurnoutStates,
+        steps: &[SpeedStep],
+    ) -> Option<(NodeId, Length, SpeedStep)> {
+        let ahead = ahead(layout, line, turnouts);
+        let (node, length) = *self.choice.of(&ahead)?;
+        let offset = self.choice.between(0.0, length);
+        Some((node, Length::from_mm(offset), *self.choice.of(steps)?))
+    }
+
+    /// How far to move, in mm.
+    pub(super) fn distance(&mut self) -> f64 {
+        self.choice.between(SHORT_MOVES_MM.start, SHORT_MOVES_MM.end)
+    }
+}
+
 /// Drives a calibrated train and compares what comes of it with the truth.
 pub(super) struct Trial<'a, 'l> {
     pub(super) layout: &'l Layout,
     pub(super) line: &'a mut VirtualLine<'l>,
     driver: Driver,
-    choice: Choice,
+    plan: Plan,
     pub(super) results: Results,
 }
 
@@ -128,12 +179,13 @@ impl<'a, 'l> Trial<'a, 'l> {
         let mut driver = Driver::new(layout.clone(), calibrated.turnouts);
         driver.add_located(calibrated.model, calibrated.locator);
         let results = Results::default();
-        Self { layout, line, driver, choice: Choice::new(seed), results }
+        let plan = Plan::new(line, seed);
+        Self { layout, line, driver, plan, results }
     }
 
     /// Everything, in turn, as far as the train remains on the rails.
     pub(super) fn run(&mut self, counts: Counts) {
-        let (mid, top) = (self.steps(MID_MM_PER_S), self.steps(TOP_FROM_MM_PER_S..f64::INFINITY));
+        let (mid, top) = (self.plan.mid.clone(), self.plan.top.clone());
         for _ in 0..counts.mid_stops {
             let error = self.stop(&mid, Aim::Median);
             self.results.mid.extend(error);
@@ -155,13 +207,6 @@ impl<'a, 'l> Trial<'a, 'l> {
         self.results.mishaps = self.line.station.world().mishaps().len();
     }
 
-    /// Steps whose true speeds lie in a range: a scorer's choice of what to ask, unknown to the driver.
-    fn steps(&self, range: std::ops::Range<f64>) -> Vec<SpeedStep> {
-        let Some(engine) = self.line.station.world().truth().engine(TRAIN) else { return Vec::new() };
-        let speed = |step: &SpeedStep| engine.speeds.speed(*step, Approach::Below).as_mm_per_s();
-        (1..=HIGHEST).filter_map(SpeedStep::new).filter(|step| range.contains(&speed(step))).collect()
-    }
-
     fn truth(&self) -> Option<TrainTruth> {
         self.line.station.world().truth().train(TRAIN)
     }
@@ -171,9 +216,9 @@ impl<'a, 'l> Trial<'a, 'l> {
         if !self.is_sound() {
             return None;
         }
-        let target = self.target()?;
-        let step = Some(*self.choice.of(steps)?);
-        let order = StopOrder { train: TRAIN, target, aim, step, next_round: true };
+        let (node, offset, step) = self.plan.stop(self.layout, self.line, self.driver.turnouts(), steps)?;
+        let target = Landmark { node, offset };
+        let order = StopOrder { train: TRAIN, target, aim, step: Some(step), next_round: true };
         let sensor = self.layout.sensor_at(target.node)?;
         self.carry_out(Order::Stop(order))?;
         let past = self.line.station.world().truth().past(TRAIN, sensor)?;
@@ -185,7 +230,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         if !self.is_sound() {
             return;
         }
-        let asked = self.choice.between(20.0, 400.0);
+        let asked = self.plan.distance();
         let Some(before) = self.truth() else { return };
         let order = Order::Move { train: TRAIN, distance: Length::from_mm(asked) };
         if self.carry_out(order).is_some()
@@ -197,19 +242,6 @@ impl<'a, 'l> Trial<'a, 'l> {
 
     fn is_sound(&self) -> bool {
         self.truth().is_some_and(|truth| !truth.is_wrecked)
-    }
-
-    /// A contact ahead on the way as the turnouts lie, and somewhere between it and the next.
-    fn target(&mut self) -> Option<Landmark> {
-        let ahead = self.ahead();
-        let (node, length) = *self.choice.of(&ahead)?;
-        let offset = self.choice.between(0.0, length);
-        Some(Landmark { node, offset: Length::from_mm(offset) })
-    }
-
-    /// Contacts of the loop that the train is on with the surveyed lengths to the next.
-    fn ahead(&self) -> Vec<(NodeId, f64)> {
-        ahead(self.layout, self.line, self.driver.turnouts())
     }
 
     /// Gives an order and waits until the train stands; nothing if it was refused or failed.
@@ -271,10 +303,19 @@ impl<'a, 'l> Trial<'a, 'l> {
         self.results.looks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
     }
 
+    /// Finds a train again that was lost, as a person would: lets it run until it has come by a contact, and stops it.
     fn halt(&mut self) {
+        let found_by = self.line.now() + TimeSpan::from_s(ORDER_PATIENCE_S);
+        if let Some(step) = self.plan.mid.first().copied() {
+            let _ = self.driver.order(self.line.now(), Order::Speed { train: TRAIN, step });
+        }
+        while self.line.now() < found_by && self.driver.locate(TRAIN, self.line.now()).is_none() {
+            let until = found_by.min(self.line.now() + LOOK);
+            let _ = self.line.drive(&mut self.driver, until);
+        }
         let stand = Order::Speed { train: TRAIN, step: SpeedStep::STAND };
         let _ = self.driver.order(self.line.now(), stand);
-        let until = self.line.now() + TimeSpan::from_s(8.0);
+        let until = self.line.now() + TimeSpan::from_s(STANDS_WITHIN_S);
         while self.line.drive(&mut self.driver, until).is_some() {}
     }
 }
