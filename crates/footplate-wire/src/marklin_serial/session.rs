@@ -56,6 +56,8 @@ pub struct Interface {
     /// Whether the line has to fall silent before the next poll.
     disturbed: bool,
     said_not_ready: bool,
+    /// Whether something was said to it without a time that may let it go on at once.
+    nudged: bool,
     output: VecDeque<Transmit>,
 }
 
@@ -85,6 +87,7 @@ impl Interface {
             stray: 0,
             disturbed: false,
             said_not_ready: false,
+            nudged: false,
             output: VecDeque::new(),
         };
         interface.recover();
@@ -106,6 +109,7 @@ impl Interface {
     /// Goes on as far as the clock allows.
     fn go_on(&mut self, now: Timestamp) {
         self.now = now;
+        self.nudged = false;
         self.watch_hand_shake(now);
         while match self.exchange {
             Exchange::Free => self.begin(now),
@@ -340,6 +344,7 @@ impl Session for Interface {
 
     fn hold_line(&mut self, until: Option<Timestamp>) {
         self.polls.hold(until);
+        self.nudged = true;
     }
 
     fn watch(&mut self, sensor: Option<SensorId>) {
@@ -355,6 +360,9 @@ impl Session for Interface {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
+        if self.nudged {
+            return Some(self.now + TimeSpan::from_ns(1));
+        }
         let next = match &self.exchange {
             Exchange::Free => self.free_timeout(),
             Exchange::Sending(sending) if self.now < sending.gone() => Some(sending.gone()),

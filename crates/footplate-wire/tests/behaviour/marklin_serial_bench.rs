@@ -231,7 +231,8 @@ impl Bench {
                 self.now = self.now.max(end);
                 break;
             };
-            self.now = next;
+            self.now = self.now.max(next);
+            let next = self.now;
             if station == Some(next)
                 && let Some((_, due)) = self.station.due.pop_front()
             {

@@ -3,8 +3,8 @@
 use std::io::Write;
 
 use super::{
-    calibrate, compare, completions, convert, demo, drive, layout, measure, odometry, predict, report,
-    simulate, store,
+    calibrate, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
+    report, simulate, store,
 };
 
 /// Makes the list of verbs from the names of their files.
@@ -36,6 +36,7 @@ verbs! {
     Completions: completions,
     Convert: convert,
     Demo: demo,
+    Doctor: doctor,
     Drive: drive,
     Layout: layout,
     Measure: measure,

@@ -10,6 +10,7 @@ mod compare;
 mod completions;
 mod convert;
 mod demo;
+mod doctor;
 mod drive;
 mod layout;
 mod log_file;

@@ -5,6 +5,7 @@
 //! open        an address becomes a link
 //! simulated   a virtual station in this process, as fast as it goes or paced
 //! served      a virtual station for other programs, at a network port or a pseudo-terminal
+//! tapped      any of them, with every byte noted
 //! stream      a serial port or a network connection, read by a thread, with the clock of this computer
 //! ```
 
@@ -13,6 +14,7 @@ mod open;
 mod served;
 mod simulated;
 mod stream;
+mod tapped;
 
 use footplate_core::{TimeSpan, Timestamp};
 
@@ -21,6 +23,7 @@ pub(crate) use open::{module_count, open, open_simulated, session_settings, stat
 pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use stream::StreamLink;
+pub(crate) use tapped::{Passed, TappedLink};
 
 /// A line to a command station and the clock beside it.
 pub(crate) trait Link {

@@ -17,9 +17,14 @@ pub(crate) struct StopFlag(());
 impl StopFlag {
     /// From now on a signal does not end the program but raises the flag; a third one ends it at once.
     pub(crate) fn install() -> Self {
+        Self::install_saying("\nstopping all trains; a third signal leaves them as they are")
+    }
+
+    /// The same for a program that has no trains to stop.
+    pub(crate) fn install_saying(words: &'static str) -> Self {
         INSTALLED.get_or_init(|| {
-            let handler = || match ASKED.fetch_add(1, Ordering::Relaxed) {
-                0 => eprintln!("\nstopping all trains; a third signal leaves them as they are"),
+            let handler = move || match ASKED.fetch_add(1, Ordering::Relaxed) {
+                0 => eprintln!("{words}"),
                 1 => {}
                 _ => std::process::exit(INTERRUPTED),
             };

@@ -20,6 +20,7 @@ mod simulate;
 mod simulate_driving;
 mod simulate_line;
 mod simulated;
+mod station;
 mod store;
 mod usage;
 mod wheel_scales;

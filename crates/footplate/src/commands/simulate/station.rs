@@ -53,7 +53,7 @@ pub(super) fn serve(
     }
     let station = station(&address, layout)?;
     let (port, incoming) = open(place)?;
-    let stop = StopFlag::install();
+    let stop = StopFlag::install_saying("\nthe station is switched off");
     let speed = wanted.speed;
     writeln!(output, "marklin-serial:{port}?pace=fast&speed={speed}")?;
     output.flush()?;

@@ -1,0 +1,140 @@
+//! `footplate doctor`: whether the line to a station is in order, and how fast it is.
+
+mod figures;
+
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use footplate_core::control::{Machine, Output};
+use footplate_core::{Command, Event, TimeSpan, Timestamp};
+use footplate_store::layout_named;
+use footplate_wire::marklin_serial::Interface;
+use footplate_wire::{CommandError, LinkNotice};
+
+use self::figures::Figures;
+use super::Outcome;
+use crate::link::{Address, Link, Speed, TappedLink, open, session_settings};
+use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
+
+/// A command now and then, to see what one costs; as rare as commands are when trains are driven.
+const COMMAND_EVERY: TimeSpan = TimeSpan::from_ms(500);
+/// More lost replies than this and the line needs a look.
+const LOST_SHARE: f64 = 0.01;
+
+/// Listen to the line for a while: how often sensors are read, what is lost, what a command costs.
+///
+/// No train is moved. Power is put on the track; trains that stand stay, and at the end the power is taken off.
+/// The exit status is 1 when more than one reply in a hundred was lost.
+#[derive(Args)]
+#[command(after_help = "Example: footplate doctor --link marklin-serial:/dev/ttyUSB0")]
+pub(crate) struct Arguments {
+    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0 or marklin-serial:tcp://host:port.
+    #[arg(long)]
+    link: Address,
+    /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// For how long to listen, in seconds of the station's time.
+    #[arg(long, default_value_t = 10.0)]
+    seconds: f64,
+    /// Say it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if !(self.seconds >= 1.0 && self.seconds <= 1e5) {
+            bail!("{} s are not worth listening; write --seconds 10", self.seconds);
+        }
+        let layout = match &self.link {
+            Address::Simulated(simulated) => &simulated.layout,
+            Address::Serial(_) => &self.layout,
+        };
+        let layout = layout_named(layout)?.layout;
+        let link = open(&self.link, &layout, Speed::Unpaced)?;
+        let settings = session_settings(&self.link, &link, &layout);
+        let session = Interface::new(link.now(), settings)?;
+        let mut patient = Patient { next: link.now() + COMMAND_EVERY, due: false };
+        let mut ear =
+            Ear { until: link.now() + TimeSpan::from_s(self.seconds), noticed: BTreeMap::new(), lost: 0 };
+        let mut runtime = Runtime::new(TappedLink::new(link), session, None, Some(StopFlag::install()));
+        let ended = runtime.run(&mut patient, &mut ear)?;
+        runtime.close();
+        match ended {
+            Ended::Finished | Ended::Interrupted => {}
+            Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
+        }
+        let figures = Figures::of(runtime.link().passed(), ear.lost);
+        if self.json {
+            writeln!(output, "{}", figures.json())?;
+        } else {
+            let hand_shake = if runtime.link().cts().is_some() { "CTS" } else { "by the clock" };
+            writeln!(output, "line          {} sensor modules, hand-shake {hand_shake}", settings.modules)?;
+            figures.write(output)?;
+            for (notice, count) in &ear.noticed {
+                writeln!(output, "{:>4} x        {notice}", count)?;
+            }
+        }
+        let is_bad = figures.lost_share() > LOST_SHARE;
+        Ok(if is_bad { Outcome::FallsShort } else { Outcome::Done })
+    }
+}
+
+/// A machine that moves nothing.
+struct Patient {
+    next: Timestamp,
+    due: bool,
+}
+
+impl Machine for Patient {
+    type Notice = ();
+
+    fn handle_event(&mut self, _: Timestamp, _: &Event) {}
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.due = now >= self.next;
+        if self.due {
+            self.next = now + COMMAND_EVERY;
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Output<()>> {
+        // The power is on already, so that this changes nothing.
+        std::mem::take(&mut self.due).then_some(Output::Command(Command::PowerOn))
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        Some(self.next)
+    }
+}
+
+/// Hears what the line has to say, until the time is over.
+struct Ear {
+    until: Timestamp,
+    noticed: BTreeMap<String, usize>,
+    lost: usize,
+}
+
+impl<M: Machine> Attendant<M> for Ear {
+    fn hear(&mut self, _: Timestamp, _: M::Notice) {}
+
+    fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
+        match notice {
+            LinkNotice::Answers => return,
+            LinkNotice::ReplyLost { .. } => self.lost += 1,
+            _ => {}
+        }
+        *self.noticed.entry(notice.to_string()).or_default() += 1;
+    }
+
+    fn hear_of_refusal(&mut self, _: Timestamp, _: Command, error: CommandError) {
+        *self.noticed.entry(error.to_string()).or_default() += 1;
+    }
+
+    fn attend(&mut self, now: Timestamp, _: &mut M) -> Wish {
+        if now >= self.until { Wish::Finish } else { Wish::GoOn }
+    }
+}

@@ -1,0 +1,143 @@
+//! What the bytes of a line come to: periods, latencies, and what a command costs.
+
+use std::io::Write;
+
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_wire::marklin_serial::{BYTE_TIME, Message};
+
+use crate::link::Passed;
+
+/// Bars of the histogram are as wide as this at most.
+const BAR: usize = 40;
+/// Bins of the histogram.
+const BINS: usize = 8;
+
+/// The figures of a line.
+pub(super) struct Figures {
+    /// From one request to the next with nothing between them, in ms, sorted.
+    periods: Vec<f64>,
+    /// The same with one command between them.
+    with_command: Vec<f64>,
+    /// From the last bit of a request to the first byte of its answer.
+    first_bytes: Vec<f64>,
+    asked: usize,
+    lost: usize,
+}
+
+impl Figures {
+    pub(super) fn of(passed: &[Passed], lost: usize) -> Self {
+        let mut figures =
+            Self { periods: Vec::new(), with_command: Vec::new(), first_bytes: Vec::new(), asked: 0, lost };
+        let mut said = Vec::new();
+        // The last request, and how many other messages went since.
+        let mut request: Option<(Timestamp, usize)> = None;
+        let mut answered = true;
+        for one in passed {
+            match *one {
+                Passed::Written(at, byte) => {
+                    said.push(byte);
+                    let Some((message, _)) = Message::decode(&said) else { continue };
+                    if message.modules_read().is_empty() {
+                        request = request.map(|(asked, others)| (asked, others + 1));
+                    } else {
+                        figures.asked += 1;
+                        if let Some((before, others)) = request {
+                            figures.period(at - before, others);
+                        }
+                        request = Some((at, 0));
+                        answered = false;
+                    }
+                    said.clear();
+                }
+                Passed::Heard(at) if !answered => {
+                    answered = true;
+                    figures.first_bytes.extend(request.map(|(asked, _)| (at - (asked + BYTE_TIME)).as_ms()));
+                }
+                Passed::Heard(_) => {}
+            }
+        }
+        for figures in [&mut figures.periods, &mut figures.with_command, &mut figures.first_bytes] {
+            figures.sort_by(f64::total_cmp);
+        }
+        figures
+    }
+
+    fn period(&mut self, span: TimeSpan, others: usize) {
+        match others {
+            0 => self.periods.push(span.as_ms()),
+            1 => self.with_command.push(span.as_ms()),
+            // What brings the line into step is no period.
+            _ => {}
+        }
+    }
+
+    /// The share of requests whose answer was lost.
+    pub(super) fn lost_share(&self) -> f64 {
+        self.lost as f64 / self.asked.max(1) as f64
+    }
+
+    fn command_cost(&self) -> Option<f64> {
+        Some(at(&self.with_command, 0.5)? - at(&self.periods, 0.5)?)
+    }
+
+    pub(super) fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "polls": self.asked,
+            "lost_replies": self.lost,
+            "poll_period_ms": quantiles(&self.periods),
+            "first_byte_ms": quantiles(&self.first_bytes),
+            "command_cost_ms": self.command_cost(),
+        })
+    }
+
+    pub(super) fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        writeln!(output, "polls         {}, {} without a whole reply", self.asked, self.lost)?;
+        line(output, "poll period", &self.periods)?;
+        self.histogram(output)?;
+        line(output, "first byte", &self.first_bytes)?;
+        match self.command_cost() {
+            Some(cost) => writeln!(
+                output,
+                "command       costs {cost:.1} ms of the line (one byte; two cost 5 ms more)"
+            ),
+            None => writeln!(output, "command       none was seen between two polls"),
+        }
+    }
+
+    fn histogram(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        let (Some(low), Some(high)) = (at(&self.periods, 0.0), at(&self.periods, 0.99)) else {
+            return Ok(());
+        };
+        let width = ((high - low) / BINS as f64).max(0.1);
+        let mut counts = [0_usize; BINS];
+        for period in self.periods.iter().filter(|period| **period <= high) {
+            let bin = (((period - low) / width) as usize).min(BINS - 1);
+            if let Some(count) = counts.get_mut(bin) {
+                *count += 1;
+            }
+        }
+        let most = counts.iter().copied().max().unwrap_or(1).max(1);
+        for (bin, count) in counts.into_iter().enumerate() {
+            let from = low + width * bin as f64;
+            writeln!(output, "  {from:>7.1} ms  {}", "#".repeat((count * BAR).div_ceil(most)))?;
+        }
+        Ok(())
+    }
+}
+
+fn at(sorted: &[f64], share: f64) -> Option<f64> {
+    sorted.get(((sorted.len().checked_sub(1)?) as f64 * share).round() as usize).copied()
+}
+
+fn quantiles(sorted: &[f64]) -> serde_json::Value {
+    serde_json::json!({ "median": at(sorted, 0.5), "p5": at(sorted, 0.05), "p95": at(sorted, 0.95), "max": at(sorted, 1.0) })
+}
+
+fn line(output: &mut dyn Write, name: &str, sorted: &[f64]) -> std::io::Result<()> {
+    let [Some(low), Some(median), Some(high), Some(most)] =
+        [0.05, 0.5, 0.95, 1.0].map(|share| at(sorted, share))
+    else {
+        return writeln!(output, "{name:<13} none");
+    };
+    writeln!(output, "{name:<13} median {median:.1} ms, 5 % {low:.1}, 95 % {high:.1}, longest {most:.1}")
+}

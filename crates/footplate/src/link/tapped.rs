@@ -1,0 +1,62 @@
+//! A link with a listener: what was written and heard, and when.
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::{Heard, Link, Lost};
+
+/// One byte that passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Passed {
+    /// To the station; when it was put on the line.
+    Written(Timestamp, u8),
+    /// From the station; when it was heard.
+    Heard(Timestamp),
+}
+
+/// A link whose bytes are noted.
+pub(crate) struct TappedLink<L> {
+    link: L,
+    passed: Vec<Passed>,
+}
+
+impl<L: Link> TappedLink<L> {
+    pub(crate) fn new(link: L) -> Self {
+        Self { link, passed: Vec::new() }
+    }
+
+    /// What passed, in order.
+    pub(crate) fn passed(&self) -> &[Passed] {
+        &self.passed
+    }
+}
+
+impl<L: Link> Link for TappedLink<L> {
+    fn now(&self) -> Timestamp {
+        self.link.now()
+    }
+
+    fn write(&mut self, byte: u8) -> Result<(), Lost> {
+        self.passed.push(Passed::Written(self.link.now(), byte));
+        self.link.write(byte)
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        let heard = self.link.wait(until);
+        if matches!(heard, Heard::Byte(_)) {
+            self.passed.push(Passed::Heard(self.link.now()));
+        }
+        heard
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.link.cts()
+    }
+
+    fn patience(&self) -> TimeSpan {
+        self.link.patience()
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        self.link.reopen()
+    }
+}
