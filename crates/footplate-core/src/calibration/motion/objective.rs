@@ -19,7 +19,7 @@ use crate::ids::SpeedStep;
 const RUN_BEFORE_STOP: f64 = 0.5;
 
 /// A scatter counts as no less than this (m): nobody sees the difference on a railway of this size.
-const LEAST_SCATTER: f64 = 0.003;
+const LEAST_SCATTER: f64 = 0.006;
 
 /// Short moves that should be known: runs (s) at every second step ...
 const MOVES: [f64; 2] = [0.9, 1.6];
