@@ -92,7 +92,7 @@ pub fn place_of(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option
     for hop in ground.hops_ahead(at.node).take(MOST_HOPS) {
         let [felt, _] = model.length(ground.sections, &hop);
         if left > felt && hop.sensor.is_some() {
-            left = left - felt;
+            left -= felt;
             continue;
         }
         let mut along = (hop.length * part(left, felt)).min(hop.length);
@@ -102,7 +102,7 @@ pub fn place_of(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option
             if along <= length {
                 return Some(Position { edge: *id, offset: along });
             }
-            along = along - length;
+            along -= length;
             last = Some(Position { edge: *id, offset: length });
         }
         return last;

@@ -15,7 +15,7 @@ use super::chain::Chain;
 use super::model::{MotionModel, StepUse};
 use super::parameters::SPEEDS;
 use super::priors::priors;
-use super::rows::{Linear, trip_rows};
+use super::rows::{Linear, Point};
 use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
 use crate::event::{Event, EventKind};
@@ -40,7 +40,6 @@ pub struct MotionFit {
     model: MotionModel,
     chain: Chain,
     sections: Option<SectionIndex>,
-    last: Vec<f64>,
     date: Timestamp,
 }
 
@@ -52,7 +51,6 @@ impl MotionFit {
             model: MotionModel::unknown(train, highest),
             chain: Chain::default(),
             sections: None,
-            last: Vec::new(),
             date: Timestamp::ZERO,
         }
     }
@@ -92,11 +90,7 @@ impl MotionFit {
         let mut x = self.start(&columns);
         let known = priors(&columns, trips, sections, &x, highest);
         let rows_at = |x: &[f64], scale: f64, with_slopes: bool| {
-            let mut rows: Vec<Linear> = Vec::new();
-            for place in 0..trips.len() {
-                trip_rows(trips, place, &columns, x, highest, scale, with_slopes, &mut rows);
-            }
-            rows
+            Point { trips, columns: &columns, x, highest, scale }.rows(with_slopes)
         };
         let mut scale = 1.0;
         let mut rows = rows_at(&x, scale, true);
@@ -143,7 +137,6 @@ impl MotionFit {
             }
         }
         let solution = equations.solve();
-        self.last = x.clone();
         let Some(solution) = solution else { return };
         self.model.learn(&columns, &x, &solution, scale, trips, self.date);
     }
@@ -188,49 +181,5 @@ impl Squares {
 
     fn scale(&self) -> f64 {
         libm::sqrt((self.sum + Self::USUAL) / (self.count + Self::USUAL))
-    }
-}
-
-impl MotionFit {
-    #[doc(hidden)]
-    pub fn describe(&self, sections: &SectionIndex) -> alloc::string::String {
-        use core::fmt::Write;
-        let highest = usize::from(self.model.highest().get());
-        let trips = &self.chain.trips;
-        let columns = Columns::of(trips, highest);
-        let mut s = alloc::string::String::new();
-        let x = &self.last;
-        let _ = sections;
-        for (place, trip) in trips.iter().enumerate() {
-            let mut rows: Vec<Linear> = Vec::new();
-            trip_rows(trips, place, &columns, x, highest, 1.0, false, &mut rows);
-            let _ = writeln!(
-                s,
-                "trip {place} cont {} rest {} begins {:.2} run {:?} p {:.3} late {:.3} told {:?} dev {:?} ch {:?}",
-                trip.continues,
-                trip.came_to_rest,
-                trip.begins,
-                trip.running,
-                x[columns.place(place)],
-                x[columns.late_start(place)],
-                trip.told
-                    .iter()
-                    .map(|t| (libm::round(t.sent * 100.0) / 100.0, t.to, t.at_rest))
-                    .collect::<Vec<_>>(),
-                columns.own(place, trip, x).deviations,
-                columns.own(place, trip, x).changes
-            );
-            for (row, c) in rows.iter().zip(trip.contacts.iter().map(Some).chain([None])) {
-                let _ = writeln!(
-                    s,
-                    "     {:?} r {:.1} mm sd {:.1} way {:.3}",
-                    c.map(|c| libm::round(c.time * 100.0) / 100.0),
-                    row.residual * 1e3,
-                    1e3 * libm::sqrt(row.variance),
-                    c.map_or(0.0, |c| c.way)
-                );
-            }
-        }
-        s
     }
 }

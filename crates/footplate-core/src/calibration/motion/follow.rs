@@ -179,9 +179,9 @@ impl Following {
     fn transform(&mut self, slope: [f64; N]) {
         let with: [f64; N] = core::array::from_fn(|i| (0..N).map(|j| slope[j] * self.p[j][i]).sum());
         let own: f64 = (0..N).map(|j| slope[j] * with[j]).sum();
-        for i in 0..N {
-            self.p[B][i] = with[i];
-            self.p[i][B] = with[i];
+        for (i, covariance) in with.into_iter().enumerate() {
+            self.p[B][i] = covariance;
+            self.p[i][B] = covariance;
         }
         self.p[B][B] = own;
     }

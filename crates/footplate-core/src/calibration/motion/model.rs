@@ -212,16 +212,3 @@ impl MotionModel {
         Speed::from_m_per_s(libm::exp(mean + deviation))
     }
 }
-
-impl MotionModel {
-    #[doc(hidden)]
-    pub fn describe(&self) -> alloc::string::String {
-        use core::fmt::Write;
-        let mut s = alloc::string::String::new();
-        for (i, v) in self.values.iter().take(super::parameters::SPEEDS).enumerate() {
-            let _ = write!(s, "{i}:{v:.3}±{:.3} ", libm::sqrt(self.spread.variance(i)));
-        }
-        let _ = write!(s, " scale {:.2}", self.scatter_scale);
-        s
-    }
-}

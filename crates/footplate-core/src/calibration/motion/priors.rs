@@ -47,30 +47,39 @@ pub(super) fn change_error(change: f64) -> f64 {
 /// Sums of numbers that are known beforehand, each give or take.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Priors {
-    rows: Vec<(Vec<(usize, f64)>, f64, f64)>,
+    rows: Vec<Known>,
+}
+
+/// The sum of numbers times slopes is `value`, give or take.
+#[derive(Debug, Clone)]
+struct Known {
+    terms: Vec<(usize, f64)>,
+    value: f64,
+    variance: f64,
+}
+
+impl Known {
+    fn cost(&self, x: &[f64]) -> f64 {
+        let sum: f64 = self.terms.iter().map(|(column, slope)| slope * at(x, *column)).sum();
+        (sum - self.value) * (sum - self.value) / self.variance
+    }
 }
 
 impl Priors {
     fn add(&mut self, terms: &[(usize, f64)], value: f64, variance: f64) {
-        self.rows.push((terms.to_vec(), value, variance));
+        self.rows.push(Known { terms: terms.to_vec(), value, variance });
     }
 
     /// Adds all of them.
     pub(super) fn add_to(&self, equations: &mut NormalEquations) {
-        for (terms, value, variance) in &self.rows {
-            equations.add(terms, *value, *variance);
+        for known in &self.rows {
+            equations.add(&known.terms, known.value, known.variance);
         }
     }
 
     /// The sum of squares, over variances, by which numbers miss them.
     pub(super) fn cost(&self, x: &[f64]) -> f64 {
-        let off = |terms: &[(usize, f64)], value: f64| {
-            terms.iter().map(|(column, slope)| slope * at(x, *column)).sum::<f64>() - value
-        };
-        self.rows
-            .iter()
-            .map(|(terms, value, variance)| off(terms, *value) * off(terms, *value) / variance)
-            .sum()
+        self.rows.iter().map(|known| known.cost(x)).sum()
     }
 }
 

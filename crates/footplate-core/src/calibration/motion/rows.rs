@@ -63,17 +63,31 @@ fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Seg
     Outcome { ways, rest: walk.way_to_rest() }
 }
 
+/// A point about which equations are made straight.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point<'p> {
+    pub(super) trips: &'p [Trip],
+    pub(super) columns: &'p Columns,
+    pub(super) x: &'p [f64],
+    pub(super) highest: usize,
+    /// How far stops scatter against what trains usually do.
+    pub(super) scale: f64,
+}
+
+impl Point<'_> {
+    /// The equations of all trips; without slopes they only tell how far off the point is.
+    pub(super) fn rows(&self, with_slopes: bool) -> Vec<Linear> {
+        let mut rows = Vec::new();
+        for place in 0..self.trips.len() {
+            trip_rows(self, place, with_slopes, &mut rows);
+        }
+        rows
+    }
+}
+
 /// Adds the equations of one trip.
-pub(super) fn trip_rows(
-    trips: &[Trip],
-    place: usize,
-    columns: &Columns,
-    x: &[f64],
-    highest: usize,
-    scale: f64,
-    with_slopes: bool,
-    rows: &mut Vec<Linear>,
-) {
+fn trip_rows(point: &Point<'_>, place: usize, with_slopes: bool, rows: &mut Vec<Linear>) {
+    let Point { trips, columns, x, highest, scale } = *point;
     let Some(trip) = trips.get(place) else { return };
     let own = columns.own(place, trip, x);
     let mut segments = Vec::new();
