@@ -6,11 +6,16 @@
 
 use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::MotionFit;
+use footplate_core::calibration::motion::StepUse;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
-use footplate_core::{EventKind, RunId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{Approach, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use crate::recording::Run;
 use crate::store::{Store, StoreError};
+
+/// How often the model is fitted anew on the way, at starts from rest: what is thought of a command depends on whether the
+/// train stood, and so on how fast it is known to stop.
+const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 
 /// What sessions told of one train.
 #[derive(Debug, Clone)]
@@ -45,12 +50,14 @@ impl MotionReplay {
         as_of: Timestamp,
     ) -> Result<Self, StoreError> {
         let mut replay = Self::empty(train, highest);
+        let sections = SectionIndex::of(layout);
         for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
             for stored in store.runs(recording.key, as_of)? {
-                replay.take(layout, &recording.name, &stored.accepted());
+                replay.take(layout, &sections, &recording.name, &stored.accepted());
             }
         }
-        replay.fit.refit(&SectionIndex::of(layout));
+        replay.fit.refit(&sections);
+        replay.note_steps(highest);
         Ok(replay)
     }
 
@@ -72,7 +79,19 @@ impl MotionReplay {
         self.runs == 0
     }
 
-    fn take(&mut self, layout: &Layout, recording: &str, run: &Run) {
+    /// A step at which contacts were passed moves the train. Those at which it stalled show by themselves when they are
+    /// tried again.
+    fn note_steps(&mut self, highest: SpeedStep) {
+        for step in (1..=highest.get()).filter_map(SpeedStep::new) {
+            let passed = |approach| self.fit.model().speed(step, approach).count > 0;
+            if passed(Approach::Below) || passed(Approach::Above) {
+                self.fit.note_use(step, StepUse::Moves);
+            }
+        }
+    }
+
+    fn take(&mut self, layout: &Layout, sections: &SectionIndex, recording: &str, run: &Run) {
+        let mut fitted: Option<Timestamp> = None;
         let moving: Vec<TrainId> = run.moving().iter().map(|at_start| at_start.train).collect();
         let train = self.fit.model().train();
         self.fit.interrupt();
@@ -92,6 +111,12 @@ impl MotionReplay {
                 | EventKind::Stopped { train: of, .. } => of == train,
             };
             if is_own && is_about_it {
+                let starts =
+                    matches!(raw.event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
+                if starts && fitted.is_none_or(|fitted| raw.event.time - fitted >= REFIT_AFTER) {
+                    fitted = Some(raw.event.time);
+                    self.fit.refit(sections);
+                }
                 self.fit.take(layout, &self.turnouts, &raw.event);
                 self.events += 1;
                 let at = run.began_at.map(|began_at| began_at + (raw.event.time - Timestamp::ZERO));

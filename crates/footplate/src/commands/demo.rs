@@ -13,8 +13,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use footplate_core::track::{Layout, TurnoutStates};
-use footplate_core::{Timestamp, TrainId};
-use footplate_store::{Journal, Store, built_in};
+use footplate_core::{SpeedStep, Timestamp, TrainId};
+use footplate_store::{Journal, MotionFile, Store, TrainAtStart, built_in};
 use serde_json::json;
 
 use super::Outcome;
@@ -100,7 +100,8 @@ impl Arguments {
         let began_at = now + (Timestamp::ZERO - at);
         let name = format!("demo {}", local(now));
         let store = Store::open_or_create(path)?;
-        let journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
+        let first = TrainAtStart { train: TRAINS[0], step: SpeedStep::STAND };
+        let journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[first], now)?;
         Ok(Some(SessionJournal::start(journal, Some(began_at), WhenFull::Wait, IfUnkept::Stop)?))
     }
 
@@ -109,11 +110,7 @@ impl Arguments {
         stage.screen.announce(&format!(
             "Footplate calibrates and drives trains {first} and {second}, of which it knows nothing, on track A"
         ))?;
-        stage.screen.mention(&format!(
-            "simulated, seed {}; {} other railways with --seed",
-            self.seed,
-            u64::MAX
-        ))?;
+        stage.screen.mention(&format!("over the bytes of a Märklin 6051, simulated; seed {}", self.seed))?;
         stage.screen.say("")
     }
 
@@ -156,10 +153,13 @@ fn turn(
     turnouts: TurnoutStates,
     dice: &mut Dice,
 ) -> anyhow::Result<TurnoutStates> {
-    stage.begin_run();
+    if train != TRAINS[0] {
+        stage.begin_run(train);
+    }
     stage.railway.put_down(train)?;
     let known = calibrating::calibrate(stage, layout, train, turnouts)?;
     if let Some(known) = &known {
+        stage.models.push(MotionFile::of(layout, known.fit.model(), Some(now())));
         Tour::new(layout, train, known).run(stage, known, STOPS, dice)?;
     }
     stage.railway.lift(train);

@@ -8,6 +8,8 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use footplate_core::{SpeedStep, Timestamp, TrainId};
+use footplate_store::{MotionFile, MotionReplay, Store, built_in};
 use serde_json::Value;
 
 use crate::program::footplate;
@@ -99,5 +101,36 @@ fn every_acknowledged_event_is_in_the_store_after_a_kill_and_learning_goes_on_fr
         assert_eq!(recording["form"], "live");
         let events = recording["event_count"].as_u64().unwrap();
         assert!(events >= last, "{events} of {last} acknowledged events are there");
+        // And what the train had taught is learnt again from them.
+        let learnt = replayed(&store, TrainId(24));
+        assert_eq!((learnt.runs, learnt.left_out.len()), (1, 0));
+        assert!(learnt.events > 0 && learnt.events as u64 <= events);
+    }
+}
+
+fn replayed(store: &Path, train: TrainId) -> MotionReplay {
+    let layout = built_in("track-a").unwrap().layout;
+    let store = Store::open(store).unwrap();
+    let highest = SpeedStep::new(14).unwrap();
+    MotionReplay::of_store(&layout, &store, train, highest, Timestamp::from_ns(i64::MAX)).unwrap()
+}
+
+#[test]
+fn what_two_trains_taught_is_learnt_again_from_their_session() {
+    let store = store("demo-replayed");
+    let run = footplate(&["demo", "--json", "--seed", "5", "--store", store.to_str().unwrap()]);
+    assert_eq!(run.status, 0, "{run:?}");
+    for train in [TrainId(24), TrainId(58)] {
+        let again = replayed(&store, train);
+        let late = Timestamp::from_ns(i64::MAX);
+        let kept =
+            MotionFile::of_store(&Store::open(&store).unwrap(), train, late).unwrap().expect("it is kept");
+        assert!(kept.steps.len() >= 16, "both sides of eight steps: {}", kept.steps.len());
+        // The session went on after the model was kept: five stops more.
+        for known in kept.steps.iter().filter(|known| known.speed.measurements > 2) {
+            let speed = again.fit.model().speed(known.step, known.approach);
+            let off = speed.value.as_mm_per_s() / known.speed.value - 1.0;
+            assert!(off.abs() < 0.03, "train {train}, step {}: {off}", known.step);
+        }
     }
 }

@@ -8,8 +8,6 @@ use footplate_core::estimation::{DueContact, Ground, PassedContact};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use footplate_sim::living::PassTruth;
-
 use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::stage::Stage;
@@ -192,12 +190,8 @@ impl<'l> Tour<'l> {
         step: SpeedStep,
         finished: Finished,
     ) -> Option<MadeStop> {
-        let truth = stage.railway.world().truth();
-        let train = truth.train(self.train)?;
         let sensor = self.layout.sensor_at(target.node)?;
-        let mine = |pass: &&PassTruth| pass.train == Some(self.train) && pass.sensor == sensor;
-        let pass = truth.passes().iter().rev().find(mine)?;
-        let past = train.odometer - Length::from_mm(pass.odometer_mm);
+        let past = stage.railway.world().truth().past(self.train, sensor)?;
         let promise = finished.promise?;
         let stood = Landmark { node: target.node, offset: Length::from_mm(past.as_mm().round()) };
         Some(MadeStop {

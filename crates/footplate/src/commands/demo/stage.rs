@@ -4,13 +4,14 @@ use std::io;
 use std::time::Duration;
 
 use footplate_core::control::Machine;
-use footplate_core::{Timestamp, TrainId};
+use footplate_core::{SpeedStep, Timestamp, TrainId};
 use footplate_sim::living::MishapKind;
+use footplate_store::{Journal, MotionFile, TrainAtStart};
 
 use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
-use crate::clock::Stopwatch;
+use crate::clock::{Stopwatch, now};
 use crate::link::Speed;
 use crate::session_journal::SessionJournal;
 
@@ -26,6 +27,8 @@ pub(super) struct Stage<'r, 'l, 'o> {
     told: usize,
     broken: bool,
     pub(super) learnt: Vec<Learnt>,
+    /// Models to be kept with the session.
+    pub(super) models: Vec<MotionFile>,
     pub(super) stops: Vec<MadeStop>,
 }
 
@@ -40,7 +43,19 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         let pictures = trains.iter().map(|train| TrainPicture::waiting(*train, "waits")).collect();
         let (learnt, stops) = (Vec::new(), Vec::new());
         let stopwatch = Stopwatch::start();
-        Self { railway, screen, stopwatch, speed, record, pictures, told: 0, broken: false, learnt, stops }
+        Self {
+            railway,
+            screen,
+            stopwatch,
+            speed,
+            record,
+            pictures,
+            told: 0,
+            broken: false,
+            learnt,
+            models: Vec::new(),
+            stops,
+        }
     }
 
     pub(super) fn now(&self) -> Timestamp {
@@ -116,10 +131,10 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         Ok(())
     }
 
-    /// Other trains take part from here on: a run of the journal of their own.
-    pub(super) fn begin_run(&mut self) {
+    /// This train takes part from here on, and no other: a run of the journal of its own.
+    pub(super) fn begin_run(&mut self, train: TrainId) {
         if let Some(journal) = &mut self.record.0.borrow_mut().journal {
-            journal.begin_run(&[]);
+            journal.begin_run(&[TrainAtStart { train, step: SpeedStep::STAND }]);
         }
     }
 
@@ -129,10 +144,15 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         self.railway.close();
         let journal = self.record.0.borrow_mut().journal.take();
         if let Some(journal) = journal {
-            let (kept, _) = journal.finish();
+            let (kept, journal) = journal.finish();
             self.screen.acknowledged(kept.acknowledged)?;
             if let Some(trouble) = kept.trouble {
                 anyhow::bail!("not all of the session was written down: {trouble}");
+            }
+            if let Some(mut store) = journal.map(Journal::end) {
+                for model in &self.models {
+                    model.keep(&mut store, now(), now())?;
+                }
             }
         }
         Ok(())

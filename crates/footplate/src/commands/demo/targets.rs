@@ -4,10 +4,8 @@ use footplate_core::estimation::Ground;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, NodeId, SpeedStep};
 
-/// So far past a contact at least, that a train that stops a little short has still passed it: the truth is measured from
-/// there.
-const PAST: Length = Length::from_m(0.10);
-/// So far before the next one at least.
+/// So far past a contact at least, and so far before the next one: nearer nobody would name a place by it.
+const PAST: Length = Length::from_m(0.05);
 const BEFORE: Length = Length::from_m(0.05);
 /// Contacts ahead among which a target is drawn: a lap of track A and a little more.
 const LOOK_AHEAD: usize = 16;
