@@ -3,12 +3,10 @@
 mod clock;
 mod commands;
 mod counted;
-#[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
 mod link;
 mod live_lines;
 mod progress;
 mod reading;
-#[allow(dead_code, unused_imports, reason = "the verbs that drive trains live are being written")]
 mod runtime;
 #[allow(dead_code, reason = "the verbs that drive trains live are being written")]
 mod session_journal;

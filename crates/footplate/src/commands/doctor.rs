@@ -75,7 +75,7 @@ impl Arguments {
             writeln!(output, "line          {} sensor modules, hand-shake {hand_shake}", settings.modules)?;
             figures.write(output)?;
             for (notice, count) in &ear.noticed {
-                writeln!(output, "{:>4} x        {notice}", count)?;
+                writeln!(output, "{count:>4} x        {notice}")?;
             }
         }
         let is_bad = figures.lost_share() > LOST_SHARE;
