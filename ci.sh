@@ -134,8 +134,6 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" odometry simulate line --score --seeds 1..100 --teeth 80,100,200 --markdown
-  # 60 trains, two minutes on two cores; all 180 (--seeds 1..30) take three times as long.
-  "$1" driving simulate driving --seeds 1..10 --markdown
 }
 
 # What is odd in the logs is said in testdata/sensor-logs/README.md.
