@@ -12,7 +12,6 @@ mod told;
 mod trains;
 mod truth;
 mod words;
-mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{IsTerminal, Write};
@@ -22,8 +21,8 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::control::Driver;
 use footplate_core::track::{Layout, Leg};
-use footplate_core::{TrainId, TurnoutId};
-use footplate_store::{Store, layout_named};
+use footplate_core::{Timestamp, TrainId, TurnoutId};
+use footplate_store::{Journal, Store, layout_named};
 use footplate_wire::marklin_serial::Interface;
 
 use self::conductor::{Conductor, Giver};
@@ -36,11 +35,12 @@ use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
-use self::written::Written;
 use super::Outcome;
 use super::predict::turnout_state;
+use crate::clock::{local, now};
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
+use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
 
 /// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
 ///
@@ -148,6 +148,22 @@ impl Arguments {
         Ok(conductor)
     }
 
+    /// What writes the session down; the line's clock stands at `at`.
+    fn journal(&self, layout: &Layout, at: Timestamp) -> anyhow::Result<Option<SessionJournal>> {
+        let Some(path) = &self.store else { return Ok(None) };
+        let now = now();
+        let began_at = Some(now + (Timestamp::ZERO - at));
+        let name = format!("drive {}", local(now));
+        let store = Store::open_or_create(path)?;
+        let journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
+        // Only a simulated clock can wait for a disk.
+        let when_full = match &self.link {
+            Address::Simulated(_) => WhenFull::Wait,
+            Address::Serial(_) => WhenFull::Lose,
+        };
+        Ok(Some(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?))
+    }
+
     fn drive<L: Link + Referee>(
         &self,
         layout: &Layout,
@@ -162,8 +178,8 @@ impl Arguments {
         if conductor.listens_to_a_person() && !self.json {
             stage.say(HELP, "");
         }
-        let mut written = self.store.as_deref().map(|store| Written::begin(store, layout)).transpose()?;
-        let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
+        let mut journal = self.journal(layout, link.now())?;
+        let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let mut beginnings = Beginnings::default();
         let ending = loop {
@@ -188,7 +204,8 @@ impl Arguments {
             eprintln!("{closing}");
         }
         if let Some(store) = &self.store {
-            drop(written);
+            // What still waits is written down before what follows from it.
+            drop(journal);
             KnownTrains::keep(store, layout, &conductor.learnt())?;
         }
         match ending {
