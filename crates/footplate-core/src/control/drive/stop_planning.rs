@@ -106,7 +106,9 @@ impl DrivenTrain {
         distance: Length,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        let located = self.located(ground, now).ok_or(Refusal::Lost { train: self.id() })?;
+        // Who was not seen where it should have been is not where it is believed to be: no contact would fit the move.
+        let located = self.located(ground, now).filter(|_| self.unseen().is_none());
+        let located = located.ok_or(Refusal::Lost { train: self.id() })?;
         if !self.stands(ground, now) {
             return Err(Refusal::StillMoves { train: self.id() });
         }
