@@ -14,6 +14,7 @@ mod short_moves;
 mod speed_change_laws;
 mod stopping;
 mod toy_railway;
+mod trains_fitted;
 mod two_sensors;
 mod ways_on_tracks;
 mod wheel_diameters;

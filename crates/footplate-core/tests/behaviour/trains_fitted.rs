@@ -1,0 +1,113 @@
+//! What a fit finds of a train, and a locator makes of it, holds against the toy railway, which knows neither.
+
+use std::sync::OnceLock;
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::MotionModel;
+use footplate_core::estimation::{Ground, Locator, WayPoint};
+use footplate_core::latency::ContactWindow;
+use footplate_core::{Approach, Command, EventKind, Length, Speed, TimeSpan, TrainId};
+
+use crate::toy_railway::{ToyRailway, known_model, step, straight};
+
+const TRAIN: TrainId = TrainId(24);
+
+fn model() -> &'static MotionModel {
+    static MODEL: OnceLock<MotionModel> = OnceLock::new();
+    MODEL.get_or_init(|| known_model(24))
+}
+
+/// Steps of 32 mm/s, changes at 170 mm/s² after 180 ms.
+fn true_way_to_rest(speed: Speed) -> Length {
+    let v = speed.as_mm_per_s();
+    Length::from_mm(0.18 * v + v * v / (2.0 * 170.0))
+}
+
+#[test]
+fn steps_that_were_run_are_known_to_a_per_cent_and_as_well_as_they_say() {
+    for (number, true_mm_per_s) in [(5, 160.0), (8, 256.0), (10, 320.0), (12, 384.0)] {
+        let speed = model().speed(step(number), Approach::Below);
+        let off = speed.value.as_mm_per_s() - true_mm_per_s;
+        assert!(off.abs() < 0.01 * true_mm_per_s, "step {number}: {off} mm/s");
+        // The survey's scale is nobody's to know: half a per cent on this track.
+        let doubt = speed.uncertainty.as_mm_per_s().hypot(0.005 * true_mm_per_s);
+        assert!(off.abs() < 3.0 * doubt, "step {number}: {off} with {doubt} mm/s");
+        assert!(speed.count >= 3);
+    }
+}
+
+#[test]
+fn a_step_between_is_known_less_well_and_says_so() {
+    let measured = model().speed(step(8), Approach::Below);
+    let between = model().speed(step(9), Approach::Below);
+    assert!((between.value.as_mm_per_s() - 288.0).abs() < 3.0 * between.uncertainty.as_mm_per_s() + 3.0);
+    assert!(between.uncertainty > 2.0 * measured.uncertainty && between.count == 0);
+}
+
+#[test]
+fn stops_are_as_long_as_the_railway_makes_them() {
+    for number in [4, 5, 8, 10, 12, 14] {
+        let speed = model().speed(step(number), Approach::Below).value;
+        let stop = model().stop(step(number), Approach::Below);
+        let off = stop.distance - true_way_to_rest(speed);
+        assert!(
+            off.abs() < 3.0 * stop.doubt + Length::from_mm(3.0),
+            "step {number}: {stop:?}, off by {off:?}"
+        );
+        assert!(off.abs() < Length::from_mm(20.0), "step {number}: off by {off:?}");
+    }
+}
+
+#[test]
+fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
+    // Given a train that runs at step 8,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let (sections, turnouts) = (SectionIndex::of(&world.layout), straight());
+    let layout = world.layout.clone();
+    let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+    let mut locator = Locator::new(TRAIN);
+    let node = layout.node_named("D1").unwrap();
+    locator.place(world.now, WayPoint { node, way: Length::from_mm(300.0) }, Length::from_mm(3.0));
+    world.command(Command::Speed { train: TRAIN, step: step(8) });
+    let follow = |world: &mut ToyRailway, locator: &mut Locator, seconds: f64| {
+        let (mut inside, mut ticks) = (0, 0);
+        let end = world.now + TimeSpan::from_s(seconds);
+        while world.now < end {
+            for event in world.tick() {
+                match event.kind {
+                    EventKind::Sensor(report) => {
+                        let after = event.time - report.poll_interval.unwrap();
+                        let window = ContactWindow { after, until: event.time };
+                        assert!(locator.likelihood(ground, model(), report.sensor, window).is_some());
+                        locator.pass(ground, model(), report.sensor, window);
+                    }
+                    _ => locator.handle_command(ground, model(), &event),
+                }
+            }
+            let located = locator.locate(ground, model(), world.now).unwrap();
+            // The toy's contacts are where the layout says, so that its ways are the layout's.
+            let here = footplate_core::estimation::place_of(ground, model(), located.at).unwrap();
+            let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
+            let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
+            let off = ahead.min(behind);
+            ticks += 1;
+            inside += i32::from(off < 1.96 * located.uncertainty + Length::from_mm(5.0));
+        }
+        f64::from(inside) / f64::from(ticks)
+    };
+    // then it is where it is believed to be, speeding up and running,
+    assert!(follow(&mut world, &mut locator, 14.0) > 0.95);
+    // and when it is told to stop,
+    let before = world.train().travelled_mm;
+    let rest = locator.rest_if_stopped(ground, model(), world.now).unwrap();
+    let here = locator.locate(ground, model(), world.now).unwrap();
+    world.command(Command::Speed { train: TRAIN, step: step(0) });
+    assert!(follow(&mut world, &mut locator, 6.0) > 0.95);
+    // it runs as far as was foreseen, within what was said.
+    let ran = world.train().travelled_mm - before;
+    let foreseen = (rest.at.way - here.at.way).as_mm();
+    let doubt = rest.doubt.as_mm().hypot(rest.scatter.as_mm());
+    assert!((ran - foreseen).abs() < 3.0 * doubt, "ran {ran}, foreseen {foreseen} with {doubt} mm");
+    assert!(doubt < 25.0);
+    assert!(locator.locate(ground, model(), world.now).unwrap().at_rest);
+}
