@@ -104,5 +104,6 @@ fn displacement_of(answers: &Answers<'_>, from: SpeedStep, to: SpeedStep) -> f64
     let told = Told { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
     let speed = answers.speed(usize::from(from.get()), false);
     let segment = Segment::of(&told, answers, Pace::steady(speed));
-    (speed - segment.to) * segment.begins + segment.displacement()
+    let added = if to == SpeedStep::STAND { segment.way_to_rest() } else { segment.displacement() };
+    (speed - segment.to) * segment.begins + added
 }
