@@ -115,8 +115,7 @@ pub(super) fn summary(stops: &[MadeStop]) -> Option<String> {
     let (median, largest) = (errors.get(errors.len() / 2)?, errors.last()?);
     let inside = stops.iter().filter(|stop| stop.is_inside()).count();
     Some(format!(
-        "{inside} of {} stops ended where they were promised to; half of them within {median:.0} mm of the target, all \
-         within {largest:.0} mm.",
+        "{inside} of {} stops ended where promised; half within {median:.0} mm of the target, all within {largest:.0} mm.",
         stops.len()
     ))
 }
@@ -153,7 +152,7 @@ impl Learnt {
         let worst =
             self.steps.iter().max_by(|one, other| within(one).total_cmp(&within(other))).unwrap_or(last);
         format!(
-            "train {} learnt in {} of track time ({} contacts, {} stops): steps {} to {}, {:.0} to {:.0} mm/s, \
+            "train {} learnt in {} ({} contacts, {} stops): steps {} to {}, {:.0} to {:.0} mm/s, \
              stops to ±{:.0} … ±{:.0} mm",
             self.train,
             minutes(self.took),
