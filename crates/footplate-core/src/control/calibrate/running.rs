@@ -15,7 +15,7 @@ use crate::units::{Length, Speed};
 /// Kept of the budget to bring the train to rest.
 const RESERVE: TimeSpan = TimeSpan::from_ms(5_000);
 
-/// Whatever is being tried is given up this long before the budget ends.
+/// Whatever is being tried is given up this long before the budget ends, or longer if the train takes longer to stop.
 const LAST_STOP: TimeSpan = TimeSpan::from_ms(4_000);
 
 /// From when a train should stand to when it surely does, reports of its last contact included.
@@ -343,7 +343,7 @@ impl Calibrator<'_> {
         let is_over =
             matches!(self.activity, Activity::Ending { .. } | Activity::Finished | Activity::Paused);
         let started = self.started.filter(|_| !is_over)?;
-        Some(started + self.settings.budget - LAST_STOP)
+        Some(started + self.settings.budget - LAST_STOP.max(self.stops_within() + COMMAND_TAKES))
     }
 
     /// When the clock alone brings something about.

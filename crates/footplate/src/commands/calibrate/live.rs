@@ -3,6 +3,8 @@
 mod ended;
 mod figures;
 mod kept;
+#[cfg(test)]
+mod promises;
 mod told;
 mod watcher;
 
