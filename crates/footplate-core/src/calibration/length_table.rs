@@ -51,12 +51,6 @@ impl SectionIndex {
         Self { of_hop, surveyed }
     }
 
-    /// Of no layout.
-    #[must_use]
-    pub const fn none() -> Self {
-        Self { of_hop: Vec::new(), surveyed: Vec::new() }
-    }
-
     /// The section of a hop.
     #[inline]
     #[must_use]

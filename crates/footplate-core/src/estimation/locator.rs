@@ -236,15 +236,15 @@ impl Locator {
     /// Where it is at a time that is not before the last entry; `None` while it is lost.
     #[must_use]
     pub fn locate(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
-        let _ = ground;
         let node = self.node?;
         let time = self.seconds(at);
         let place = self.following.place(model, time);
+        let survey = between_contacts(ground);
         let speed = self.following.speed(model, time);
         let at_rest = self.following.at(model, time).rests_at(time);
         Some(Located {
             at: WayPoint { node, way: Length::from_m(place.mean) },
-            uncertainty: Length::from_m(libm::sqrt(place.variance)),
+            uncertainty: Length::from_m(libm::sqrt(place.variance + survey * survey)),
             speed: Speed::from_m_per_s(if at_rest { 0.0 } else { speed.mean }),
             speed_uncertainty: Speed::from_m_per_s(libm::sqrt(speed.variance)),
             step: SpeedStep::new(self.following.step()).unwrap_or(SpeedStep::STAND),
@@ -288,10 +288,9 @@ impl Locator {
     /// that were sent. For a train that was told to stop already, where it comes to rest anyway.
     #[must_use]
     pub fn rest_if_stopped(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Rest> {
-        let _ = ground;
         let mut stopped = self.following;
         stopped.tell(model, self.seconds(at), 0);
-        self.rest_of(&stopped, model)
+        self.rest_of(ground, &stopped, model)
     }
 
     /// The same for a train at rest that is first told a step at `start`: what a short move is made of.
@@ -304,19 +303,20 @@ impl Locator {
         step: SpeedStep,
         stop: Timestamp,
     ) -> Option<Rest> {
-        let _ = ground;
         let mut moved = self.following;
         moved.tell(model, self.seconds(start), step.get());
         moved.tell(model, self.seconds(stop.max(start)), 0);
-        self.rest_of(&moved, model)
+        self.rest_of(ground, &moved, model)
     }
 
-    fn rest_of(&self, following: &Following, model: &MotionModel) -> Option<Rest> {
+    fn rest_of(&self, ground: Ground<'_>, following: &Following, model: &MotionModel) -> Option<Rest> {
         let node = self.node?;
         let (place, scatter, time) = following.rest(model)?;
         Some(Rest {
             at: WayPoint { node, way: Length::from_m(place.mean) },
-            doubt: Length::from_m(libm::sqrt(place.variance)),
+            doubt: Length::from_m(libm::sqrt(
+                place.variance + between_contacts(ground) * between_contacts(ground),
+            )),
             scatter: Length::from_m(libm::sqrt(scatter)),
             time: self.timestamp(time),
         })
@@ -325,6 +325,12 @@ impl Locator {
 
 /// Hops looked at ahead of a train: more than its way to rest and a few silent contacts.
 const MOST_HOPS: usize = 8;
+
+/// Contacts are where the train felt them; how far a place between two of them is from either only the survey tells, and
+/// in the mean of all places it is about half as far off as an edge may be (m).
+fn between_contacts(ground: Ground<'_>) -> f64 {
+    0.5 * ground.layout.survey().uncertainty.as_m()
+}
 
 /// ln of the density of a normal distribution at zero.
 fn log_density(of: Guess) -> f64 {

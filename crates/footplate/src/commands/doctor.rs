@@ -23,7 +23,7 @@ const COMMAND_EVERY: TimeSpan = TimeSpan::from_ms(500);
 /// More lost replies than this and the line needs a look.
 const LOST_SHARE: f64 = 0.01;
 
-/// Listen to the line for a while: how often sensors are read, what is lost, what a command costs.
+/// Listen to a line: how often sensors are read, and what is lost.
 ///
 /// No train is moved. Power is put on the track; trains that stand stay, and at the end the power is taken off.
 /// The exit status is 1 when more than one reply in a hundred was lost.

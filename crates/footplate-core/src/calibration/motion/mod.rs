@@ -8,7 +8,6 @@ mod chain;
 mod doubts;
 mod fit;
 mod follow;
-mod known;
 mod learn;
 mod model;
 mod numbers;
@@ -25,7 +24,6 @@ mod unknowns;
 
 pub use fit::MotionFit;
 pub(crate) use follow::{Following, Guess};
-pub use known::KnownMotion;
 pub use model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;

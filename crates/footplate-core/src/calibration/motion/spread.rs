@@ -44,12 +44,6 @@ impl Spread {
         spread
     }
 
-    /// Nothing is in doubt.
-    pub(super) fn certain(highest: usize) -> Self {
-        let side = count(highest);
-        Self { side, covariance: vec![0.0; side * side] }
-    }
-
     /// Of the first numbers of a solution.
     pub(super) fn of(solution: &Solution, highest: usize) -> Self {
         let side = count(highest);
