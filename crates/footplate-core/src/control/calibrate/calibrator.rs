@@ -56,8 +56,8 @@ pub struct Calibrator<'l> {
     pub(super) started: Option<Timestamp>,
     pub(super) finished: Option<Ending>,
     pub(super) ending: Option<Ending>,
-    /// Whether it was said that lengths differ.
-    pub(super) has_told_lengths: bool,
+    /// Hops of which it was said that their lengths differ.
+    pub(super) odd_lengths: usize,
     watched: Option<SensorId>,
     outputs: VecDeque<Output<CalibrationNotice>>,
 }
@@ -94,7 +94,7 @@ impl<'l> Calibrator<'l> {
             started: None,
             finished: None,
             ending: None,
-            has_told_lengths: false,
+            odd_lengths: 0,
             watched: None,
             outputs: VecDeque::new(),
         }

@@ -142,25 +142,36 @@ impl Calibrator<'_> {
         self.report_mishap(Mishap::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
     }
 
-    /// Says once if several hops of the lap take times that their surveyed lengths cannot explain.
+    /// Says if several hops of the lap take times that their surveyed lengths cannot explain; again when more do.
+    ///
+    /// Only lengths beside each other count: on another layout all of them would be off by as much as its total is.
     pub(super) fn check_lengths(&mut self) {
-        let Some(circuit) = self.circuit.as_ref().filter(|_| !self.has_told_lengths) else { return };
+        let Some(circuit) = &self.circuit else { return };
         let model = self.fit.model();
         let survey = self.layout.survey().uncertainty;
-        let hops: Vec<(HopId, Length, Length)> = circuit
-            .lap
-            .iter()
-            .filter_map(|id| self.layout.hop(*id))
-            .filter_map(|hop| {
+        let lap = circuit.lap.iter().filter_map(|id| self.layout.hop(*id));
+        let felt: Vec<(HopId, Length, Length, Length)> = lap
+            .map(|hop| {
                 let [felt, doubt] = model.length(&self.sections, &hop);
-                let off = (felt - hop.length).abs();
-                let is_sure = off > SURE * doubt;
-                let is_odd = off > ODD * survey && off > ODD_PART * hop.length;
-                (is_sure && is_odd).then_some((hop.id, hop.length, felt))
+                (hop.id, hop.length, felt, doubt)
             })
+            .filter(|(_, surveyed, ..)| *surveyed > Length::ZERO)
             .collect();
-        if hops.len() >= FEWEST_ODD {
-            self.has_told_lengths = true;
+        let mut ratios: Vec<f64> = felt.iter().map(|(_, surveyed, felt, _)| *felt / *surveyed).collect();
+        ratios.sort_unstable_by(f64::total_cmp);
+        let Some(scale) = ratios.get(ratios.len() / 2).copied().filter(|scale| *scale > 0.0) else { return };
+        let hops: Vec<(HopId, Length, Length)> = felt
+            .into_iter()
+            .map(|(id, surveyed, felt, doubt)| (id, surveyed, felt / scale, doubt))
+            .filter(|(_, surveyed, felt, doubt)| {
+                let off = (*felt - *surveyed).abs();
+                off > SURE * *doubt && off > ODD * survey && off > ODD_PART * *surveyed
+            })
+            .map(|(id, surveyed, felt, _)| (id, surveyed, felt))
+            .collect();
+        let is_news = hops.len() != self.odd_lengths;
+        if hops.len() >= FEWEST_ODD && is_news {
+            self.odd_lengths = hops.len();
             self.report_mishap(Mishap::LengthsDiffer { hops });
         }
     }

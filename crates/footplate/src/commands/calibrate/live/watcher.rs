@@ -14,6 +14,9 @@ use crate::runtime::{Attendant, Wish};
 /// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
 const EXPLAINED: Length = Length::from_mm(40.0);
 
+/// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
+const FEWEST_EXPLAINED: usize = 2;
+
 /// Tells people how it goes, on standard error.
 pub(super) struct Watcher<'l> {
     layout: &'l Layout,
@@ -50,14 +53,18 @@ impl<'l> Watcher<'l> {
     fn layout_with(&self, hops: &[(HopId, Length, Length)]) -> Option<&'static str> {
         BUILT_IN.iter().copied().filter(|name| *name != self.layout.name()).find(|name| {
             let Ok(other) = built_in(name) else { return false };
-            hops.iter().all(|(hop, _, felt)| {
+            // Early in a session one or the other length is still wrong.
+            let explained = hops.iter().filter(|(hop, surveyed, felt)| {
                 let Some(hop) = self.layout.hop(*hop) else { return false };
                 let ends =
                     [hop.from, hop.to].map(|node| other.layout.node_named(self.layout.node_name(node)));
                 let [Some(from), Some(to)] = ends else { return false };
                 let there = other.layout.hops_from(from).find(|other| other.to == to);
-                there.is_some_and(|there| (there.length - *felt).abs() <= EXPLAINED)
-            })
+                let is_nearer = |there: Length| (there - *felt).abs() < 0.5 * (*surveyed - *felt).abs();
+                there
+                    .is_some_and(|there| (there.length - *felt).abs() <= EXPLAINED && is_nearer(there.length))
+            });
+            explained.count() >= FEWEST_EXPLAINED
         })
     }
 }
@@ -72,7 +79,7 @@ impl<'l> Attendant<Calibrator<'l>> for Watcher<'_> {
         if let CalibrationNotice::Mishap(mishap) = &notice {
             self.mishaps += 1;
             if let Mishap::LengthsDiffer { hops } = mishap {
-                self.other_layout = self.layout_with(hops);
+                self.other_layout = self.other_layout.or_else(|| self.layout_with(hops));
             }
         }
         if let Some(line) = told::line(self.layout, &notice) {
