@@ -4,6 +4,7 @@ mod driving;
 mod layout;
 mod line;
 mod recording;
+mod rehearsal;
 mod seeds;
 mod station;
 mod truth;

@@ -189,6 +189,9 @@ impl Driver {
             Order::Move { distance, .. } if !(distance > Length::ZERO && distance <= LONGEST_MOVE) => {
                 Err(Refusal::IllegalDistance { found: distance })
             }
+            Order::Hold { train, .. } | Order::Follow { train, .. } | Order::Arrive { train, .. } => {
+                Err(Refusal::NotPaced { train })
+            }
             Order::Move { .. } | Order::Turnout { .. } => Ok(()),
         }
     }

@@ -23,5 +23,5 @@ mod turnout_guard;
 
 pub use driver::Driver;
 pub use notice::{Achieved, DriveNotice, Finished, PlannedStop, Promise};
-pub use order::{Aim, Order, OrderId, StopOrder};
+pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use refusal::Refusal;

@@ -3,8 +3,9 @@
 use core::fmt;
 
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
+use crate::time::TimeSpan;
 use crate::track::Landmark;
-use crate::units::{Length, Ratio};
+use crate::units::{Length, Ratio, Speed};
 
 /// Something to be done.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +40,40 @@ pub enum Order {
         /// How far, ahead.
         distance: Length,
     },
+    /// Run at a mean speed, whatever steps that takes.
+    Hold {
+        /// The train.
+        train: TrainId,
+        /// The speed.
+        speed: Speed,
+    },
+    /// Run behind another train and keep the gap to it.
+    Follow {
+        /// The train.
+        train: TrainId,
+        /// The one ahead.
+        leader: TrainId,
+        /// The gap.
+        gap: Gap,
+    },
+    /// Come to rest with the leading end of the pickup at a place, and do so in a time.
+    Arrive {
+        /// The train.
+        train: TrainId,
+        /// The place, counted from where this train's pickup closes the contact.
+        target: Landmark,
+        /// How long from now it shall take until the train stands.
+        within: TimeSpan,
+    },
+}
+
+/// How far one train keeps behind another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Gap {
+    /// From a contact's being closed by the train ahead until the follower closes it.
+    Time(TimeSpan),
+    /// From the rear end of the train ahead to the front of the follower.
+    Way(Length),
 }
 
 /// Come to rest at a place.
@@ -78,9 +113,12 @@ impl Order {
     #[must_use]
     pub const fn train(&self) -> Option<TrainId> {
         match self {
-            Self::Speed { train, .. } | Self::Reverse { train, .. } | Self::Move { train, .. } => {
-                Some(*train)
-            }
+            Self::Speed { train, .. }
+            | Self::Reverse { train, .. }
+            | Self::Move { train, .. }
+            | Self::Hold { train, .. }
+            | Self::Follow { train, .. }
+            | Self::Arrive { train, .. } => Some(*train),
             Self::Stop(stop) => Some(stop.train),
             Self::Turnout { .. } => None,
         }

@@ -109,6 +109,11 @@ pub enum Refusal {
         /// The train on that.
         train: TrainId,
     },
+    /// Nobody here can pace a train yet.
+    NotPaced {
+        /// The train.
+        train: TrainId,
+    },
     /// No contact reported the train within the time in which one should have.
     NotFound {
         /// The train.
@@ -179,6 +184,9 @@ impl fmt::Display for Refusal {
                 "turnout {turnout} may lie curved only while turnout {partner} lies straight, and train {train} \
                  is on that: wait, or stop it first"
             ),
+            Self::NotPaced { train } => {
+                write!(f, "train {train} cannot be held at a speed: name a step, as with `speed {train} 6`")
+            }
             Self::NotFound { train, within } => write!(
                 f,
                 "no contact reported train {train} within {:.0} s: does it run, and is it on this layout?",

@@ -6,7 +6,6 @@ mod figures;
 mod known_train;
 mod page;
 mod trial;
-mod virtual_line;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -23,8 +22,9 @@ use footplate_store::layout_named;
 use self::course_project::CourseProject;
 use self::figures::ScoredTrain;
 use self::page::Page;
-use self::trial::{Counts, Plan, TRAIN, Trial, ahead, calibrate, world};
+use self::trial::{Counts, Plan, TRAIN, Trial, ahead, world};
 use super::super::Outcome;
+use super::rehearsal::{Calibrated, calibrate};
 use super::seeds::Seeds;
 use crate::progress::with_progress;
 use crate::spread::{all_cores, spread};
@@ -103,7 +103,7 @@ impl Arguments {
 fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow::Result<ScoredTrain> {
     let sections = SectionIndex::of(layout);
     let mut line = world(layout, seed, law)?;
-    let calibrated = calibrate(layout, &mut line, budget);
+    let calibrated = calibrate(layout, &mut line, TRAIN, budget);
     // What is asked differs from train to train, and is the same whoever drives.
     let asked = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
     let way: Vec<_> = ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
@@ -112,7 +112,7 @@ fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow
     let mut by = Vec::new();
     for model in [calibrated.model.clone(), knowing] {
         let mut world = line.clone();
-        let known = trial::Calibrated { model, ..calibrated.clone() };
+        let known = Calibrated { model, ..calibrated.clone() };
         let mut trial = Trial::new(layout, &mut world, known, asked);
         trial.run(COUNTS);
         by.push(trial.results);

@@ -10,8 +10,8 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{Command, Event, EventKind, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp};
 
+use super::super::rehearsal::VirtualLine;
 use super::trial::{Counts, Plan, Results, TRAIN};
-use super::virtual_line::VirtualLine;
 
 /// After a command a train runs steadily from here on, in s (chosen: the slowest trains need five).
 const SETTLES_S: f64 = 6.0;

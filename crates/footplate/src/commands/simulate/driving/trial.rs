@@ -1,23 +1,17 @@
 //! One train from nothing known to stops and moves, each beside the truth.
 
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
-use footplate_core::control::{
-    Aim, Calibrator, CalibratorSettings, DriveNotice, Driver, Order, OrderId, StopOrder,
-};
-use footplate_core::estimation::Locator;
+use footplate_core::control::{Aim, DriveNotice, Driver, Order, OrderId, StopOrder};
 use footplate_core::track::{Landmark, Layout, TurnoutStates};
 use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
 
+use super::super::rehearsal::{Calibrated, VirtualLine};
 use super::choice::Choice;
-use super::virtual_line::VirtualLine;
 
 /// The train's address.
 pub(super) const TRAIN: TrainId = TrainId(24);
 /// Steps of the decoders that all figures are about.
 const HIGHEST: u8 = 14;
-/// A calibration that has not ended by then is taken as it is.
-const CALIBRATION_PATIENCE_S: f64 = 420.0;
 /// An order that is not carried out by then has failed.
 const ORDER_PATIENCE_S: f64 = 60.0;
 /// A train that was told to stop stands after this, in s.
@@ -65,52 +59,11 @@ pub(super) struct Results {
 /// The probabilities of [`Results::not_beyond`], in percent.
 pub(super) const NOT_BEYOND_PERCENT: [f64; 2] = [5.0, 1.0];
 
-/// What a calibration leaves to whoever drives next.
-#[derive(Clone)]
-pub(super) struct Calibrated {
-    pub(super) model: MotionModel,
-    pub(super) locator: Locator,
-    pub(super) turnouts: TurnoutStates,
-    pub(super) seconds: f64,
-    pub(super) ending: String,
-}
-
 /// A world with one train that nothing is known of.
 pub(super) fn world(layout: &Layout, seed: u64, law: LawFamily) -> anyhow::Result<VirtualLine<'_>> {
     let switches = LivingSwitches { law: Some(law), ..LivingSwitches::well_kept() };
     let station = VirtualStation::draw(layout, seed, &[TRAIN], &switches)?;
     Ok(VirtualLine::open(station)?)
-}
-
-/// Calibrates as a person would let it: from nothing, within the budget.
-pub(super) fn calibrate(layout: &Layout, line: &mut VirtualLine<'_>, budget: TimeSpan) -> Calibrated {
-    let highest = SpeedStep::new(HIGHEST).unwrap_or(SpeedStep::STAND);
-    let settings = CalibratorSettings { budget, ..CalibratorSettings::default() };
-    let mut calibrator = Calibrator::new(layout, settings, MotionFit::new(TRAIN, highest));
-    let began = line.now();
-    let patience = began + TimeSpan::from_s(CALIBRATION_PATIENCE_S) + budget;
-    calibrator.handle_start(began);
-    while line.now() < patience && calibrator.ending().is_none() {
-        let _ = line.drive(&mut calibrator, patience);
-    }
-    Calibrated {
-        turnouts: calibrator.turnouts().clone(),
-        locator: calibrator.locator().clone(),
-        seconds: (line.now() - began).as_s(),
-        ending: format!("{:?}", calibrator.ending()),
-        model: calibrator.into_fit().model().clone(),
-    }
-}
-
-/// The start of a machine that begins with the first word it hears.
-trait Begins {
-    fn handle_start(&mut self, now: Timestamp);
-}
-
-impl<M: footplate_core::control::Machine> Begins for M {
-    fn handle_start(&mut self, now: Timestamp) {
-        self.handle_timeout(now);
-    }
 }
 
 /// What is asked of a train: the same whoever drives, as long as the train stands at the same places.

@@ -11,26 +11,26 @@ const MODULES: u8 = 5;
 
 /// A station and the program's side of the line to it; a clone is the same world with another future.
 #[derive(Clone)]
-pub(super) struct VirtualLine<'l> {
-    pub(super) station: VirtualStation<'l>,
+pub(crate) struct VirtualLine<'l> {
+    pub(crate) station: VirtualStation<'l>,
     interface: Interface,
 }
 
 impl<'l> VirtualLine<'l> {
     /// A line that has just been opened.
-    pub(super) fn open(station: VirtualStation<'l>) -> Result<Self, EncodeError> {
+    pub(crate) fn open(station: VirtualStation<'l>) -> Result<Self, EncodeError> {
         let now = station.now();
         let mut interface = Interface::new(now, Settings::with_cts(MODULES))?;
         interface.handle_cts(now, station.cts());
         Ok(Self { station, interface })
     }
 
-    pub(super) const fn now(&self) -> Timestamp {
+    pub(crate) const fn now(&self) -> Timestamp {
         self.station.now()
     }
 
     /// Lets a machine drive until it has something to say or a time has come.
-    pub(super) fn drive<M: Machine>(&mut self, machine: &mut M, until: Timestamp) -> Option<M::Notice> {
+    pub(crate) fn drive<M: Machine>(&mut self, machine: &mut M, until: Timestamp) -> Option<M::Notice> {
         loop {
             let now = self.now();
             if let Some(notice) = self.settle(machine, now) {

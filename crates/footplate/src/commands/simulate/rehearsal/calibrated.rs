@@ -1,0 +1,52 @@
+//! A train calibrated from nothing, as a person would let it.
+
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::control::{Calibrator, CalibratorSettings, Machine};
+use footplate_core::estimation::Locator;
+use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::{SpeedStep, TimeSpan, TrainId};
+
+use super::VirtualLine;
+
+/// Steps of the decoders that all figures are about.
+const HIGHEST: u8 = 14;
+/// A calibration that has not ended so long after its budget is taken as it is.
+const PATIENCE: TimeSpan = TimeSpan::from_s(420.0);
+
+/// What a calibration leaves to whoever drives next.
+#[derive(Clone)]
+pub(crate) struct Calibrated {
+    pub(crate) model: MotionModel,
+    pub(crate) locator: Locator,
+    pub(crate) turnouts: TurnoutStates,
+    /// Track time that it took, in s.
+    pub(crate) seconds: f64,
+    /// Why it ended.
+    pub(crate) ending: String,
+}
+
+/// Calibrates a train from nothing, within a budget of track time. It has to be alone on the layout.
+pub(crate) fn calibrate(
+    layout: &Layout,
+    line: &mut VirtualLine<'_>,
+    train: TrainId,
+    budget: TimeSpan,
+) -> Calibrated {
+    let highest = SpeedStep::new(HIGHEST).unwrap_or(SpeedStep::STAND);
+    let settings = CalibratorSettings { budget, ..CalibratorSettings::default() };
+    let mut calibrator = Calibrator::new(layout, settings, MotionFit::new(train, highest));
+    let began = line.now();
+    let patience = began + PATIENCE + budget;
+    // It begins with the first word it hears.
+    calibrator.handle_timeout(began);
+    while line.now() < patience && calibrator.ending().is_none() {
+        let _ = line.drive(&mut calibrator, patience);
+    }
+    Calibrated {
+        turnouts: calibrator.turnouts().clone(),
+        locator: calibrator.locator().clone(),
+        seconds: (line.now() - began).as_s(),
+        ending: format!("{:?}", calibrator.ending()),
+        model: calibrator.into_fit().model().clone(),
+    }
+}
