@@ -1,24 +1,29 @@
 //! Carries out instructions one after the other: hands orders to the driver, waits, and says what comes of it.
 
+mod outcomes;
+
 use std::collections::{BTreeMap, VecDeque};
 
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::control::{
-    Achieved, DriveNotice, Driver, Finished, Machine, Order, OrderId, Output, Refusal,
-};
-use footplate_core::{Event, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::control::{Driver, Machine, Order, OrderId, Output, Refusal};
+use footplate_core::estimation::WayPoint;
+use footplate_core::track::Landmark;
+use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
-use super::parse::Known;
+use super::reader::Known;
 use super::script::{Step, step};
-use super::spoken::{Ended, Spoken, Target};
-use super::told::{Tongue, verb};
+use super::spoken::Spoken;
+use super::told::Tongue;
 
 /// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
 const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
 /// How often it is looked whether a train stands.
 const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
+
+/// How well a person sees where the end of a shoe is beside a contact, whose own place is known to 5 mm.
+const SEEN_BY_HAND: Length = Length::from_mm(12.0);
 
 /// Who gives the instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,7 +206,9 @@ impl Conductor {
         match step.instruction {
             Instruction::Order(order) => match self.driver.order(now, order) {
                 Ok(id) => {
-                    if let (Order::Stop(_) | Order::Move { .. }, Some(train)) = (order, order.train()) {
+                    if let (Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }, Some(train)) =
+                        (order, order.train())
+                    {
                         self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
                     }
                     self.pending.insert(id, step);
@@ -216,6 +223,7 @@ impl Conductor {
                     self.steps.push_front(part);
                 }
             }
+            Instruction::Place(train, at) => self.place(now, &step, train, at),
             Instruction::Where(Some(train)) => {
                 let line = self.tongue().whereabouts(train, now);
                 self.say(line);
@@ -235,36 +243,16 @@ impl Conductor {
         }
     }
 
-    fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
-        self.fell_short = true;
-        self.say(format!("refused `{}`: {why}", step.text));
-        let ended = Ended { refused: Some(why.to_string()), ..self.ended(now, step) };
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
-    }
-
-    fn ended(&self, time: Timestamp, step: &Step) -> Ended {
-        let (train, target) = match step.instruction {
-            Instruction::Order(order) => (
-                order.train(),
-                match order {
-                    Order::Stop(stop) => Target::Place(stop.target),
-                    Order::Move { distance, .. } => Target::Ahead(distance),
-                    _ => Target::None,
-                },
-            ),
-            _ => (None, Target::None),
-        };
-        Ended {
-            text: step.text.clone(),
-            command: verb(&step.instruction),
-            train,
-            target,
-            achieved: None,
-            error: None,
-            promise: None,
-            unseen: None,
-            at: self.since_begin(time),
-            refused: None,
+    /// A person says where a train stands.
+    fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
+        if self.driver.stands(train, now) {
+            let at = WayPoint { node: at.node, way: at.offset };
+            self.driver.place(now, train, at, SEEN_BY_HAND);
+            self.learning.interrupt(train);
+            let line = self.tongue().whereabouts(train, now);
+            self.say(line);
+        } else {
+            self.refuse(now, step, &Refusal::StillMoves { train });
         }
     }
 
@@ -277,72 +265,6 @@ impl Conductor {
                 Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
                 Output::Notice(notice) => self.notice(now, &notice),
             }
-        }
-    }
-
-    fn notice(&mut self, now: Timestamp, notice: &DriveNotice) {
-        if let Some(line) = self.tongue().line(notice) {
-            self.say(line);
-        }
-        match notice {
-            DriveNotice::Passed { train, passed, .. } => {
-                self.learning.passed(*train, &self.driver, passed);
-                if let Some(wait) = &mut self.wait {
-                    wait.is_met |= wait.until == Until::At(*train, passed.sensor);
-                }
-            }
-            DriveNotice::Done(finished) => {
-                self.done(finished);
-                self.learn(now, finished);
-            }
-            DriveNotice::Lost { train } | DriveNotice::TurnoutLiesOtherwise { train, .. } => {
-                self.learning.interrupt(*train);
-            }
-            DriveNotice::Thrown { order: Some(order), .. } => {
-                if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
-                    let ended = self.ended(now, &step);
-                    self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
-                }
-            }
-            DriveNotice::GivenUp { order, why, .. } => {
-                if let Some(step) = self.pending.remove(order) {
-                    self.refuse(now, &step, why);
-                }
-            }
-            DriveNotice::Replaced { order, .. } => {
-                self.pending.remove(order);
-            }
-            _ => {}
-        }
-    }
-
-    fn done(&mut self, finished: &Finished) {
-        let Some(step) = self.pending.remove(&finished.order) else { return };
-        let achieved = finished.achieved;
-        self.fell_short |= finished.unseen.is_some();
-        let name = |achieved: Achieved| self.tongue().place(achieved.at);
-        let ended = Ended {
-            achieved: achieved.map(name),
-            error: achieved.and_then(|achieved| achieved.error),
-            promise: finished.promise,
-            unseen: finished.unseen.map(|sensor| self.tongue().sensor(sensor).to_owned()),
-            ..self.ended(finished.time, &step)
-        };
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
-    }
-}
-
-impl Conductor {
-    /// What trains taught is used from the next order on. Only while all of them stand, so that nobody waits for it.
-    fn learn(&mut self, now: Timestamp, finished: &Finished) {
-        if finished.unseen.is_some() {
-            self.learning.interrupt(finished.train);
-        }
-        let trains: Vec<TrainId> = self.trains.keys().copied().collect();
-        if trains.iter().all(|train| self.driver.stands(*train, now))
-            && let Some(model) = self.learning.model(finished.train)
-        {
-            self.driver.set_model(model);
         }
     }
 }

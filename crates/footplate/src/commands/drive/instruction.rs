@@ -1,6 +1,7 @@
 //! What a line says, once it has been understood.
 
 use footplate_core::control::Order;
+use footplate_core::track::Landmark;
 use footplate_core::{SensorId, TimeSpan, TrainId};
 
 /// One line of a script or of the prompt.
@@ -10,6 +11,8 @@ pub(super) enum Instruction {
     Order(Order),
     /// All turnouts straight, one after the other.
     Straighten,
+    /// A person put a train there, or sees that it stands there.
+    Place(TrainId, Landmark),
     /// Where is a train, or all of them?
     Where(Option<TrainId>),
     /// Go on with the next line later.
@@ -44,6 +47,10 @@ stop 24 at C13+120mm              come to rest with the pickup 120 mm past conta
      [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most
      [next round]                 ... after passing it once
 move 24 37mm                      from rest, move on by 37 mm
+hold 24 250mm/s                   run at a mean speed, whatever steps that takes
+follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, contact by contact (or by 150mm)
+arrive 24 at D5+40mm in 12s       come to rest there, 12 s from now
+place 24 at C13+120mm             train 24 was put there by hand, or stands there as you see
 where [24]                        where the train is, how sure, and how fast
 wait 2s                           go on after 2 seconds (also 500ms)
 wait 24 at rest                   go on when train 24 has done what it was told and stands

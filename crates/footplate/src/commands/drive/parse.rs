@@ -1,22 +1,16 @@
 //! Reads what people write to drive trains, and tells them what would be right where it is not.
 
-use std::collections::BTreeMap;
-
-use footplate_core::control::{Aim, Order, StopOrder};
-use footplate_core::track::{Landmark, Layout, TurnoutStates, WayError};
-use footplate_core::{Length, Ratio, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::SpeedStep;
+use footplate_core::control::{Aim, Gap, Order, StopOrder};
 
 use super::instruction::{Instruction, Until};
-use super::words::{Mistake, Word, meant, words};
+use super::reader::{Known, Words};
+use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 8] = ["speed", "reverse", "turnout", "stop", "move", "where", "wait", "help"];
-
-/// What a line may name: the places of a layout, and trains with their highest steps.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Known<'k> {
-    pub(super) layout: &'k Layout,
-    pub(super) trains: &'k BTreeMap<TrainId, SpeedStep>,
-}
+const VERBS: [&str; 12] = [
+    "speed", "reverse", "turnout", "stop", "move", "hold", "follow", "arrive", "place", "where", "wait",
+    "help",
+];
 
 /// Reads one line; `None` where it says nothing.
 ///
@@ -55,6 +49,23 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             let train = words.train()?;
             Instruction::Order(Order::Move { train, distance: words.distance()? })
         }
+        "hold" => {
+            let train = words.train()?;
+            Instruction::Order(Order::Hold { train, speed: words.speed()? })
+        }
+        "follow" => words.follow()?,
+        "arrive" => {
+            let train = words.train()?;
+            words.expect("at")?;
+            let target = words.landmark()?;
+            words.expect("in")?;
+            Instruction::Order(Order::Arrive { train, target, within: words.span()? })
+        }
+        "place" => {
+            let train = words.train()?;
+            words.expect("at")?;
+            Instruction::Place(train, words.landmark()?)
+        }
         "where" if words.rest.is_empty() => Instruction::Where(None),
         "where" => Instruction::Where(Some(words.train()?)),
         "wait" => Instruction::Wait(words.until()?),
@@ -72,88 +83,7 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
     }
 }
 
-/// The words that have not been read yet.
-struct Words<'w, 't, 'k> {
-    rest: &'w [Word<'t>],
-    known: Known<'k>,
-    /// Where a word would stand that is missing at the end.
-    end: usize,
-    after: Word<'t>,
-}
-
-impl<'t> Words<'_, 't, '_> {
-    fn next(&mut self, wanted: &str) -> Result<Word<'t>, Mistake> {
-        let Some((word, rest)) = self.rest.split_first() else {
-            let what = format!("{wanted} is missing after `{}`", self.after.text.escape_debug());
-            return Err(Mistake { column: self.end, what });
-        };
-        (self.rest, self.after) = (rest, *word);
-        Ok(*word)
-    }
-
-    /// Takes this word if it is next.
-    fn take(&mut self, word: &str) -> bool {
-        match self.rest.split_first() {
-            Some((first, rest)) if first.text == word => {
-                (self.rest, self.after) = (rest, *first);
-                true
-            }
-            _ => false,
-        }
-    }
-
-    fn expect(&mut self, wanted: &str) -> Result<(), Mistake> {
-        let word = self.next(&format!("`{wanted}`"))?;
-        if word.text == wanted { Ok(()) } else { Err(word.mistake(format!("should be `{wanted}`"))) }
-    }
-
-    fn number<T: std::str::FromStr>(&mut self, wanted: &str) -> Result<(Word<'t>, T), Mistake> {
-        let word = self.next(wanted)?;
-        let number = word.text.parse().map_err(|_| word.mistake(format!("should be {wanted}")))?;
-        Ok((word, number))
-    }
-
-    fn train(&mut self) -> Result<TrainId, Mistake> {
-        let (word, number) = self.number("the number of a train, such as 24")?;
-        let train = TrainId(number);
-        if self.known.trains.contains_key(&train) {
-            return Ok(train);
-        }
-        let trains: Vec<String> = self.known.trains.keys().map(ToString::to_string).collect();
-        let known = if trains.is_empty() { "none is".to_owned() } else { trains.join(", ") };
-        Err(word.mistake(format!("is no train that is driven here: {known}")))
-    }
-
-    fn step(&mut self, train: TrainId) -> Result<SpeedStep, Mistake> {
-        let highest = self.known.trains.get(&train).copied().unwrap_or_default();
-        let wanted = format!("a step from 0 to {highest}");
-        let (word, number) = self.number(&wanted)?;
-        let step = SpeedStep::new(number).filter(|step| *step <= highest);
-        step.ok_or_else(|| word.mistake(format!("should be {wanted}")))
-    }
-
-    fn turnout(&mut self) -> Result<TurnoutId, Mistake> {
-        let (word, number) = self.number("`all` or the number of a turnout, such as 11")?;
-        let turnout = TurnoutId(number);
-        if self.known.layout.branch(turnout).is_some() {
-            return Ok(turnout);
-        }
-        let all: Vec<String> = self.known.layout.turnouts().map(|(turnout, _)| turnout.to_string()).collect();
-        Err(word.mistake(format!("is no turnout of {}: it has {}", self.known.layout.name(), all.join(", "))))
-    }
-
-    fn leg(&mut self) -> Result<bool, Mistake> {
-        let word = self.next("`straight` or `curved`")?;
-        match word.text {
-            "straight" => Ok(false),
-            "curved" => Ok(true),
-            other => {
-                let near = meant(other, ["straight", "curved"].into_iter(), "");
-                Err(word.mistake(format!("should be `straight` or `curved`{near}")))
-            }
-        }
-    }
-
+impl Words<'_, '_, '_> {
     fn stop(&mut self) -> Result<Instruction, Mistake> {
         let train = self.train()?;
         if self.rest.is_empty() {
@@ -183,81 +113,22 @@ impl<'t> Words<'_, 't, '_> {
         Ok(Instruction::Order(Order::Stop(stop)))
     }
 
-    /// A place, with its offset in one word or several.
-    fn landmark(&mut self) -> Result<Landmark, Mistake> {
-        let first = self.next("a place, such as `C13` or `C13+120mm`")?;
-        let mut text = first.text.to_owned();
-        while let Some(word) = self.rest.first() {
-            let goes_on = word.text.starts_with(['+', '-'])
-                || text.ends_with(['+', '-'])
-                || (word.text == "mm" && text.ends_with(|c: char| c.is_ascii_digit()));
-            if !goes_on {
-                break;
-            }
-            text.push_str(word.text);
-            self.next("")?;
+    fn follow(&mut self) -> Result<Instruction, Mistake> {
+        let train = self.train()?;
+        self.expect("behind")?;
+        let behind = self.rest.first().copied();
+        let leader = self.train()?;
+        if let Some(word) = behind.filter(|_| leader == train) {
+            return Err(word.mistake("is the same train: name the one ahead of it"));
         }
-        let layout = self.known.layout;
-        let whole = Word { text: &text, column: first.column };
-        let landmark = layout.landmark(&text).map_err(|error| {
-            let name = text.split(['+', '-']).next().unwrap_or_default();
-            let nodes = layout.nodes().map(|(_, node)| node.name.as_str());
-            let near = meant(name, nodes, "");
-            Mistake { column: whole.column, what: format!("{error}{near}") }
-        })?;
-        match layout.locate(landmark, &TurnoutStates::unknown()) {
-            Err(error @ WayError::TrackEnds { .. }) => {
-                Err(whole.mistake(format!("is off the track: {error}")))
-            }
-            _ => Ok(landmark),
-        }
-    }
-
-    fn sensor(&mut self) -> Result<SensorId, Mistake> {
-        let word = self.next("a contact, such as `C13`")?;
-        let layout = self.known.layout;
-        layout.sensor_named(word.text).ok_or_else(|| {
-            let all = layout.sensors().map(|(sensor, _)| layout.sensor_name(sensor));
-            let near = meant(word.text, all, ": write a name such as `C13`");
-            word.mistake(format!("is no contact of {}{near}", layout.name()))
-        })
-    }
-
-    fn share(&mut self) -> Result<Ratio, Mistake> {
-        let wanted = "a share of stops from 0.0001% to 50%";
-        let word = self.next(wanted)?;
-        let percent = word.text.strip_suffix('%').and_then(|number| number.parse::<f64>().ok());
-        let share = percent.filter(|percent| (1e-4..=50.0).contains(percent)).map(Ratio::from_percent);
-        share.ok_or_else(|| word.mistake(format!("should be {wanted}")))
-    }
-
-    fn distance(&mut self) -> Result<Length, Mistake> {
-        let wanted = "a distance ahead, such as 37mm or 1.2m";
-        let (word, number, unit) = self.with_unit(wanted, &["mm", "cm", "m"])?;
-        let mm = number
-            * match unit {
-                "mm" => 1.0,
-                "cm" => 10.0,
-                _ => 1e3,
-            };
-        if (1.0..=1e5).contains(&mm) {
-            Ok(Length::from_mm(mm))
-        } else {
-            Err(word.mistake("should be 1mm to 100m"))
-        }
+        self.expect("by")?;
+        let gap = if self.is_at_span() { Gap::Time(self.span()?) } else { Gap::Way(self.distance()?) };
+        Ok(Instruction::Order(Order::Follow { train, leader, gap }))
     }
 
     fn until(&mut self) -> Result<Until, Mistake> {
-        let span = self.rest.first().is_some_and(|word| word.text.ends_with('s'))
-            || self.rest.get(1).is_some_and(|word| ["s", "ms"].contains(&word.text));
-        if span {
-            let (word, number, unit) = self.with_unit("a time, such as 2s or 500ms", &["ms", "s"])?;
-            let seconds = if unit == "ms" { 1e-3 * number } else { number };
-            return if (0.0..=86_400.0).contains(&seconds) {
-                Ok(Until::Passed(TimeSpan::from_s(seconds)))
-            } else {
-                Err(word.mistake("should be at most a day: 86400s"))
-            };
+        if self.is_at_span() {
+            return Ok(Until::Passed(self.span()?));
         }
         let wanted = "a time such as 2s, or a train such as 24";
         if self.rest.is_empty() {
@@ -270,31 +141,11 @@ impl<'t> Words<'_, 't, '_> {
         self.expect("at")?;
         if self.take("rest") { Ok(Until::AtRest(train)) } else { Ok(Until::At(train, self.sensor()?)) }
     }
-
-    /// A number and its unit, in one word or two.
-    fn with_unit(
-        &mut self,
-        wanted: &str,
-        units: &[&'static str],
-    ) -> Result<(Word<'t>, f64, &'static str), Mistake> {
-        let word = self.next(wanted)?;
-        let digits = word.text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-        let mut unit = word.text.get(digits.len()..).unwrap_or_default();
-        if unit.is_empty() && self.rest.first().is_some_and(|next| units.contains(&next.text)) {
-            unit = self.next("")?.text;
-        }
-        let unit = units.iter().find(|known| **known == unit);
-        // Neither `inf` nor a sign alone: digits only.
-        let number = digits.parse::<f64>().ok().filter(|number| number.is_finite());
-        match (number, unit) {
-            (Some(number), Some(unit)) => Ok((word, number, *unit)),
-            _ => Err(word.mistake(format!("should be {wanted}"))),
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use footplate_core::{Length, Ratio, Speed, TimeSpan, TrainId, TurnoutId};
     use footplate_store::layout_named;
 
     use super::*;
@@ -337,6 +188,19 @@ mod tests {
         assert_eq!(wait("wait 24 at rest"), Until::AtRest(train));
         assert_eq!(wait("wait 24 located"), Until::Located(train));
         assert!(matches!(wait("wait 24 at C13"), Until::At(TrainId(24), _)));
+        assert_eq!(order("hold 24 250mm/s"), Order::Hold { train, speed: Speed::from_mm_per_s(250.0) });
+        assert_eq!(order("hold 24 0.25 m/s"), Order::Hold { train, speed: Speed::from_mm_per_s(250.0) });
+        let (follower, leader) = (TrainId(58), train);
+        let gap = Gap::Time(TimeSpan::from_ms(1500));
+        assert_eq!(order("follow 58 behind 24 by 1.5s"), Order::Follow { train: follower, leader, gap });
+        let gap = Gap::Way(Length::from_mm(150.0));
+        assert_eq!(order("follow 58 behind 24 by 150mm"), Order::Follow { train: follower, leader, gap });
+        let Order::Arrive { target, within, .. } = order("arrive 24 at D5 in 12s") else { panic!("a time") };
+        assert_eq!((target.offset, within), (Length::ZERO, TimeSpan::from_s(12.0)));
+        let Ok(Some(Instruction::Place(placed, at))) = read("place 24 at C13+120mm") else {
+            panic!("a place")
+        };
+        assert_eq!((placed, at.offset), (train, Length::from_mm(120.0)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
         assert_eq!(read("where"), Ok(Some(Instruction::Where(None))));
         assert_eq!(read("  # nothing but a remark"), Ok(None));
@@ -367,6 +231,11 @@ mod tests {
             ),
             ("move 24 37", "column 9: `37` should be a distance ahead, such as 37mm or 1.2m"),
             ("move 24 -5mm", "column 9: `-5mm` should be 1mm to 100m"),
+            ("hold 24 250", "column 9: `250` should be a speed, such as 250mm/s"),
+            ("hold 24 9m/s", "column 9: `9m/s` should be 1mm/s to 5m/s"),
+            ("follow 58 behind 58 by 1s", "column 18: `58` is the same train: name the one ahead of it"),
+            ("follow 58 behind 24 by 1", "column 24: `1` should be a distance ahead, such as 37mm or 1.2m"),
+            ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),
         ] {

@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::instruction::Instruction;
-use super::parse::{Known, parse};
+use super::parse::parse;
+use super::reader::Known;
 
 /// The longest script that is read, in bytes: a day of driving.
 const LONGEST: u64 = 1 << 20;

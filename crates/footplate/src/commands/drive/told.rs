@@ -24,6 +24,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Hold { .. }) => "hold",
         Instruction::Order(Order::Follow { .. }) => "follow",
         Instruction::Order(Order::Arrive { .. }) => "arrive",
+        Instruction::Place(..) => "place",
         Instruction::Where(_) => "where",
         Instruction::Wait(_) => "wait",
         Instruction::Help => "help",
