@@ -137,7 +137,13 @@ proptest! {
         let model = law.corrected_by(&moves).unwrap();
         let time = model.command_time(Length::from_mm(distance)).unwrap();
         let found = model.distance(time).as_mm();
-        prop_assert!((found - distance).abs() < 1e-4, "time is rounded to nanoseconds, no more: {distance} mm: {time:?} gives {found} mm");
+        // Once on the way there and once on the way back; a sharp start before a long stop gets 0.3 um farther in one.
+        let rounding = TimeSpan::from_ns(2);
+        let [soonest, latest] = [time - rounding, time + rounding].map(|time| model.distance(time).as_mm());
+        prop_assert!(
+            (soonest - 1e-6..=latest + 1e-6).contains(&distance),
+            "time is rounded to nanoseconds, no more: {distance} mm: {time:?} gives {found} mm"
+        );
         prop_assert!(model.distance(time + TimeSpan::from_ms(10)) >= model.distance(time));
     }
 }
