@@ -3,6 +3,7 @@
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
+use footplate_core::estimation::WayPoint;
 use footplate_core::{Command, Length, Ratio, SensorId, TrainId, TurnoutId};
 
 use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};
@@ -175,6 +176,52 @@ fn a_train_never_runs_off_the_end_of_the_track() {
         assert!(!world.train().is_off_the_track && world.train().speed_mm_per_s < 1.0);
         assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::TrackEnds { .. })));
     }
+}
+
+#[test]
+fn a_train_stays_within_its_limit_whatever_it_was_ordered_and_whatever_is_reported() {
+    for (throttle, is_deaf) in [(6, false), (10, true), (14, false), (14, true)] {
+        let mut world = ToyRailway::new(24, "D1", 300.0);
+        let mut driver = driver_of(&world, "D1", 300.0);
+        if is_deaf {
+            world.dead.extend(world.layout.sensors().map(|(sensor, _)| sensor));
+        }
+        let limit = WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(2_000.0) };
+        driver.set_limit(world.now, TRAIN, Some(limit));
+        driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
+        world.run(&mut driver, 40.0);
+        let beyond = world.beyond_mm("D1+2000mm");
+        assert!((-400.0..0.0).contains(&beyond) && world.train().speed_mm_per_s < 1.0, "{beyond} mm");
+        assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::AtLimit { .. })));
+        // Where it was turned around nobody allowed it to go.
+        driver.order(world.now, Order::Reverse { train: TRAIN, then: step(throttle) }).expect("a train");
+        let before = world.train().travelled_mm;
+        world.run(&mut driver, 20.0);
+        assert!(world.train().travelled_mm - before < 60.0, "{} mm", world.train().travelled_mm - before);
+        driver.set_limit(world.now, TRAIN, None);
+        driver.order(world.now, Order::Speed { train: TRAIN, step: step(6) }).expect("a step");
+        world.run(&mut driver, 5.0);
+        assert!(world.train().speed_mm_per_s > 1.0);
+    }
+}
+
+#[test]
+fn a_stop_beyond_the_limit_ends_at_the_limit() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    let stop = stop_at(&driver, "A1+400mm");
+    driver.set_limit(
+        world.now,
+        TRAIN,
+        Some(WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(1_100.0) }),
+    );
+    driver.order(world.now, Order::Stop(stop)).expect("a way leads there");
+    world.run(&mut driver, 20.0);
+    let given_up = |notice: &DriveNotice| {
+        matches!(notice, DriveNotice::GivenUp { why: Refusal::AtLimit { train: TRAIN }, .. })
+    };
+    assert!(world.notices.iter().any(given_up), "{:#?}", world.notices);
+    assert!((-200.0..0.0).contains(&world.beyond_mm("A1+200mm")), "{} mm", world.beyond_mm("A1+200mm"));
 }
 
 #[test]

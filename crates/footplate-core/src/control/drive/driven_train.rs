@@ -15,6 +15,7 @@ use super::outputs::Outputs;
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
+use super::turnout_guard::TRAIN_REACH;
 
 /// A command of two bytes takes this long on a line of 2400 baud with eleven bits a byte (Märklin 6050).
 pub(super) const LINE_TIME: TimeSpan = TimeSpan::from_us(9_167);
@@ -43,6 +44,10 @@ pub(super) struct DrivenTrain {
     unsent: Option<(Command, Timestamp)>,
     /// What should come next.
     pub(super) expected: Expectation,
+    /// What it shall not pass.
+    pub(super) limit: Option<WayPoint>,
+    /// From its pickup to the end that is further from it.
+    pub(super) reach: Length,
 }
 
 impl DrivenTrain {
@@ -54,6 +59,8 @@ impl DrivenTrain {
             told: SpeedStep::STAND,
             unsent: None,
             expected: Expectation::default(),
+            limit: None,
+            reach: TRAIN_REACH,
         }
     }
 
@@ -84,6 +91,7 @@ impl DrivenTrain {
     pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
         self.locator.place(now, at, uncertainty);
         self.expected.unseen = None;
+        self.limit_here(ground, now);
         self.expect_next(ground, now);
     }
 
@@ -169,6 +177,7 @@ impl DrivenTrain {
                     Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
                     None => self.locator.lose(),
                 }
+                self.limit_here(ground, now);
                 self.expect_next(ground, now);
                 if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
                     if then > SpeedStep::STAND {
@@ -227,6 +236,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.expected.unseen = None;
+        self.count_limit_from(ground, node);
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
         let Some(task) = self.task else { return };

@@ -38,8 +38,8 @@ const LONGEST_MOVE: Length = Length::from_m(100.0);
 /// Knows where the trains are, and tells them when to do what.
 #[derive(Debug, Clone)]
 pub struct Driver {
-    track: KnownTrack,
-    trains: BTreeMap<TrainId, DrivenTrain>,
+    pub(super) track: KnownTrack,
+    pub(super) trains: BTreeMap<TrainId, DrivenTrain>,
     outputs: Outputs,
     /// When each contact was last seen closed.
     closed: BTreeMap<SensorId, Timestamp>,
@@ -292,7 +292,7 @@ impl Driver {
     }
 
     /// Says of the line what the plans want of it.
-    fn wish(&mut self) {
+    pub(super) fn wish(&mut self) {
         let plans = || {
             self.trains.values().filter_map(|train| match train.task?.phase {
                 Phase::Running { plan } => plan,
@@ -306,7 +306,8 @@ impl Driver {
             .filter(|(_, time)| next.is_some_and(|plan| plan.leaves - *time <= WATCHED))
             .map(|(sensor, _)| sensor)
             .find(|sensor| triggers().any(|trigger| trigger == *sensor));
-        let hold = next.map(|plan| plan.leaves - LINE_TIME);
+        let guard = self.trains.values().filter_map(DrivenTrain::guard);
+        let hold = next.map(|plan| plan.leaves - LINE_TIME).into_iter().chain(guard).min();
         self.outputs.hold_line(hold);
         self.outputs.watch(watched);
     }

@@ -23,7 +23,7 @@ const LOST: TimeSpan = TimeSpan::from_s(10.0);
 const LOST_WITHOUT: TimeSpan = TimeSpan::from_s(40.0);
 /// What of a train is ahead of its pickup, and a little: this much of the track is left before its end.
 const BEFORE_END: Length = Length::from_mm(200.0);
-/// How often a train that is stopped for the end of the track may come nearer than that.
+/// How often a train that is stopped for the end of the track may come nearer than that, or pass its limit.
 const NEARER: Ratio = Ratio::from_percent(0.1);
 
 /// What is expected of a train, as of when something was last known.
@@ -37,6 +37,8 @@ pub(super) struct Expectation {
     pub(super) unseen: Option<SensorId>,
     /// When it has to be told to stop because the track ends, and where.
     end: Option<(Timestamp, NodeId)>,
+    /// When it has to be told to stop so that it stays within its limit.
+    limit: Option<Timestamp>,
 }
 
 impl DrivenTrain {
@@ -50,12 +52,18 @@ impl DrivenTrain {
         self.expected.due.map(|due| (due.sensor, due.time))
     }
 
-    /// Looks ahead to the next contact, and to the end of the track.
+    /// Looks ahead to the next contact, to the end of the track and to the limit.
     pub(super) fn expect_next(&mut self, ground: Ground<'_>, now: Timestamp) {
         let due = self.locator.next_contact(ground, &self.model, now);
         let end = self.end_of_track(ground, now);
+        let limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
         let unseen = self.expected.unseen;
-        self.expected = Expectation { due, since: now, overdue_said: false, unseen, end };
+        self.expected = Expectation { due, since: now, overdue_said: false, unseen, end, limit };
+    }
+
+    /// Looks at another limit, and at nothing else.
+    pub(super) fn expect_limit(&mut self, ground: Ground<'_>, now: Timestamp) {
+        self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
     }
 
     /// When a contact that does not come is overdue, and after that when the train is lost.
@@ -94,20 +102,38 @@ impl DrivenTrain {
         }
     }
 
-    /// When the train has to be told to stop so that it stays on the track. Whoever has a plan stops earlier.
+    /// When the train has to be told to stop so that it stays on the track and within its limit, whatever is reported
+    /// until then.
     pub(super) fn guard(&self) -> Option<Timestamp> {
+        [self.end_guard(), self.limit_guard()].into_iter().flatten().min()
+    }
+
+    /// Whoever has a plan stops before the end of the track.
+    fn end_guard(&self) -> Option<Timestamp> {
         let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
         let (leaves, _) = self.expected.end.filter(|_| self.told > SpeedStep::STAND && !has_plan)?;
         Some(leaves - LINE_TIME)
     }
 
-    /// Stops the train where the track ends ahead of it.
+    /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
+    fn limit_guard(&self) -> Option<Timestamp> {
+        let leaves = self.expected.limit.filter(|_| self.told > SpeedStep::STAND)?;
+        Some(leaves - LINE_TIME)
+    }
+
+    /// Stops the train where the track ends ahead of it, or what it may enter.
     pub(super) fn keep_on_track(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
-        if let (Some(at), Some((_, end))) = (self.guard(), self.expected.end)
+        let train = self.id();
+        if self.limit_guard().is_some_and(|at| at <= now) {
+            self.expected.limit = None;
+            out.say(DriveNotice::AtLimit { train });
+            self.give_up(now, Refusal::AtLimit { train }, out);
+        }
+        if let (Some(at), Some((_, end))) = (self.end_guard(), self.expected.end)
             && at <= now
         {
             self.expected.end = None;
-            let (train, name) = (self.id(), ground.layout.node_name(end).into());
+            let name = ground.layout.node_name(end).into();
             out.say(DriveNotice::TrackEnds { train, end });
             self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
         }
@@ -117,14 +143,24 @@ impl DrivenTrain {
         let located = self.located(ground, now).filter(|_| self.told > SpeedStep::STAND)?;
         let (end, way) = track_end(ground, &self.model, located.at.node)?;
         let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
+        Some((self.last_stop_before(ground, now, at)?, end))
+    }
+
+    /// The latest time at which a command to stop may leave so that the train comes to rest before a point, but for one
+    /// time in [`NEARER`]; the earliest that can still be kept where even that is too late; `None` while it does not
+    /// come so far.
+    fn last_stop_before(&self, ground: Ground<'_>, now: Timestamp, at: WayPoint) -> Option<Timestamp> {
+        if self.told == SpeedStep::STAND {
+            return None;
+        }
         let earliest = now + LINE_TIME;
         let found = command_time(earliest, |leaves| {
             let rest = self.locator.rest_if_stopped(ground, &self.model, leaves)?;
             Some((rest, self.aimed_beyond(ground, &rest, at, Aim::NotBeyond(NEARER))?))
         });
         match found {
-            CommandTime::At(leaves, _) => Some((leaves, end)),
-            CommandTime::TooLate(..) => Some((earliest, end)),
+            CommandTime::At(leaves, _) => Some(leaves),
+            CommandTime::TooLate(..) => Some(earliest),
             CommandTime::Never => None,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::calibration::motion::MotionModel;
 use crate::estimation::{Ground, WayPoint};
-use crate::ids::{NodeId, SensorId, TurnoutId};
+use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::track::{Hop, Landmark, NodeKind};
 use crate::units::Length;
 
@@ -34,10 +34,20 @@ pub(super) fn way_between(
     felt_hops(ground, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
 }
 
-/// The way once round from a node to itself, on a circuit.
+/// The way once round from a node to itself, on a circuit. Hops end at contacts: from any other node it is the way round
+/// from the next contact, if that leads over the node.
 pub(super) fn lap(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
-    let (_, [_, end]) = felt_hops(ground, model, node).find(|(hop, _)| hop.to == node)?;
-    (end > Length::ZERO).then_some(end)
+    let contact = match ground.layout.sensor_at(node) {
+        Some(_) => node,
+        None => ground.hops_ahead(node).next()?.to,
+    };
+    let mut over_it = contact == node;
+    let (_, [_, end]) = felt_hops(ground, model, contact).find(|(hop, _)| {
+        let starts_at = |edge: &EdgeId| ground.layout.edge(*edge).is_some_and(|edge| edge.from == node);
+        over_it |= hop.edges.iter().any(starts_at);
+        hop.to == contact
+    })?;
+    (over_it && end > Length::ZERO).then_some(end)
 }
 
 /// The same point counted from another node, which the train came to since: ahead of the one before, and once round if

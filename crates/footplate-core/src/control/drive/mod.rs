@@ -12,6 +12,7 @@ mod driver;
 mod expectation;
 mod felt_way;
 mod known_track;
+mod limit;
 mod notice;
 mod order;
 mod outputs;

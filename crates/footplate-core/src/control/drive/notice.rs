@@ -85,6 +85,11 @@ pub enum DriveNotice {
         /// Where.
         end: NodeId,
     },
+    /// What a train may enter ends ahead of it. It has been told to stop.
+    AtLimit {
+        /// The train.
+        train: TrainId,
+    },
     /// Nobody knows any more where a train is. It has been told to stop.
     Lost {
         /// The train.

@@ -88,6 +88,11 @@ pub enum Refusal {
         /// Where.
         end: String,
     },
+    /// The train would have passed its limit, and has been stopped for that.
+    AtLimit {
+        /// The train.
+        train: TrainId,
+    },
     /// The train still moves, and this is for a train at rest.
     StillMoves {
         /// The train.
@@ -172,6 +177,9 @@ impl fmt::Display for Refusal {
             ),
             Self::TrackEnds { train, end } => {
                 write!(f, "the track ends at `{end}` ahead of train {train}, which was stopped for that")
+            }
+            Self::AtLimit { train } => {
+                write!(f, "train {train} was stopped: it does not hold the track further ahead")
             }
             Self::StillMoves { train } => {
                 write!(f, "train {train} still moves: wait until it is at rest")

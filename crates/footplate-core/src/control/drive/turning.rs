@@ -11,7 +11,8 @@ const SHOE: Length = Length::from_mm(35.0);
 const SHOE_DOUBT: Length = Length::from_mm(12.0);
 
 /// The place of a train at rest after it turned around on the spot, and one standard deviation of it. Counted from the
-/// contact that was next before; `None` where the way ahead is not known, or leads back another way.
+/// node behind it, whatever is there: how turnouts further away lie makes no difference then. `None` where the way back
+/// is not known, or does not lead to where the train stands.
 pub(super) fn turned(
     ground: Ground<'_>,
     model: &MotionModel,
@@ -20,17 +21,7 @@ pub(super) fn turned(
     let place = place_of(ground, model, located.at)?;
     let back = ground.layout.reversed(place)?;
     let leading = ground.layout.advance(back, SHOE, ground.turnouts).ok()?;
-    // The first contact or track end ahead, as it was, is the last one behind.
-    let mut end = Length::ZERO;
-    let behind = ground
-        .hops_ahead(located.at.node)
-        .take(ground.layout.nodes().len())
-        .find(|hop| {
-            end += model.length(ground.sections, hop)[0];
-            end > located.at.way
-        })?
-        .to
-        .reverse();
+    let behind = ground.layout.edge(leading.edge)?.from;
     let way = way_to(ground, model, behind, leading)?;
     let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DOUBT.as_m()));
     Some((WayPoint { node: behind, way }, uncertainty))

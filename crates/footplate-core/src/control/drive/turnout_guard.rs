@@ -13,7 +13,7 @@ use super::felt_way::nodes_of_turnout;
 
 /// From the pickup to either end of a train, which nobody has measured: a long locomotive of the gauge, or a short one
 /// with a wagon.
-const TRAIN_REACH: Length = Length::from_mm(250.0);
+pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 /// A train is within this many standard deviations of where it is believed to be, but for one time in 15 000.
 const CERTAIN: f64 = 4.0;
 /// From the order until the points lie: a poll and the command on the line, and the solenoid.
@@ -35,7 +35,7 @@ pub(super) fn train_on(
 
 fn is_near(ground: Ground<'_>, train: &DrivenTrain, located: &Located, nodes: [NodeId; 2]) -> bool {
     let Some(place) = place_of(ground, &train.model, located.at) else { return false };
-    let reach = TRAIN_REACH + located.uncertainty * CERTAIN;
+    let reach = train.reach + located.uncertainty * CERTAIN;
     let ahead = reach + located.speed * THROWING;
     let within = |from: Position, to: Position, limit: Length| {
         ground.layout.distance_ahead(from, to, ground.turnouts).is_some_and(|way| way <= limit)

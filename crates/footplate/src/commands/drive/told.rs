@@ -104,6 +104,9 @@ impl Tongue<'_> {
                 let end = self.driver.layout().node_name(*end);
                 format!("the track ends at {end} ahead of train {train}: told to stop")
             }
+            DriveNotice::AtLimit { train } => {
+                format!("train {train} does not hold the track further ahead: told to stop")
+            }
             DriveNotice::Lost { train } => {
                 format!("train {train} is lost: told to stop; put it right, then let it pass a contact")
             }

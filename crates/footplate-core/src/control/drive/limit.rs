@@ -1,0 +1,77 @@
+//! What a train shall not pass, whatever it was ordered, and places as whoever sets limits needs them.
+
+use crate::estimation::{Ground, WayPoint, place_of, way_to};
+use crate::ids::{NodeId, TrainId};
+use crate::time::Timestamp;
+use crate::track::Position;
+use crate::units::Length;
+
+use super::driven_train::DrivenTrain;
+use super::driver::Driver;
+use super::felt_way::counted_from;
+
+impl Driver {
+    /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is told to stop in time, by
+    /// the clock if nothing is heard of it, so that it comes to rest before but for one time in a thousand. Whoever plans
+    /// a stop plans it before the limit. A train that is put elsewhere or turned around may not move until it is given
+    /// another limit; `None` lifts it.
+    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+        let ground = self.track.ground();
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.set_limit(ground, now, limit);
+        }
+        self.wish();
+    }
+
+    /// How far a train reaches from its pickup, to the end that is further from it. Unless it is said, that of a long
+    /// locomotive (250 mm).
+    pub fn set_reach(&mut self, train: TrainId, reach: Length) {
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.reach = reach.max(Length::ZERO);
+        }
+    }
+
+    /// The place of a train on the layout; `None` if nobody knows it.
+    #[must_use]
+    pub fn position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
+        self.position_at(train, self.locate(train, now)?.at)
+    }
+
+    /// The place on the layout of a point of a train's way as the turnouts lie.
+    #[must_use]
+    pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
+        place_of(self.track.ground(), &self.trains.get(&train)?.model, at)
+    }
+
+    /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads
+    /// there.
+    #[must_use]
+    pub fn way_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<WayPoint> {
+        let way = way_to(self.track.ground(), &self.trains.get(&train)?.model, from, to)?;
+        Some(WayPoint { node: from, way })
+    }
+}
+
+impl DrivenTrain {
+    /// Sets another limit, or none.
+    pub(super) fn set_limit(&mut self, ground: Ground<'_>, now: Timestamp, limit: Option<WayPoint>) {
+        self.limit = limit;
+        self.expect_limit(ground, now);
+    }
+
+    /// The train was put somewhere or turned around: whatever it was allowed before, it was not allowed from here.
+    pub(super) fn limit_here(&mut self, ground: Ground<'_>, now: Timestamp) {
+        if self.limit.is_some() {
+            self.limit = self.located(ground, now).map(|located| located.at);
+        }
+    }
+
+    /// The train has come to a contact. Where no way leads from there to the limit it is somewhere else than it should
+    /// be, and the limit is here.
+    pub(super) fn count_limit_from(&mut self, ground: Ground<'_>, node: NodeId) {
+        if let Some(limit) = self.limit {
+            let counted = counted_from(ground, &self.model, limit, node);
+            self.limit = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
+        }
+    }
+}
