@@ -13,7 +13,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
 /// Contacts close a little earlier or later from one passage to the next (m).
-const CONTACT_SCATTER_M: f64 = 0.0015;
+pub(super) const CONTACT_SCATTER_M: f64 = 0.0015;
 /// Nobody knows where a train is that is lost, to this far (m).
 const ANYWHERE_M: f64 = 30.0;
 /// A contact that is this many standard deviations behind the train has been missed.
@@ -21,7 +21,7 @@ const MISSED_BEYOND: f64 = 4.0;
 /// A report this unlikely (ln of a density in 1/s) is of another train, or of none.
 const LEAST_LIKELIHOOD: f64 = -40.0;
 /// A moment (s) in which a train at rest could have come a little further than is known.
-const LEAST_SPEED_M_PER_S: f64 = 0.005;
+pub(super) const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
 /// A place on the way of a train, counted in lengths as the train feels them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,6 +155,13 @@ impl Locator {
             EventKind::Reverse { train } if train == self.train => self.lose(),
             _ => {}
         }
+    }
+
+    /// The node from which its way is counted, where it is from there (m) and how fast it runs (m/s); `None` while it is
+    /// lost.
+    pub(super) fn motion_at(&self, model: &MotionModel, at: Timestamp) -> Option<(NodeId, Guess, f64)> {
+        let time = self.seconds(at);
+        Some((self.node?, self.following.place(model, time), self.following.speed(model, time).mean))
     }
 
     /// The way to a contact that fits best, and how far the train was short of it when it reported.
@@ -333,7 +340,7 @@ fn between_contacts(ground: Ground<'_>) -> f64 {
 }
 
 /// ln of the density of a normal distribution at zero.
-fn log_density(of: Guess) -> f64 {
+pub(super) fn log_density(of: Guess) -> f64 {
     let variance = of.variance.max(f64::MIN_POSITIVE);
     -0.5 * (of.mean * of.mean / variance + libm::log(2.0 * core::f64::consts::PI * variance))
 }

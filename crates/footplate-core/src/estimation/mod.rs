@@ -10,6 +10,7 @@
 //! where the train is at any moment, and where it would come to rest if told to stop at another.
 
 mod belief;
+mod claim;
 mod contact_scatter;
 mod felt_way;
 mod forecast;

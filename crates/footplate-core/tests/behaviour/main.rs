@@ -1,5 +1,6 @@
 //! What core promises, a file a promise.
 
+mod attribution;
 mod counted_run;
 mod draw;
 mod driving;

@@ -145,6 +145,8 @@ pub(crate) struct ToyRailway {
     pub(crate) dead: BTreeSet<SensorId>,
     /// Turnouts that do not move.
     pub(crate) stuck: BTreeSet<TurnoutId>,
+    /// Which train came to which contact, and when.
+    pub(crate) passes: Vec<(Timestamp, SensorId, TrainId)>,
     queue: VecDeque<Command>,
     line_free: Timestamp,
     closed: BTreeSet<SensorId>,
@@ -154,11 +156,17 @@ pub(crate) struct ToyRailway {
 impl ToyRailway {
     /// One train, `mm` past a node.
     pub(crate) fn new(train: u16, node: &str, mm: f64) -> Self {
-        let layout = layout();
-        let turnouts = straight();
-        let landmark = layout.landmark(&format!("{node}{mm:+}mm")).expect("a place");
-        let at = layout.locate(landmark, &turnouts).expect("a place");
-        let train = ToyTrain {
+        let mut railway = Self::empty();
+        railway.put(train, node, mm);
+        railway
+    }
+
+    /// One more train, or the same one elsewhere, `mm` past a node.
+    pub(crate) fn put(&mut self, train: u16, node: &str, mm: f64) {
+        let landmark = self.layout.landmark(&format!("{node}{mm:+}mm")).expect("a place");
+        let at = self.layout.locate(landmark, &self.turnouts).expect("a place");
+        self.trains.retain(|known| known.id != TrainId(train));
+        self.trains.push(ToyTrain {
             id: TrainId(train),
             at,
             speed_mm_per_s: 0.0,
@@ -166,17 +174,28 @@ impl ToyRailway {
             obeys: VecDeque::new(),
             travelled_mm: 0.0,
             is_off_the_track: false,
-        };
+        });
+    }
+
+    /// A contact closes by itself.
+    pub(crate) fn close(&mut self, sensor: SensorId) {
+        self.closed.insert(sensor);
+    }
+
+    fn empty() -> Self {
+        let layout = layout();
+        let turnouts = straight();
         Self {
             layout,
             turnouts,
             now: Timestamp::ZERO,
-            trains: vec![train],
+            trains: Vec::new(),
             events: Vec::new(),
             notices: Vec::new(),
             commands: Vec::new(),
             dead: BTreeSet::new(),
             stuck: BTreeSet::new(),
+            passes: Vec::new(),
             queue: VecDeque::new(),
             line_free: Timestamp::ZERO,
             closed: BTreeSet::new(),
@@ -221,7 +240,9 @@ impl ToyRailway {
         let mut events = Vec::new();
         let mut passed = Vec::new();
         for train in &mut self.trains {
-            passed.extend(train.tick(self.now, &self.layout, &self.turnouts));
+            let sensor = train.tick(self.now, &self.layout, &self.turnouts);
+            passed.extend(sensor);
+            self.passes.extend(sensor.map(|sensor| (self.now, sensor, train.id)));
         }
         self.closed.extend(passed.into_iter().filter(|sensor| !self.dead.contains(sensor)));
         if self.line_free <= self.now
@@ -330,6 +351,18 @@ pub(crate) fn known_model(train: u16) -> MotionModel {
     }
     fit.refit(&SectionIndex::of(&world.layout));
     fit.model().clone()
+}
+
+/// One more train for a driver, which moves as all toy trains do.
+pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, place: Option<(&str, f64)>) {
+    let mut numbers = driver.model(TrainId(24)).expect("the first train").numbers();
+    numbers.train = TrainId(train);
+    driver.add_train(MotionModel::from_numbers(&numbers).expect("the same numbers"));
+    if let Some((node, mm)) = place {
+        let node = world.layout.node_named(node).expect("a node");
+        let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(mm) };
+        driver.place(world.now, TrainId(train), at, Length::from_mm(2.0));
+    }
 }
 
 /// A driver of train 24, which is known and of which is known where it stands.

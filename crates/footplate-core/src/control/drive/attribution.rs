@@ -1,87 +1,298 @@
-//! Which train closed a contact.
+//! Which train closed a contact: the likeliest of everything that may have, if it is likely enough.
+//!
+//! Each explanation has a density in time (1/s) with its prior chance in it; that of a contact closing by itself comes
+//! from the contact's own conduct. The share of a train in the sum of all is the probability that it was this train. A
+//! train is believed from [`SURE`] on. Below that nobody's estimate is touched. What may have been otherwise is kept as
+//! [`Branch`]es, and the next closures decide between them: a train that was told apart wrongly is taken back.
 
+use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
-use crate::estimation::Ground;
-use crate::ids::{SensorId, TrainId, TurnoutId};
-use crate::latency::ContactWindow;
-use crate::time::Timestamp;
-use crate::track::{Leg, TurnoutStates};
+use crate::estimation::{Ground, Locator, PassedContact};
+use crate::event::Event;
+use crate::ids::{SensorId, TrainId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::TurnoutStates;
 
+use super::contact_conduct::ContactConduct;
 use super::driven_train::DrivenTrain;
+use super::hypotheses::{Closure, Explanation, Hypothesis, hypotheses};
 
-/// Hops ahead of a train within which a turnout may have been taken the other way: the one it is on and the next.
-const HOPS_LOOKED_AT: usize = 2;
+/// A train closed a contact if that is at least this probable.
+const SURE: f64 = 0.9;
+/// What was believed from the first is not looked at again once it is this probable.
+const CERTAIN: f64 = 0.9999;
+/// What is less probable is not kept in mind.
+const NEGLIGIBLE: f64 = 0.01;
+/// A density (ln 1/s) that is less than this is unusual: a contact was missed, a turnout failed, a train has changed.
+const UNUSUAL: f64 = -3.0;
+/// A closure that is still not explained after this long never will be: two contacts further even at a crawl.
+const WAITS: TimeSpan = TimeSpan::from_s(15.0);
 
-/// What explains a report best.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Explanation {
-    /// This train, which was expected somewhere there, or of which nobody knew where it was.
-    Train(TrainId),
-    /// This train, if the turnout lay otherwise than it was told.
-    Turnout { train: TrainId, turnout: TurnoutId, leg: Leg },
-    /// This train, which should have been reported elsewhere long ago.
-    Strayed(TrainId),
+/// What is made of a closure.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Verdict {
+    /// It was this train.
+    Explained(Explanation),
+    /// It may have been one of two, or one and nothing; what comes next decides.
+    Ambiguous { likeliest: TrainId, or: Option<TrainId> },
+    /// Nothing that trains can do.
+    Unexplained,
+    /// The same, of a contact that is not believed from now on.
+    Stuck,
+    /// Of a contact that is not believed.
+    Ignored,
 }
 
-/// The train that most likely closed a contact: of those whose place is known the one that is likeliest there; else
-/// one that took the other leg of a turnout; else the one that runs and has been lost, or is overdue, if it is the
-/// only one.
-pub(super) fn explain(
+/// An earlier closure in doubt that has been decided.
+#[derive(Debug, Clone)]
+pub(super) enum Decided {
+    /// It was otherwise than is believed.
+    Otherwise(Box<Branch>),
+    /// No train did it, as is believed.
+    Nothing(Closure),
+}
+
+/// How things are with one train if they are not as is believed.
+#[derive(Debug, Clone)]
+pub(super) struct Branch {
+    pub(super) closure: Closure,
+    pub(super) train: TrainId,
+    /// How it passed the contact, and what had been expected; `None` if it did not.
+    pub(super) passed: Option<(Explanation, PassedContact)>,
+    /// As it was followed from there since.
+    pub(super) locator: Locator,
+    /// A contact that should have reported it before.
+    pub(super) unseen: Option<SensorId>,
+    /// Its share before what came after.
+    share: f64,
+}
+
+/// A closure of which nobody is sure.
+#[derive(Debug, Clone)]
+struct Doubt {
+    closure: Closure,
+    /// Whether a train is believed to have done it.
+    is_believed: bool,
+    /// The share of what is believed.
+    share: f64,
+    otherwise: Vec<Branch>,
+    until: Timestamp,
+}
+
+/// Judges closures one after the other.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Attribution {
+    conduct: ContactConduct,
+    doubt: Option<Doubt>,
+}
+
+impl Attribution {
+    /// A contact that was stuck and is believed again; until `None`.
+    pub(super) fn next_reformed(&mut self, now: Timestamp) -> Option<SensorId> {
+        self.conduct.next_reformed(now)
+    }
+
+    /// A command to a train has left: those that it may be hear it, too.
+    pub(super) fn command_left(
+        &mut self,
+        trains: &BTreeMap<TrainId, DrivenTrain>,
+        ground: Ground<'_>,
+        event: &Event,
+    ) {
+        let branches = self.doubt.iter_mut().flat_map(|doubt| &mut doubt.otherwise);
+        for branch in branches {
+            if let Some(train) = trains.get(&branch.train) {
+                branch.locator.handle_command(ground, &train.model, event);
+            }
+        }
+    }
+
+    /// Looks whether one more closure decides what an earlier one was. To be asked before it is judged itself.
+    pub(super) fn decide(
+        &mut self,
+        trains: &BTreeMap<TrainId, DrivenTrain>,
+        ground: Ground<'_>,
+        now: Timestamp,
+        closure: Closure,
+    ) -> Option<Decided> {
+        let mut doubt = self.doubt.take()?;
+        if now >= doubt.until {
+            return (!doubt.is_believed).then_some(Decided::Nothing(doubt.closure));
+        }
+        let background = self.conduct.log_rate(closure.sensor, now);
+        // How well the new closure is explained, if the earlier one was so.
+        let likely = |trains: &BTreeMap<TrainId, DrivenTrain>, ground: Ground<'_>| {
+            let found = hypotheses(trains, ground, now, closure);
+            libm::exp(background) + found.iter().map(|one| libm::exp(one.log_density)).sum::<f64>()
+        };
+        let believed = doubt.share * likely(trains, ground);
+        let weight = |branch: &Branch| {
+            let mut so = trains.clone();
+            if let Some(train) = so.get_mut(&branch.train) {
+                train.locator = branch.locator.clone();
+                train.expected.unseen = branch.unseen;
+            }
+            let explanation = branch.passed.as_ref().map(|(explanation, _)| explanation);
+            let turnouts = explanation.map(|explanation| turnouts_after(explanation, ground));
+            let turnouts = turnouts.as_ref().unwrap_or(ground.turnouts);
+            branch.share * likely(&so, Ground { turnouts, ..ground })
+        };
+        let weights: Vec<f64> = doubt.otherwise.iter().map(weight).collect();
+        let all = believed + weights.iter().sum::<f64>();
+        if !doubt.is_believed && believed >= SURE * all {
+            self.conduct.note_strange(doubt.closure.sensor, doubt.closure.window.until);
+            return Some(Decided::Nothing(doubt.closure));
+        }
+        if doubt.is_believed && believed >= CERTAIN * all {
+            return None;
+        }
+        if let Some(place) = weights.iter().position(|weight| *weight >= SURE * all) {
+            let branch = doubt.otherwise.into_iter().nth(place)?;
+            match branch.passed {
+                Some(_) => self.conduct.note_good(doubt.closure.sensor, now),
+                None => {
+                    self.conduct.note_strange(doubt.closure.sensor, doubt.closure.window.until);
+                }
+            }
+            return Some(Decided::Otherwise(Box::new(branch)));
+        }
+        doubt.share = believed / all;
+        for (branch, weight) in doubt.otherwise.iter_mut().zip(weights) {
+            branch.share = weight / all;
+        }
+        self.doubt = Some(doubt);
+        None
+    }
+
+    /// Judges a closure.
+    pub(super) fn judge(
+        &mut self,
+        trains: &BTreeMap<TrainId, DrivenTrain>,
+        ground: Ground<'_>,
+        now: Timestamp,
+        closure: Closure,
+    ) -> Verdict {
+        let found = hypotheses(trains, ground, now, closure);
+        let nothing = libm::exp(self.conduct.log_rate(closure.sensor, now));
+        let density = |one: &Hypothesis| libm::exp(one.log_density);
+        let all = nothing + found.iter().map(density).sum::<f64>();
+        let mut of_trains: Vec<(TrainId, f64)> = Vec::new();
+        for one in &found {
+            let train = one.explanation.train();
+            match of_trains.iter_mut().find(|(known, _)| *known == train) {
+                Some((_, share)) => *share += density(one) / all,
+                None => of_trains.push((train, density(one) / all)),
+            }
+        }
+        of_trains.sort_by(|(_, one), (_, other)| other.total_cmp(one));
+        let best = of_trains.first().copied();
+        if let Some((train, _)) = best.filter(|(_, share)| *share >= SURE) {
+            self.conduct.note_good(closure.sensor, now);
+            if self.conduct.is_stuck(closure.sensor) {
+                return Verdict::Ignored;
+            }
+            let own = found.iter().filter(|one| one.explanation.train() == train);
+            let likeliest = own.max_by(|one, other| one.log_density.total_cmp(&other.log_density));
+            if let Some(one) = likeliest {
+                if one.log_density < UNUSUAL {
+                    if self.doubt.is_some() {
+                        // What came before may explain it better, once that is decided.
+                        return Verdict::Ambiguous { likeliest: train, or: None };
+                    }
+                    self.keep_in_mind(trains, now, closure, one, nothing / all);
+                }
+                return Verdict::Explained(one.explanation);
+            }
+        }
+        let Some((likeliest, _)) = best.filter(|_| nothing < SURE * all) else {
+            return self.strange(closure);
+        };
+        if self.conduct.is_stuck(closure.sensor) {
+            self.conduct.note_strange(closure.sensor, now);
+            return Verdict::Ignored;
+        }
+        let otherwise = found
+            .iter()
+            .filter(|one| density(one) >= NEGLIGIBLE * all)
+            .filter_map(|one| branch(trains, ground, closure, one, density(one) / all));
+        // One doubt at a time: an older one that this closure did not decide is given up.
+        self.doubt = Some(Doubt {
+            closure,
+            is_believed: false,
+            share: nothing / all,
+            otherwise: otherwise.collect(),
+            until: now + WAITS,
+        });
+        let second = of_trains.get(1).filter(|(_, share)| *share >= nothing / all);
+        Verdict::Ambiguous { likeliest, or: second.map(|(train, _)| *train) }
+    }
+
+    /// What is believed is unusual enough to remember how it would be if nobody had passed the contact.
+    fn keep_in_mind(
+        &mut self,
+        trains: &BTreeMap<TrainId, DrivenTrain>,
+        now: Timestamp,
+        closure: Closure,
+        believed: &Hypothesis,
+        nothing: f64,
+    ) {
+        let Some(train) = trains.get(&believed.explanation.train()) else { return };
+        let not_passed = Branch {
+            closure,
+            train: train.id(),
+            passed: None,
+            locator: train.locator.clone(),
+            unseen: train.unseen(),
+            share: nothing,
+        };
+        self.doubt = Some(Doubt {
+            closure,
+            is_believed: true,
+            share: 1.0 - nothing,
+            otherwise: alloc::vec![not_passed],
+            until: now + WAITS,
+        });
+    }
+
+    fn strange(&mut self, closure: Closure) -> Verdict {
+        let was_stuck = self.conduct.is_stuck(closure.sensor);
+        let is_news = self.conduct.note_strange(closure.sensor, closure.window.until);
+        match (was_stuck, is_news) {
+            (true, _) => Verdict::Ignored,
+            (false, true) => Verdict::Stuck,
+            (false, false) => Verdict::Unexplained,
+        }
+    }
+}
+
+/// A train as it goes on from a contact, if it passed it.
+fn branch(
     trains: &BTreeMap<TrainId, DrivenTrain>,
     ground: Ground<'_>,
-    now: Timestamp,
-    sensor: SensorId,
-    window: ContactWindow,
-) -> Option<Explanation> {
-    let located = || trains.values().filter(|train| train.located(ground, now).is_some());
-    let likelihood = |train: &DrivenTrain, ground: Ground<'_>| {
-        train.locator.likelihood(ground, &train.model, sensor, window)
-    };
-    let likeliest = located()
-        .filter_map(|train| Some((train.id(), likelihood(train, ground)?)))
-        .max_by(|(_, one), (_, other)| one.total_cmp(other));
-    if let Some((train, _)) = likeliest {
-        return Some(Explanation::Train(train));
+    closure: Closure,
+    hypothesis: &Hypothesis,
+    share: f64,
+) -> Option<Branch> {
+    let explanation = hypothesis.explanation;
+    let train = trains.get(&explanation.train())?;
+    let turnouts = turnouts_after(&explanation, ground);
+    let mut locator = train.locator.clone();
+    if matches!(explanation, Explanation::Strayed(_)) {
+        locator.lose();
     }
-    let strayed = located().filter(|train| train.may_move(ground, now)).find_map(|train| {
-        other_legs(train, ground, now).find_map(|(turnout, leg)| {
-            let mut turnouts: TurnoutStates = ground.turnouts.clone();
-            turnouts.set(turnout, leg);
-            likelihood(train, Ground { turnouts: &turnouts, ..ground })?;
-            Some(Explanation::Turnout { train: train.id(), turnout, leg })
-        })
-    });
-    if strayed.is_some() {
-        return strayed;
-    }
-    let only = |trains: &mut dyn Iterator<Item = TrainId>| {
-        let first = trains.next()?;
-        trains.next().is_none().then_some(first)
-    };
-    let mut lost = trains
-        .values()
-        .filter(|train| train.located(ground, now).is_none() && train.may_move(ground, now))
-        .map(DrivenTrain::id);
-    if let Some(train) = only(&mut lost) {
-        return Some(Explanation::Train(train));
-    }
-    let mut overdue = located().filter(|train| train.unseen().is_some()).map(DrivenTrain::id);
-    only(&mut overdue).map(Explanation::Strayed)
+    let ground = Ground { turnouts: &turnouts, ..ground };
+    let passed = locator.pass(ground, &train.model, closure.sensor, closure.window);
+    let passed = Some((explanation, passed));
+    Some(Branch { closure, train: train.id(), passed, locator, unseen: None, share })
 }
 
-/// The turnouts that a train meets at their toes before long, with the leg for which they are not believed to lie.
-fn other_legs<'g>(
-    train: &DrivenTrain,
-    ground: Ground<'g>,
-    now: Timestamp,
-) -> impl Iterator<Item = (TurnoutId, Leg)> + use<'g> {
-    let node = train.located(ground, now).map(|located| located.at.node);
-    node.into_iter()
-        .flat_map(move |node| ground.hops_ahead(node).take(HOPS_LOOKED_AT))
-        .flat_map(|hop| hop.needs.iter().filter(|need| need.facing))
-        .map(|need| {
-            let other = if need.leg.is_curved() { Leg::Straight } else { Leg::Curved };
-            (need.turnout, other)
-        })
+/// How the turnouts lie if an explanation is true.
+fn turnouts_after(explanation: &Explanation, ground: Ground<'_>) -> TurnoutStates {
+    let mut turnouts = ground.turnouts.clone();
+    if let Explanation::Turnout { turnout, leg, .. } = explanation {
+        turnouts.set(*turnout, *leg);
+    }
+    turnouts
 }

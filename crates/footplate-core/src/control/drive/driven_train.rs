@@ -90,7 +90,7 @@ impl DrivenTrain {
     /// A person says where it is.
     pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
         self.locator.place(now, at, uncertainty);
-        self.expected.unseen = None;
+        self.seen();
         self.limit_here(ground, now);
         self.expect_next(ground, now);
     }
@@ -164,7 +164,7 @@ impl DrivenTrain {
                 } else if waits_for.is_none() {
                     self.told = step;
                 }
-                self.expect_next(ground, now);
+                self.expect_on(ground, now);
                 self.step_left(ground, now, step, out);
             }
             EventKind::Reverse { .. } => {
@@ -235,7 +235,7 @@ impl DrivenTrain {
         passed: PassedContact,
         out: &mut Outputs,
     ) {
-        self.expected.unseen = None;
+        self.seen();
         self.count_limit_from(ground, node);
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
@@ -283,7 +283,7 @@ impl DrivenTrain {
         if let Some(task) = self.task {
             self.go_on(ground, now, task, out);
         }
-        self.doubt(now, out);
+        self.doubt(ground, now, out);
     }
 
     fn go_on(&mut self, ground: Ground<'_>, now: Timestamp, task: Task, out: &mut Outputs) {

@@ -13,9 +13,10 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
 use crate::units::Length;
 
-use super::attribution::{Explanation, explain};
+use super::attribution::{Attribution, Branch, Decided, Verdict};
 use super::driven_train::{DrivenTrain, LINE_TIME};
 use super::felt_way::landmark_at;
+use super::hypotheses::{Closure, Explanation};
 use super::known_track::KnownTrack;
 use super::notice::DriveNotice;
 use super::order::{Aim, Order, OrderId, StopOrder};
@@ -45,6 +46,7 @@ pub struct Driver {
     closed: BTreeMap<SensorId, Timestamp>,
     /// Turnouts that were asked for and have not been told yet, by which order.
     throwing: Vec<(TurnoutId, OrderId)>,
+    attribution: Attribution,
     orders: u32,
 }
 
@@ -58,6 +60,7 @@ impl Driver {
             outputs: Outputs::default(),
             closed: BTreeMap::new(),
             throwing: Vec::new(),
+            attribution: Attribution::default(),
             orders: 0,
         }
     }
@@ -261,33 +264,76 @@ impl Driver {
         if before.is_some_and(|before| time - before <= HELD.max(interval)) {
             return;
         }
-        let ground = self.track.ground();
-        let explained = ground
-            .node_of(sensor)
-            .and_then(|node| Some((node, explain(&self.trains, ground, now, sensor, window)?)));
-        let Some((node, explanation)) = explained else {
-            self.outputs.say(DriveNotice::Unexplained { sensor, time });
-            return;
-        };
-        let id = match explanation {
-            Explanation::Train(train) | Explanation::Strayed(train) => train,
-            Explanation::Turnout { train, turnout, leg } => {
-                self.track.turnouts.set(turnout, leg);
-                let curved = leg.is_curved();
-                self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
-                train
+        while let Some(sensor) = self.attribution.next_reformed(now) {
+            self.outputs.say(DriveNotice::ContactBehaves { sensor });
+        }
+        let closure = Closure { sensor, window };
+        match self.attribution.decide(&self.trains, self.track.ground(), now, closure) {
+            Some(Decided::Otherwise(branch)) => self.take_back(now, *branch),
+            Some(Decided::Nothing(closure)) => {
+                let time = closure.window.until;
+                self.outputs.say(DriveNotice::Unexplained { sensor: closure.sensor, time });
             }
-        };
+            None => {}
+        }
+        match self.attribution.judge(&self.trains, self.track.ground(), now, closure) {
+            Verdict::Explained(explanation) => self.passed(now, closure, explanation),
+            Verdict::Ambiguous { likeliest, or } => {
+                self.outputs.say(DriveNotice::Ambiguous { sensor, time, likeliest, or });
+            }
+            Verdict::Unexplained => self.outputs.say(DriveNotice::Unexplained { sensor, time }),
+            Verdict::Stuck => self.outputs.say(DriveNotice::ContactStuck { sensor }),
+            Verdict::Ignored => {}
+        }
+    }
+
+    /// A train passed a contact just now.
+    fn passed(&mut self, now: Timestamp, closure: Closure, explanation: Explanation) {
+        self.believe(explanation);
         let ground = self.track.ground();
-        if let Some(train) = self.trains.get_mut(&id) {
+        if let (Some(train), Some(node)) =
+            (self.trains.get_mut(&explanation.train()), ground.node_of(closure.sensor))
+        {
             if matches!(explanation, Explanation::Strayed(_)) {
                 train.locator.lose();
             }
-            let passed = train.locator.pass(ground, &train.model, sensor, window);
+            let passed = train.locator.pass(ground, &train.model, closure.sensor, closure.window);
             train.passed(ground, now, node, passed, &mut self.outputs);
         }
         if matches!(explanation, Explanation::Turnout { .. }) {
             self.ways_changed(now);
+        }
+    }
+
+    /// A train passed a contact a while ago, or did not, as has turned out.
+    fn take_back(&mut self, now: Timestamp, branch: Branch) {
+        let Branch { closure: Closure { sensor, window }, train, passed, locator, unseen, .. } = branch;
+        if let Some((explanation, _)) = passed {
+            self.believe(explanation);
+        } else {
+            self.outputs.say(DriveNotice::Unexplained { sensor, time: window.until });
+        }
+        let ground = self.track.ground();
+        let Some(train) = self.trains.get_mut(&train) else { return };
+        train.locator = locator;
+        match (passed, ground.node_of(sensor)) {
+            (Some((_, passed)), Some(node)) => train.passed(ground, now, node, passed, &mut self.outputs),
+            _ => {
+                train.expected.unseen = unseen;
+                train.way_changed(ground, now, &mut self.outputs);
+            }
+        }
+        if matches!(passed, Some((Explanation::Turnout { .. }, _))) {
+            self.ways_changed(now);
+        }
+    }
+
+    /// Takes over what a train showed of a turnout.
+    fn believe(&mut self, explanation: Explanation) {
+        if let Explanation::Turnout { train, turnout, leg } = explanation {
+            self.track.turnouts.set(turnout, leg);
+            let curved = leg.is_curved();
+            self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
         }
     }
 
@@ -321,6 +367,7 @@ impl Machine for Driver {
         match event.kind {
             EventKind::Sensor(report) => self.report(now, event.time, report),
             EventKind::Speed { train, .. } | EventKind::Reverse { train } => {
+                self.attribution.command_left(&self.trains, ground, event);
                 if let Some(train) = self.trains.get_mut(&train) {
                     train.command_left(ground, now, event, &mut self.outputs);
                 }

@@ -16,7 +16,10 @@ use super::task::Phase;
 
 /// A contact is overdue this long after the last of 99.7 % of cases.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
-/// And the train is lost when at least this long has passed, or twice the way there: contacts are missed now and then.
+/// Contacts that stay silent in a row until the train is lost: two are missed one after the other once in 100 000 times,
+/// and trains are stuck, derailed or lifted ten times as often.
+const MOST_SILENT: u8 = 2;
+/// And however far the next one is, when at least this long has passed, or twice the way there.
 const LOST: TimeSpan = TimeSpan::from_s(10.0);
 /// Where nobody knows which contact comes next, it is lost after this long: the longest way of the known tracks between
 /// two contacts, 1.5 m, at a crawl.
@@ -33,8 +36,12 @@ pub(super) struct Expectation {
     pub(super) due: Option<DueContact>,
     since: Timestamp,
     overdue_said: bool,
+    /// Contacts in a row that should have reported the train.
+    silent: u8,
     /// A contact that should have reported it, and nothing has reported it since.
     pub(super) unseen: Option<SensorId>,
+    /// When it is lost if nothing reports it until then; only once a contact is overdue.
+    lost_by: Option<Timestamp>,
     /// When it has to be told to stop because the track ends, and where.
     end: Option<(Timestamp, NodeId)>,
     /// When it has to be told to stop so that it stays within its limit.
@@ -57,13 +64,37 @@ impl DrivenTrain {
         let due = self.locator.next_contact(ground, &self.model, now);
         let end = self.end_of_track(ground, now);
         let limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
-        let unseen = self.expected.unseen;
-        self.expected = Expectation { due, since: now, overdue_said: false, unseen, end, limit };
+        // What was missed is not forgotten because something was commanded.
+        self.expected = Expectation { due, since: now, overdue_said: false, end, limit, ..self.expected };
     }
 
     /// Looks at another limit, and at nothing else.
     pub(super) fn expect_limit(&mut self, ground: Ground<'_>, now: Timestamp) {
         self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
+    }
+
+    /// The same after a command to it. A contact that it should have come by already stays due: who is told something
+    /// else every other second must not be lost for that without anybody noticing.
+    pub(super) fn expect_on(&mut self, ground: Ground<'_>, now: Timestamp) {
+        let before = self.expected;
+        self.expect_next(ground, now);
+        if self.told == SpeedStep::STAND {
+            // Each run is judged by its own contacts; that one was silent stays known.
+            self.expected.silent = 0;
+            self.expected.lost_by = None;
+        } else if let (Some(due), Some(next)) = (before.due, self.expected.due)
+            && (due.sensor != next.sensor || before.overdue_said)
+        {
+            let Expectation { due, since, overdue_said, .. } = before;
+            self.expected = Expectation { due, since, overdue_said, ..self.expected };
+        }
+    }
+
+    /// It was seen where it can be.
+    pub(super) const fn seen(&mut self) {
+        self.expected.unseen = None;
+        self.expected.silent = 0;
+        self.expected.lost_by = None;
     }
 
     /// When a contact that does not come is overdue, and after that when the train is lost.
@@ -77,29 +108,43 @@ impl DrivenTrain {
             return self.locator.is_located().then_some(since + LOST_WITHOUT);
         };
         let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
-        let way = due.time - since;
-        let lost = LOST.max(way + way);
-        Some(latest + if overdue_said { lost } else { OVERDUE })
+        let overdue = (!overdue_said).then_some(latest + OVERDUE);
+        overdue.into_iter().chain(self.expected.lost_by).min()
     }
 
-    pub(super) fn doubt(&mut self, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn doubt(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
         if self.next_doubt().is_none_or(|at| now < at) {
             return;
         }
+        let is_over = self.expected.lost_by.is_some_and(|by| by <= now);
         match self.expected.due {
-            Some(due) if !self.expected.overdue_said => {
-                self.expected.overdue_said = true;
-                self.expected.unseen.get_or_insert(due.sensor);
+            Some(due) if !self.expected.overdue_said && !is_over => {
                 out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+                let way = due.time - self.expected.since;
+                self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
+                self.expected.unseen.get_or_insert(due.sensor);
+                self.expected.silent = self.expected.silent.saturating_add(1);
+                if self.expected.silent >= MOST_SILENT {
+                    return self.lose(now, out);
+                }
+                let next = self.locator.next_contact(ground, &self.model, now);
+                // The one behind it is waited for now; where none is known only the clock ends the wait.
+                let next = next.filter(|next| next.sensor != due.sensor);
+                self.expected.overdue_said = next.is_none();
+                self.expected.since = now;
+                self.expected.due = next.or(self.expected.due);
             }
-            _ => {
-                self.locator.lose();
-                self.expected = Expectation { since: now, ..Expectation::default() };
-                let train = self.id();
-                out.say(DriveNotice::Lost { train });
-                self.give_up(now, Refusal::Lost { train }, out);
-            }
+            _ => self.lose(now, out),
         }
+    }
+
+    /// Nobody knows any more where the train is.
+    fn lose(&mut self, now: Timestamp, out: &mut Outputs) {
+        self.locator.lose();
+        self.expected = Expectation { since: now, ..Expectation::default() };
+        let train = self.id();
+        out.say(DriveNotice::Lost { train });
+        self.give_up(now, Refusal::Lost { train }, out);
     }
 
     /// When the train has to be told to stop so that it stays on the track and within its limit, whatever is reported

@@ -7,10 +7,12 @@
 mod approach;
 mod attribution;
 mod command_time;
+mod contact_conduct;
 mod driven_train;
 mod driver;
 mod expectation;
 mod felt_way;
+mod hypotheses;
 mod known_track;
 mod limit;
 mod notice;

@@ -95,6 +95,28 @@ pub enum DriveNotice {
         /// The train.
         train: TrainId,
     },
+    /// A contact that may have been closed by one train or another, or by none. What is believed of them stays as it was
+    /// until other contacts tell.
+    Ambiguous {
+        /// The contact.
+        sensor: SensorId,
+        /// When it was seen closed.
+        time: Timestamp,
+        /// The train that most likely did.
+        likeliest: TrainId,
+        /// The next likely; `None` if that is nobody.
+        or: Option<TrainId>,
+    },
+    /// A contact has closed again and again where no train can be: it is not believed any more.
+    ContactStuck {
+        /// The contact.
+        sensor: SensorId,
+    },
+    /// A contact that was stuck has behaved for a while, and is believed again.
+    ContactBehaves {
+        /// The contact.
+        sensor: SensorId,
+    },
     /// A contact that no train can have closed.
     Unexplained {
         /// The contact.

@@ -110,6 +110,21 @@ impl Tongue<'_> {
             DriveNotice::Lost { train } => {
                 format!("train {train} is lost: told to stop; put it right, then let it pass a contact")
             }
+            DriveNotice::Ambiguous { sensor, time, likeliest, or } => {
+                let or = or.map_or_else(|| "by no train at all".into(), |other| format!("by train {other}"));
+                format!(
+                    "{}  {} was closed by train {likeliest} or {or}: the next contacts will tell",
+                    self.at(*time),
+                    self.sensor(*sensor)
+                )
+            }
+            DriveNotice::ContactStuck { sensor } => format!(
+                "{} closes again and again where no train can be: it is not believed until it behaves",
+                self.sensor(*sensor)
+            ),
+            DriveNotice::ContactBehaves { sensor } => {
+                format!("{} has behaved for a while and is believed again", self.sensor(*sensor))
+            }
             DriveNotice::Unexplained { sensor, time } => format!(
                 "{}  {} was closed, and no train can have been there",
                 self.at(*time),
