@@ -2,9 +2,9 @@
 
 use super::ground::Ground;
 use super::locator::WayPoint;
-use crate::calibration::motion::{Guess, MotionModel};
+use crate::calibration::motion::{FELT, Guess, MotionModel};
 use crate::ids::{NodeId, SensorId};
-use crate::track::{Hop, Layout, Position, Reach};
+use crate::track::{Hop, Landmark, Layout, Position, Reach};
 use crate::units::Length;
 
 /// Contacts that may stay silent in a row before the way is no longer believed.
@@ -16,6 +16,9 @@ const LOG_MISSED: f64 = -3.9;
 pub(super) const LOG_CHANCE_OF_SILENCE: f64 = -5.809;
 /// Hops that a way to a place may take: more than a lap of any layout in use.
 const MOST_HOPS: usize = 200;
+/// A contact closes within this of where the survey has it, one standard deviation (m): half a pickup's springiness and a
+/// contact track's own length (chosen; tapes laid from contacts agree to it).
+const CONTACT_PLACE_M: f64 = 0.005;
 
 /// A way to a contact, past contacts that stayed silent, as a train feels it.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +85,107 @@ pub fn way_to(ground: Ground<'_>, model: &MotionModel, from: NodeId, to: Positio
         way += felt;
     }
     None
+}
+
+/// The length of a hop as a tape finds it between the two contacts (m): the survey knows it to the errors of its edges and
+/// of where contacts close, the train to what it feels longer or shorter of curves and slopes. Both count by how well they
+/// know it, and the train mostly knows better.
+pub(super) fn taped_length(ground: Ground<'_>, model: &MotionModel, hop: &Hop<'_>) -> Guess {
+    let felt = felt_reach(ground, model, hop);
+    let surveyed = hop.length.as_m();
+    let survey =
+        ground.sections.section(hop.id).map_or(0.0, |section| ground.sections.survey_variance(section))
+            + 2.0 * CONTACT_PLACE_M * CONTACT_PLACE_M;
+    let feels = FELT * surveyed;
+    let train = felt.variance + feels * feels;
+    if train <= 0.0 {
+        return Guess { mean: surveyed, variance: survey };
+    }
+    let (one, other) = (1.0 / survey, 1.0 / train);
+    Guess { mean: (surveyed * one + felt.mean * other) / (one + other), variance: 1.0 / (one + other) }
+}
+
+/// The way from a waypoint's node to a landmark ahead, in lengths as the train feels them: so many millimetres past the
+/// contact of its name, whatever the survey says of the rest of the hop. `None` if none leads there within one lap.
+#[must_use]
+pub fn way_to_landmark(
+    ground: Ground<'_>,
+    model: &MotionModel,
+    from: NodeId,
+    to: Landmark,
+) -> Option<Length> {
+    let Some((base, before)) = way_to_node(ground, model, from, to.node) else {
+        let position = ground.layout.locate(to, ground.turnouts).ok()?;
+        return way_to(ground, model, from, position);
+    };
+    if to.offset < Length::ZERO {
+        return Some(base + to.offset * before);
+    }
+    let (mut way, mut left) = (base, to.offset);
+    for hop in ground.hops_ahead(to.node).take(MOST_HOPS) {
+        let felt = felt_reach(ground, model, &hop).mean;
+        let taped = taped_length(ground, model, &hop).mean;
+        if left.as_m() <= taped {
+            return Some(way + left * if taped > 0.0 { felt / taped } else { 1.0 });
+        }
+        (way, left) = (way + Length::from_m(felt), left - Length::from_m(taped));
+    }
+    (left == Length::ZERO).then_some(way)
+}
+
+/// The way to a node at which hops begin or end, and how long a taped length feels on the hop before it.
+fn way_to_node(ground: Ground<'_>, model: &MotionModel, from: NodeId, to: NodeId) -> Option<(Length, f64)> {
+    if from == to {
+        return Some((Length::ZERO, 1.0));
+    }
+    let mut way = 0.0;
+    for (count, hop) in ground.hops_ahead(from).take(MOST_HOPS).enumerate() {
+        if count > 0 && hop.from == from {
+            return None;
+        }
+        let felt = felt_reach(ground, model, &hop).mean;
+        way += felt;
+        if hop.to == to {
+            let taped = taped_length(ground, model, &hop).mean;
+            return Some((Length::from_m(way), if taped > 0.0 { felt / taped } else { 1.0 }));
+        }
+    }
+    None
+}
+
+/// A point of the way as people name it and find it with a tape: from the last contact before it. Whole laps make no
+/// difference to the place.
+#[must_use]
+pub fn landmark_of(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Landmark {
+    let [landmark, _] = taped(ground, model, at);
+    landmark
+}
+
+/// How well a point of the way is known as people name it (m), where the train itself knows it without doubt: so far past a
+/// contact nobody knows how long a taped length feels.
+pub(super) fn taping_doubt(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> f64 {
+    let [_, doubt] = taped(ground, model, at);
+    doubt.offset.as_m()
+}
+
+/// The landmark of a point on the way, and one standard deviation of its offset in the same form.
+fn taped(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> [Landmark; 2] {
+    let mut from = at.node;
+    let mut left = at.way.as_m();
+    for hop in ground.hops_ahead(at.node).take(MOST_HOPS) {
+        let felt = felt_reach(ground, model, &hop).mean;
+        if left > felt && hop.sensor.is_some() {
+            left -= felt;
+            from = hop.to;
+            continue;
+        }
+        let length = taped_length(ground, model, &hop);
+        let scale = if felt > 0.0 && left > 0.0 { length.mean / felt } else { 1.0 };
+        let relative = if length.mean > 0.0 { libm::sqrt(length.variance) / length.mean } else { 0.0 };
+        let offset = Length::from_m(left * scale);
+        return [Landmark { node: from, offset }, Landmark { node: from, offset: offset.abs() * relative }];
+    }
+    [Landmark { node: from, offset: Length::from_m(left) }, Landmark { node: from, offset: Length::ZERO }]
 }
 
 fn part(of: Length, whole: Length) -> f64 {

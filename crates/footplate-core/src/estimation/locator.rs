@@ -1,9 +1,10 @@
 //! Where one train is between two contacts, through changes of speed, and where it would come to rest.
 //!
 //! Ways are counted from a contact passed, in lengths as the train feels them: a contact-to-contact hop is as long as
-//! [`MotionModel::length`] says, and a place within it lies at the same part of it as on the survey.
+//! [`MotionModel::length`] says. What people call a place, so many millimetres past a contact, is counted in lengths of a
+//! tape, which a train feels a little longer or shorter.
 
-use super::felt_way::{FeltReach, felt_reach, felt_reaches};
+use super::felt_way::{FeltReach, felt_reach, felt_reaches, taping_doubt};
 use super::ground::Ground;
 use crate::calibration::motion::{Following, Guess, MotionModel};
 use crate::event::{Event, EventKind};
@@ -246,12 +247,13 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(at);
         let place = self.following.place(model, time);
-        let survey = between_contacts(ground);
+        let here = WayPoint { node, way: Length::from_m(place.mean) };
+        let taping = taping_doubt(ground, model, here);
         let speed = self.following.speed(model, time);
         let at_rest = self.following.at(model, time).rests_at(time);
         Some(Located {
-            at: WayPoint { node, way: Length::from_m(place.mean) },
-            uncertainty: Length::from_m(libm::sqrt(place.variance + survey * survey)),
+            at: here,
+            uncertainty: Length::from_m(libm::sqrt(place.variance + taping * taping)),
             speed: Speed::from_m_per_s(if at_rest { 0.0 } else { speed.mean }),
             speed_uncertainty: Speed::from_m_per_s(libm::sqrt(speed.variance)),
             step: SpeedStep::new(self.following.step()).unwrap_or(SpeedStep::STAND),
@@ -319,11 +321,11 @@ impl Locator {
     fn rest_of(&self, ground: Ground<'_>, following: &Following, model: &MotionModel) -> Option<Rest> {
         let node = self.node?;
         let (place, scatter, time) = following.rest(model)?;
+        let at = WayPoint { node, way: Length::from_m(place.mean) };
+        let taping = taping_doubt(ground, model, at);
         Some(Rest {
-            at: WayPoint { node, way: Length::from_m(place.mean) },
-            doubt: Length::from_m(libm::sqrt(
-                place.variance + between_contacts(ground) * between_contacts(ground),
-            )),
+            at,
+            doubt: Length::from_m(libm::sqrt(place.variance + taping * taping)),
             scatter: Length::from_m(libm::sqrt(scatter)),
             time: self.timestamp(time),
         })
@@ -332,12 +334,6 @@ impl Locator {
 
 /// Hops looked at ahead of a train: more than its way to rest and a few silent contacts.
 const MOST_HOPS: usize = 8;
-
-/// Contacts are where the train felt them; how far a place between two of them is from either only the survey tells, and
-/// in the mean of all places it is about half as far off as an edge may be (m).
-fn between_contacts(ground: Ground<'_>) -> f64 {
-    0.5 * ground.layout.survey().uncertainty.as_m()
-}
 
 /// ln of the density of a normal distribution at zero.
 pub(super) fn log_density(of: Guess) -> f64 {

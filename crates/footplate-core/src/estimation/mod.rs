@@ -25,7 +25,7 @@ mod train_model;
 mod transition;
 mod way_memory;
 
-pub use felt_way::{place_of, way_to};
+pub use felt_way::{landmark_of, place_of, way_to, way_to_landmark};
 pub use forecast::{Forecast, Phase};
 pub use ground::Ground;
 pub use law_memory::{KnownLaw, LawMemory};

@@ -29,8 +29,11 @@ const MOST_PENDING: usize = 6;
 const WANDERS_IN: f64 = 4.0;
 /// Looks at one contact from ever better points: speed and place bend the way while little is known.
 const LOOKS: usize = 3;
-/// Part of a change's displacement by which no shape is true in its middle.
+/// Part of a change's displacement by which no shape is true in its middle, ...
 const SHAPE_ERROR: f64 = 0.04;
+/// ... and part of its change of speed by which the speed there is not: an eased ramp (3τ² − 2τ³) and an even one are apart
+/// by up to 0.096.
+const SHAPE_SPEED_ERROR: f64 = 0.07;
 /// Bounds of what one run may differ from all others: beyond, the model is wrong.
 const FARTHEST_DEVIATION: f64 = 1.5;
 
@@ -124,6 +127,7 @@ impl Following {
         let (way, slope) = self.way_and_slope(time);
         let pace = if from_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
         let speed = pace.speed;
+        let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
         self.transform(slope);
         self.x[B] = way;
         let answers = model.answers();
@@ -150,7 +154,9 @@ impl Following {
             model.change_doubt(speed, to)
         };
         let error = if told.to == 0 || from_rest { 0.0 } else { change_error(to - speed) };
-        self.p[Z][Z] = doubt * doubt + error * error;
+        // Who begins faster than was thought is farther by so much once the change is done.
+        let carried = unshaped * self.segment.delay();
+        self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
         if told.to == 0 {
             let scatter = model.scatter(speed * libm::exp(self.x[E]));
             self.p[Z][Z] += scatter * scatter;
@@ -234,6 +240,12 @@ impl Following {
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);
         Some((Guess { mean, variance }, scatter, later.rest_time()))
+    }
+
+    /// One standard deviation (m/s) of the speed in the middle of a change.
+    fn shape_speed_error(&self, time: f64) -> f64 {
+        let share = self.segment.share(time);
+        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.segment.to - self.segment.from.speed).abs()
     }
 
     fn shape_error(&self, time: f64) -> f64 {

@@ -27,4 +27,5 @@ pub(crate) use follow::{Following, Guess};
 pub use model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;
+pub(crate) use priors::FELT;
 pub use prospect::Prospect;

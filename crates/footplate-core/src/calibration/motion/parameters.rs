@@ -151,6 +151,26 @@ impl<'v> Answers<'v> {
         (below + full * Self::hysteresis_part(below)).max(0.5 * below)
     }
 
+    /// The step, with parts, at which a train runs that has been told `near` and whose set speed (m/s) is this now: steps
+    /// below and above are looked at with the speeds that are reached from below, as a ramp passes them.
+    pub(super) fn step_at(&self, near: usize, set: f64) -> f64 {
+        let near = near.min(self.highest);
+        let settled = [self.speed(near, false), self.speed(near, true)];
+        if (settled[0]..=settled[1]).contains(&set) {
+            return near as f64;
+        }
+        let mut low = (0, 0.0);
+        for step in 1..=self.highest {
+            let speed = self.speed(step, false);
+            if speed >= set {
+                return low.0 as f64
+                    + ((set - low.1) / (speed - low.1).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            }
+            low = (step, speed);
+        }
+        self.highest as f64
+    }
+
     /// The part of full hysteresis that a speed (m/s) shows.
     pub(super) const fn hysteresis_part(speed: f64) -> f64 {
         (speed / FULL_HYSTERESIS_FROM).min(1.0)

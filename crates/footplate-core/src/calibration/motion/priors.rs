@@ -15,7 +15,7 @@ use crate::linalg::NormalEquations;
 const TOTAL: f64 = 0.001;
 /// A train feels a hop up to some per cent longer or shorter than it is, for curves and slopes (published section
 /// means: 1 to 3 %).
-const FELT: f64 = 0.02;
+pub(crate) const FELT: f64 = 0.02;
 /// Where a chain begins nobody knows to some metres.
 const ANYWHERE: f64 = 10.0;
 /// A start is late or early by a tenth of its delay (seen on trains that need 0.5 to 1 s to stir).

@@ -105,10 +105,8 @@ impl Segment {
     pub(super) fn of(told: &Told, answers: &Answers<'_>, from: Pace) -> Self {
         let to = answers.speed(usize::from(told.to), told.above());
         let change = to - from.set;
-        // Of the steps, those that the set speed still has to go.
-        let whole = (to - answers.speed(usize::from(told.from), false)).abs();
-        let part = if whole > 0.0 { (change.abs() / whole).min(1.0) } else { 1.0 };
-        let steps = part * (f64::from(told.to) - f64::from(told.from));
+        // Those steps that the set speed still has to go: a change that is interrupted has not gone all of its own.
+        let steps = f64::from(told.to) - answers.step_at(usize::from(told.from), from.set);
         let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
         let shape = RampedLag::new(ramp, lag);
         // The shape cannot be less than nothing; the way that follows from the numbers is kept linear in them.
@@ -205,6 +203,11 @@ impl Segment {
 
     fn way_of_stop(&self, rolling: Rolling) -> f64 {
         self.displacement() - rolling.loss(self.shape.lag())
+    }
+
+    /// Mean time (s) by which the change is late against one at once.
+    pub(super) const fn delay(&self) -> f64 {
+        self.shape.delay()
     }
 
     /// By how much the way once it is settled differs from that of a change at once (m).

@@ -1,14 +1,14 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint};
+use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint, landmark_of};
 use crate::event::{Command, Event, EventKind};
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::expectation::Expectation;
-use super::felt_way::{contacts_until, counted_from, landmark_at};
+use super::felt_way::{contacts_until, counted_from};
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
@@ -357,7 +357,7 @@ impl DrivenTrain {
     ) {
         let located = self.located(ground, time);
         let achieved = located.map(|located| Achieved {
-            at: landmark_at(ground, &self.model, located.at),
+            at: landmark_of(ground, &self.model, located.at),
             uncertainty: located.uncertainty,
             error: target.and_then(|target| self.beyond(ground, located.at, target)),
         });

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::calibration::motion::{MotionModel, StepUse};
 use crate::control::{Machine, Output};
-use crate::estimation::{Located, Locator, WayPoint};
+use crate::estimation::{Located, Locator, WayPoint, landmark_of};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::latency::ContactWindow;
@@ -15,7 +15,6 @@ use crate::units::Length;
 
 use super::attribution::{Attribution, Branch, Decided, Verdict};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::landmark_at;
 use super::hypotheses::{Closure, Explanation};
 use super::known_track::KnownTrack;
 use super::notice::DriveNotice;
@@ -115,7 +114,7 @@ impl Driver {
     /// A point of a train's way as people name it.
     #[must_use]
     pub fn landmark(&self, train: TrainId, at: WayPoint) -> Option<Landmark> {
-        Some(landmark_at(self.track.ground(), &self.trains.get(&train)?.model, at))
+        Some(landmark_of(self.track.ground(), &self.trains.get(&train)?.model, at))
     }
 
     /// Whether a train stands, as far as is known.

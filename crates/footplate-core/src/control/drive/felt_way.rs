@@ -3,7 +3,7 @@
 use crate::calibration::motion::MotionModel;
 use crate::estimation::{Ground, WayPoint};
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
-use crate::track::{Hop, Landmark, NodeKind};
+use crate::track::{Hop, NodeKind};
 use crate::units::Length;
 
 /// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after
@@ -78,27 +78,6 @@ pub(super) fn contacts_until<'g>(
 pub(super) fn track_end(ground: Ground<'_>, model: &MotionModel, from: NodeId) -> Option<(NodeId, Length)> {
     let (hop, [_, end]) = felt_hops(ground, model, from).find(|(hop, _)| hop.sensor.is_none())?;
     Some((hop.to, end))
-}
-
-/// A point of the way as people name it: from the last contact before it, in surveyed lengths.
-pub(super) fn landmark_at(ground: Ground<'_>, model: &MotionModel, point: WayPoint) -> Landmark {
-    let mut landmark = Landmark { node: point.node, offset: point.way };
-    // On long ways round and round: whole laps make no difference to the place.
-    let whole_laps = lap(ground, model, point.node)
-        .map_or(Length::ZERO, |lap| libm::floor((point.way / lap).max(0.0)) * lap);
-    let way = point.way - whole_laps;
-    for (hop, [begin, end]) in felt_hops(ground, model, point.node) {
-        let felt = end - begin;
-        if way < begin {
-            break;
-        }
-        let part = if felt > Length::ZERO { hop.length / felt } else { 1.0 };
-        landmark = Landmark { node: hop.from, offset: (way - begin) * part };
-        if way < end {
-            break;
-        }
-    }
-    landmark
 }
 
 /// The first turnout ahead of a node at which the way forks and nobody knows where it leads.

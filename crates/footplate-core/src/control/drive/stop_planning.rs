@@ -2,14 +2,14 @@
 
 use alloc::string::{String, ToString};
 
-use crate::estimation::{Ground, Located, Rest, WayPoint, way_to};
+use crate::estimation::{Ground, Located, Rest, WayPoint, landmark_of, way_to_landmark};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::{contacts_until, landmark_at, lap, unknown_turnout, way_between};
+use super::felt_way::{contacts_until, lap, unknown_turnout, way_between};
 use super::notice::{DriveNotice, PlannedStop, Promise};
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
@@ -164,8 +164,8 @@ impl DrivenTrain {
         let node = located.at.node;
         let no_way = || self.no_way(ground, node, destination);
         let named = destination.named.ok_or_else(no_way)?;
-        let position = ground.layout.locate(named, ground.turnouts).map_err(Refusal::Place)?;
-        let mut way = way_to(ground, &self.model, node, position).ok_or_else(no_way)?;
+        ground.layout.locate(named, ground.turnouts).map_err(Refusal::Place)?;
+        let mut way = way_to_landmark(ground, &self.model, node, named).ok_or_else(no_way)?;
         let lap = lap(ground, &self.model, node);
         let behind = |way: Length| way < located.at.way - THERE;
         if behind(way) {
@@ -196,7 +196,7 @@ impl DrivenTrain {
         if destination.named.is_none() {
             return Refusal::MoveTooShort { shortest: beyond };
         }
-        let nearest = landmark_at(ground, &self.model, WayPoint { way: at.way + beyond, ..at });
+        let nearest = landmark_of(ground, &self.model, WayPoint { way: at.way + beyond, ..at });
         let nearest = crate::track::Landmark {
             offset: Length::from_mm(libm::round(nearest.offset.as_mm())),
             ..nearest
@@ -224,8 +224,7 @@ impl DrivenTrain {
         node: NodeId,
         destination: &Destination,
     ) -> Option<WayPoint> {
-        let position = ground.layout.locate(destination.named?, ground.turnouts).ok()?;
-        Some(WayPoint { node, way: way_to(ground, &self.model, node, position)? })
+        Some(WayPoint { node, way: way_to_landmark(ground, &self.model, node, destination.named?)? })
     }
 
     /// The turnouts lie otherwise: is the target still where it was?

@@ -249,9 +249,11 @@ impl<'a, 'l> Trial<'a, 'l> {
     fn look(&mut self) {
         let now = self.line.now();
         let Some(located) = self.driver.locate(TRAIN, now) else { return };
-        let Some(sensor) = self.layout.sensor_at(located.at.node) else { return };
-        let Some(past) = self.line.station.world().truth().felt_past(TRAIN, sensor) else { return };
-        let off = (past - located.at.way).as_mm();
+        // As a person reads it: so many millimetres past a contact.
+        let Some(said) = self.driver.landmark(TRAIN, located.at) else { return };
+        let Some(sensor) = self.layout.sensor_at(said.node) else { return };
+        let Some(past) = self.line.station.world().truth().past(TRAIN, sensor) else { return };
+        let off = (past - said.offset).as_mm();
         self.results.looks[0] += 1;
         self.results.looks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
     }
