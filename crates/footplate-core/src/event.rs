@@ -1,11 +1,14 @@
 //! What the railway reports and what it was told: the entries of every recording.
 
+use core::fmt;
+
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 /// One entry of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Event {
     /// When the host saw or sent it.
     pub time: Timestamp,
@@ -15,6 +18,7 @@ pub struct Event {
 
 /// What can stand in a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum EventKind {
     /// A trackside contact was reported as closed.
     Sensor(Report),
@@ -50,6 +54,7 @@ pub enum EventKind {
 
 /// A contact that was seen closed, and what is known of the time at which it closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Report {
     /// The contact.
     pub sensor: SensorId,
@@ -60,6 +65,7 @@ pub struct Report {
 
 /// What a command station can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Command {
     /// Run a train at a throttle step; step 0 stops it by its own law.
     Speed {
@@ -84,6 +90,20 @@ pub enum Command {
     PowerOff,
     /// Give power to the track.
     PowerOn,
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Speed { train, step } => write!(f, "step {step} for train {train}"),
+            Self::Reverse { train } => write!(f, "turn around, train {train}"),
+            Self::Turnout { turnout, curved } => {
+                write!(f, "turnout {turnout} {}", if *curved { "curved" } else { "straight" })
+            }
+            Self::PowerOff => f.write_str("power off"),
+            Self::PowerOn => f.write_str("power on"),
+        }
+    }
 }
 
 /// From which side a speed was reached; the same throttle step reached from above is faster.

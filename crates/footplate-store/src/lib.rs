@@ -59,9 +59,9 @@ pub use sensor_log::{
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
 pub use store::{
-    Calibration, CalibrationKind, Change, EventKey, Import, Journal, Mark, MarkKind, NewCalibration,
-    RecordingKey, RunKey, Salvaged, SalvagedTable, Store, StoreError, StoredEvent, StoredRecording,
-    StoredRun, salvage,
+    Calibration, CalibrationKind, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark,
+    MarkKind, NewCalibration, NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store,
+    StoreError, StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

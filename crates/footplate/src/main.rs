@@ -11,6 +11,7 @@ mod runtime;
 #[allow(dead_code, reason = "the verbs that drive trains live are being written")]
 mod session_journal;
 mod spread;
+mod witness;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

@@ -5,6 +5,8 @@
 //! to come. What cannot be written is kept and tried again, so a disk that has room again, or another process that ends,
 //! costs nothing; what no longer fits into the queue is lost, counted, and the run broken there.
 
+mod scribe;
+
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,8 +15,9 @@ use std::time::Duration;
 
 use anyhow::bail;
 use footplate_core::{Event, Timestamp};
-use footplate_store::{Journal, StoreError, TrainAtStart};
+use footplate_store::{Journal, JournalEntry, StoreError, TrainAtStart};
 
+pub(crate) use self::scribe::Scribe;
 use crate::clock::now;
 use crate::runtime::Recorder;
 
@@ -32,6 +35,19 @@ pub(crate) enum WhenFull {
     Lose,
     /// Wait for the disk: the clock is simulated and stands still meanwhile.
     Wait,
+}
+
+impl WhenFull {
+    /// Whether a queue took an entry.
+    fn offer(self, queue: &SyncSender<Entry>, entry: Entry) -> bool {
+        match self {
+            Self::Wait => queue.send(entry).is_ok(),
+            Self::Lose => match queue.try_send(entry) {
+                Ok(()) => true,
+                Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
+            },
+        }
+    }
 }
 
 /// What is to be done when the session cannot be written down.
@@ -77,8 +93,10 @@ struct Beginning {
 
 #[derive(Debug)]
 enum Entry {
-    Event(Event),
+    Of(JournalEntry),
     Run(Beginning),
+    /// No more will come; only wakes the thread.
+    End,
 }
 
 /// What became of a session in the end.
@@ -140,7 +158,7 @@ impl SessionJournal {
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
             return;
         }
-        if !self.offer(Entry::Event(*event)) {
+        if !self.offer(Entry::Of(JournalEntry::Event(*event))) {
             self.broken = Some(self.beginning.clone());
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
@@ -156,14 +174,14 @@ impl SessionJournal {
 
     /// Whether the queue took it.
     fn offer(&self, entry: Entry) -> bool {
-        let Some(queue) = &self.queue else { return false };
-        match self.when_full {
-            WhenFull::Wait => queue.send(entry).is_ok(),
-            WhenFull::Lose => match queue.try_send(entry) {
-                Ok(()) => true,
-                Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
-            },
-        }
+        self.queue.as_ref().is_some_and(|queue| self.when_full.offer(queue, entry))
+    }
+
+    /// What writes down, in the same order, what a machine is told and decides. The journal has
+    /// [begun](Journal::begin_machine) the machine.
+    pub(crate) fn scribe(&self) -> Option<Scribe> {
+        let queue = self.queue.clone()?;
+        Some(Scribe::new(queue, self.when_full, Arc::clone(&self.shared)))
     }
 
     /// How many entries of the session are on the disk by now.
@@ -196,7 +214,10 @@ impl SessionJournal {
 
     fn end(&mut self) -> Option<Journal> {
         self.shared.ended.store(true, Ordering::Release);
-        drop(self.queue.take());
+        // Scribes may still hold the queue. If it is full, the thread is awake anyway.
+        if let Some(queue) = self.queue.take() {
+            let _ = queue.try_send(Entry::End);
+        }
         self.thread.take()?.join().ok()
     }
 }
@@ -239,12 +260,12 @@ impl Writer {
         loop {
             // Asked before taking what is there: what comes between the two is seen next time.
             let ended = self.shared.ended.load(Ordering::Acquire);
-            let ended = gather(entries, &mut pending) || ended && pending.len() >= QUEUE;
+            let ended = gather(entries, &mut pending, ended) || ended && pending.len() >= QUEUE;
             let written = self.write(&mut pending);
             self.say(written.err().map(|error| error.to_string()));
             if ended {
                 let left = pending.drain(..).chain(entries.try_iter());
-                let lost = left.filter(|entry| matches!(entry, Entry::Event(_))).count();
+                let lost = left.filter(|entry| matches!(entry, Entry::Of(_))).count();
                 self.shared.lost.fetch_add(lost as u64, Ordering::Relaxed);
                 return self.journal;
             }
@@ -257,22 +278,19 @@ impl Writer {
     /// Writes down what it can, and leaves the rest.
     fn write(&mut self, pending: &mut Vec<Entry>) -> Result<(), StoreError> {
         while let Some(first) = pending.first() {
-            if let Entry::Run(beginning) = first {
-                self.journal.begin_run(beginning.began_at, &beginning.trains)?;
-                pending.remove(0);
-                continue;
+            match first {
+                Entry::Of(_) => {
+                    let entries = pending.iter().map_while(Entry::of_journal).take(MOST_TOGETHER);
+                    let entries: Vec<JournalEntry> = entries.cloned().collect();
+                    let acknowledged = self.journal.append_all(&entries, now())?;
+                    self.shared.acknowledged.store(acknowledged, Ordering::Release);
+                    pending.drain(..entries.len());
+                    continue;
+                }
+                Entry::Run(beginning) => self.journal.begin_run(beginning.began_at, &beginning.trains)?,
+                Entry::End => {}
             }
-            let events: Vec<Event> = pending
-                .iter()
-                .map_while(|entry| match entry {
-                    Entry::Event(event) => Some(*event),
-                    Entry::Run(_) => None,
-                })
-                .take(MOST_TOGETHER)
-                .collect();
-            let acknowledged = self.journal.append(&events, now())?;
-            self.shared.acknowledged.store(acknowledged, Ordering::Release);
-            pending.drain(..events.len());
+            pending.remove(0);
         }
         Ok(())
     }
@@ -282,9 +300,19 @@ impl Writer {
     }
 }
 
-/// Waits for an entry, unless some are pending, and takes all that are there. Says whether none will come any more.
-fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>) -> bool {
-    if pending.is_empty() {
+impl Entry {
+    const fn of_journal(&self) -> Option<&JournalEntry> {
+        match self {
+            Self::Of(entry) => Some(entry),
+            Self::Run(_) | Self::End => None,
+        }
+    }
+}
+
+/// Waits for an entry, unless some are pending or the end was told, and takes all that are there. Says whether none
+/// will come any more.
+fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>, ended: bool) -> bool {
+    if pending.is_empty() && !ended {
         match entries.recv() {
             Ok(entry) => pending.push(entry),
             Err(_) => return true,
@@ -293,7 +321,7 @@ fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>) -> bool {
     while pending.len() < QUEUE {
         match entries.try_recv() {
             Ok(entry) => pending.push(entry),
-            Err(TryRecvError::Empty) => return false,
+            Err(TryRecvError::Empty) => return ended,
             Err(TryRecvError::Disconnected) => return true,
         }
     }

@@ -12,8 +12,11 @@ const APPLICATION_ID: i64 = 0x466F_6F74;
 
 /// What turns an empty file into version 1, version 1 into version 2 and so on. Entries are appended and never
 /// changed: files out there were made by them. `testdata/compat` keeps a file of every version.
-const MIGRATIONS: &[&str] =
-    &[include_str!("migrations/1_begin.sql"), include_str!("migrations/2_motion.sql")];
+const MIGRATIONS: &[&str] = &[
+    include_str!("migrations/1_begin.sql"),
+    include_str!("migrations/2_motion.sql"),
+    include_str!("migrations/3_decisions.sql"),
+];
 
 /// How long we wait for another process to finish writing, chosen: an import of a million events takes less.
 const PATIENCE: Duration = Duration::from_secs(5);

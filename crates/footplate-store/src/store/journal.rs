@@ -7,10 +7,24 @@
 
 use footplate_core::{Event, RunId, Timestamp};
 
+use super::decisions::{self, MachineKey, NewMachine, Traced};
 use super::error::StoreError;
 use super::file::Store;
 use super::recordings::{RecordingKey, RunKey};
+use super::row;
 use crate::recording::TrainAtStart;
+
+/// What a session brings, as it comes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum JournalEntry {
+    /// The railway reported something, or was told.
+    Event(Event),
+    /// The machine that was begun last was told something, or decided.
+    Traced(Traced),
+}
+
+/// No row has this number, so that the store refuses what is of no machine.
+const NO_MACHINE: MachineKey = MachineKey(0);
 
 /// A live session that is being written down.
 #[derive(Debug)]
@@ -19,6 +33,7 @@ pub struct Journal {
     recording: RecordingKey,
     run: RunKey,
     number: u32,
+    machine: Option<MachineKey>,
     acknowledged: u64,
 }
 
@@ -38,7 +53,7 @@ impl Journal {
     ) -> Result<Self, StoreError> {
         let recording = store.begin_recording(name, layout, now)?;
         let run = store.begin_run(recording, RunId(1), began_at, trains)?;
-        Ok(Self { store, recording, run, number: 1, acknowledged: 0 })
+        Ok(Self { store, recording, run, number: 1, machine: None, acknowledged: 0 })
     }
 
     /// Begins the next run: the clock has jumped, a train was lifted, or other trains take part. `began_at` as above, and
@@ -57,16 +72,46 @@ impl Journal {
         Ok(())
     }
 
+    /// A machine begins to decide; what is traced from here on is of it.
+    ///
+    /// # Errors
+    /// The store cannot be written: better known before the first train moves.
+    pub fn begin_machine(&mut self, new: NewMachine<'_>, now: Timestamp) -> Result<(), StoreError> {
+        self.machine = Some(self.store.begin_machine(self.recording, new, now)?);
+        Ok(())
+    }
+
     /// Writes events down, in their order. When this returns they are on the disk, all of them; it says how many of the
     /// session are by now.
     ///
     /// # Errors
     /// None of these events was acknowledged. They can be handed over again: nothing is written down twice.
     pub fn append(&mut self, events: &[Event], now: Timestamp) -> Result<u64, StoreError> {
-        if !events.is_empty() {
-            self.store.append(self.run, events, now)?;
-            self.acknowledged += events.len() as u64;
+        let entries: Vec<JournalEntry> = events.iter().copied().map(JournalEntry::Event).collect();
+        self.append_all(&entries, now)
+    }
+
+    /// The same for all that a session brings: in their order, and all of it or nothing.
+    ///
+    /// # Errors
+    /// As [`append`](Self::append); and if something is traced before a machine was begun.
+    pub fn append_all(&mut self, entries: &[JournalEntry], now: Timestamp) -> Result<u64, StoreError> {
+        if entries.is_empty() {
+            return Ok(self.acknowledged);
         }
+        let path = self.store.path().to_owned();
+        let (run, machine) = (self.run, self.machine.unwrap_or(NO_MACHINE));
+        let transaction = self.store.write()?;
+        let append = || {
+            let mut statement = transaction.prepare_cached(row::INSERT)?;
+            entries.iter().try_for_each(|entry| match entry {
+                JournalEntry::Event(event) => row::insert(&mut statement, run, None, now, *event),
+                JournalEntry::Traced(traced) => decisions::insert(&transaction, machine, traced),
+            })
+        };
+        append().and_then(|()| transaction.commit()).map_err(|error| StoreError::of(&path, error))?;
+        let events = entries.iter().filter(|entry| matches!(entry, JournalEntry::Event(_))).count();
+        self.acknowledged += events as u64;
         Ok(self.acknowledged)
     }
 

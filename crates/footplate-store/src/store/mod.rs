@@ -8,6 +8,7 @@
 //! file          opening, creating, migrating; who may write
 //! recordings    importing a recording, appending the events of a live session
 //! journal       a live session from its beginning to its end
+//! decisions     what a machine was told and decided, so that it can be made to decide again
 //! history       reading back what was there at a date, and what changed between two
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
@@ -15,6 +16,7 @@
 //! ```
 
 mod calibrations;
+mod decisions;
 mod error;
 mod file;
 mod history;
@@ -25,10 +27,11 @@ mod row;
 mod salvage;
 
 pub use calibrations::{Calibration, CalibrationKind, NewCalibration};
+pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};
 pub use error::StoreError;
 pub use file::Store;
 pub use history::{Change, StoredEvent, StoredRecording, StoredRun};
-pub use journal::Journal;
+pub use journal::{Journal, JournalEntry};
 pub use marks::{Mark, MarkKind};
 pub use recordings::{EventKey, Import, RecordingKey, RunKey};
 pub use salvage::{Salvaged, SalvagedTable, salvage};

@@ -277,7 +277,33 @@ mod tests {
                    VALUES (24, 0, 0, '1', '{}')";
         store.connection.execute(sql, []).unwrap();
 
-        let tables = ["recordings", "runs", "starts", "events", "gate_passes", "marks", "calibrations"];
+        let new = crate::NewMachine { kind: "drive", program: "1", body: "{}" };
+        let machine = store.begin_machine(RecordingKey(1), new, Timestamp::ZERO).unwrap();
+        let transaction = store.write().unwrap();
+        for side in [crate::Side::Input, crate::Side::Decision] {
+            let traced = crate::Traced {
+                number: 0,
+                time: Timestamp::ZERO,
+                side,
+                kind: "any".into(),
+                text: String::new(),
+            };
+            crate::store::decisions::insert(&transaction, machine, &traced).unwrap();
+        }
+        transaction.commit().unwrap();
+
+        let tables = [
+            "recordings",
+            "runs",
+            "starts",
+            "events",
+            "gate_passes",
+            "marks",
+            "calibrations",
+            "machines",
+            "inputs",
+            "decisions",
+        ];
         for table in tables {
             assert!(count(&store, table) > 0, "{table}");
             // Each table has a column of its own that would be changed.

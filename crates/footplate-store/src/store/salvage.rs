@@ -34,7 +34,7 @@ pub struct SalvagedTable {
 }
 
 /// Tables with what they belong to, parents first.
-const TABLES: [(&str, Option<Parent>); 7] = [
+const TABLES: [(&str, Option<Parent>); 10] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
@@ -43,6 +43,10 @@ const TABLES: [(&str, Option<Parent>); 7] = [
     // A mark says nothing without its event.
     ("marks", None),
     ("calibrations", None),
+    ("machines", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
+    // Without how it began nothing can be decided again.
+    ("inputs", None),
+    ("decisions", None),
 ];
 
 /// Where a row belongs.

@@ -1,12 +1,14 @@
 //! A live session is written down as it happens, and no acknowledged event of it is lost, whoever is killed when.
 
+use std::borrow::Cow;
 use std::thread;
 use std::time::Duration;
 
 use footplate_core::{Event, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
-use footplate_store::{Journal, Store, StoreError, TrainAtStart};
+use footplate_store::{Journal, JournalEntry, NewMachine, Side, Store, StoreError, Traced, TrainAtStart};
 
 use crate::child_process::{ChildProcess, say, store_of_parent};
+use crate::drawn_moments::DrawnMoments;
 use crate::stores::{Shelf, minute};
 
 /// Events of a run in the child, chosen: a commit hits the change of runs often.
@@ -22,6 +24,25 @@ fn event(number: usize) -> Event {
     Event { time, kind }
 }
 
+/// Sessions that are killed: enough that a commit is hit in its every part, in some seconds.
+const KILLS: usize = 30;
+/// A kill comes so long (µs) after the first word: a commit takes some milliseconds.
+const KILLED_WITHIN_US: std::ops::Range<u64> = 0..60_000;
+
+/// Behind every event the machine is told of it, and decides something.
+fn traced(number: usize) -> [Traced; 2] {
+    let time = event(number).time;
+    let [told, decided] =
+        [(Side::Input, "event"), (Side::Decision, "command")].map(|(side, kind)| (side, Cow::Borrowed(kind)));
+    [(0, told), (1, decided)].map(|(place, (side, kind))| Traced {
+        number: 2 * number as u64 + place,
+        time,
+        side,
+        kind,
+        text: format!("of {number}"),
+    })
+}
+
 const STANDING: TrainAtStart = TrainAtStart { train: TrainId(24), step: SpeedStep::STAND };
 
 #[test]
@@ -31,25 +52,32 @@ fn writes_down_until_killed() {
     let store = Store::open_or_create(&path).unwrap();
     let mut journal =
         Journal::begin(store, "evening", "track-a", Some(minute(0)), &[STANDING], minute(0)).unwrap();
+    journal.begin_machine(NewMachine { kind: "drive", program: "1", body: "{}" }, minute(0)).unwrap();
     // As a link brings them: one by one, sometimes two or three together.
     for group in [1, 1, 3, 1, 2].iter().cycle() {
         let from = journal.acknowledged() as usize;
-        let events: Vec<Event> = (from..from + group).map(event).collect();
+        let of_one = |number| {
+            let traced = traced(number).map(JournalEntry::Traced);
+            [JournalEntry::Event(event(number))].into_iter().chain(traced)
+        };
+        let entries: Vec<JournalEntry> = (from..from + group).flat_map(of_one).collect();
         if from / RUN != (from + group) / RUN {
             journal.begin_run(Some(minute(1)), &[STANDING]).unwrap();
         }
-        say(journal.append(&events, minute(1)).unwrap());
+        say(journal.append_all(&entries, minute(1)).unwrap());
     }
 }
 
 #[test]
-fn every_acknowledged_event_of_a_session_is_there_after_a_kill() {
-    // Killed between 3 and 90 ms after the first word: a commit takes some milliseconds, so any part of one is hit.
-    for wait_ms in [3, 5, 8, 11, 17, 23, 31, 47, 66, 90] {
+fn every_acknowledged_event_and_decision_of_a_session_is_there_after_a_kill() {
+    let mut moments = DrawnMoments::new();
+    for kill in 0..KILLS {
+        let wait = moments.wait_us(KILLED_WITHIN_US);
+        println!("kill {kill} of seed {}: after {wait:?}", moments.seed);
         let shelf = Shelf::new();
         let mut child = ChildProcess::start("journal_survives::writes_down_until_killed", &shelf.path());
         let mut acknowledged: usize = child.next_word().unwrap().parse().unwrap();
-        thread::sleep(Duration::from_millis(wait_ms));
+        thread::sleep(wait);
         child.kill();
         while let Some(word) = child.next_word() {
             acknowledged = word.parse().unwrap();
@@ -65,6 +93,10 @@ fn every_acknowledged_event_of_a_session_is_there_after_a_kill() {
         assert!(events.len() >= acknowledged, "{} of {acknowledged} are there", events.len());
         assert!(events.iter().enumerate().all(|(number, stored)| *stored == event(number)));
         assert!(runs.iter().all(|run| run.trains == [STANDING]));
+        // What followed from the events came with them, whole.
+        let machine = store.machines().unwrap()[0].key;
+        let followed: Vec<Traced> = (0..events.len()).flat_map(traced).collect();
+        assert_eq!(store.trace(machine).unwrap(), followed);
         // And the next session begins as if nothing had happened.
         let mut next = Journal::begin(store, "next", "track-a", None, &[], minute(3)).unwrap();
         assert_eq!(next.append(&[event(1), event(2)], minute(3)).unwrap(), 2);

@@ -7,6 +7,8 @@ mod bad_trains_and_lines;
 mod built_in_layouts;
 mod child_process;
 mod circuits;
+mod decisions;
+mod drawn_moments;
 mod journal_survives;
 mod layout_tables;
 mod layouts_of_any_text;

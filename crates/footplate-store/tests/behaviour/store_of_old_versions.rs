@@ -20,6 +20,8 @@ fn every_old_store_opens_with_all_it_had() {
         fs::copy(committed, shelf.path()).unwrap();
         let store = shelf.store();
         store.check().unwrap();
+        // Decisions are kept from version 3 on.
+        assert_eq!(store.machines().unwrap().len(), usize::from(file == "store-3.sqlite"));
         let late = minute(1_000_000);
         let recordings = store.recordings(late).unwrap();
         let counts: Vec<_> =

@@ -4,8 +4,15 @@ use footplate_core::{Event, EventKind, Report, RunId, SensorId, Timestamp};
 use footplate_store::{ContentHash, Store};
 
 use crate::child_process::{ChildProcess, say, store_of_parent};
+use crate::drawn_moments::DrawnMoments;
 use crate::recordings::{ALL, real};
 use crate::stores::{Shelf, import_new, minute};
+
+/// Processes that are killed: enough that a commit is hit in its every part, in some seconds.
+const KILLS: usize = 24;
+const KILLED_IMPORTS: usize = 10;
+/// A kill comes so long (µs) after the word it waits for: a commit takes some milliseconds.
+const KILLED_WITHIN_US: std::ops::Range<u64> = 0..10_000;
 
 /// How many events go to the disk together in the child: commits of one page and of many.
 const BATCHES: [usize; 3] = [1, 7, 400];
@@ -33,14 +40,17 @@ fn appends_until_killed() {
 
 #[test]
 fn what_was_acknowledged_is_there_after_a_kill() {
-    // The child goes on while it is being killed, so that it is hit anywhere in a commit.
-    for words in [1, 2, 3, 4, 5, 8, 13, 21, 34, 55] {
+    let mut moments = DrawnMoments::new();
+    for kill in 0..KILLS {
+        let (words, wait) = (moments.one_of(1..30), moments.wait_us(KILLED_WITHIN_US));
+        println!("kill {kill} of seed {}: {wait:?} after word {words}", moments.seed);
         let shelf = Shelf::new();
         let mut child = ChildProcess::start("store_survives::appends_until_killed", &shelf.path());
         let mut acknowledged = 0;
         for _ in 0..words {
             acknowledged = child.next_word().unwrap().parse().unwrap();
         }
+        std::thread::sleep(wait);
         child.kill();
         // What it said before the end counts, even if nobody had listened yet.
         while let Some(word) = child.next_word() {
@@ -115,12 +125,16 @@ fn imports_until_killed() {
 
 #[test]
 fn an_import_is_there_whole_or_not_at_all_after_a_kill() {
-    for words in [1, 2, 5, 11] {
+    let mut moments = DrawnMoments::new();
+    for kill in 0..KILLED_IMPORTS {
+        let (words, wait) = (moments.one_of(1..12) as usize, moments.wait_us(KILLED_WITHIN_US));
+        println!("kill {kill} of seed {}: {wait:?} after word {words}", moments.seed);
         let shelf = Shelf::new();
         let mut child = ChildProcess::start("store_survives::imports_until_killed", &shelf.path());
         for _ in 0..words {
             child.next_word().unwrap();
         }
+        std::thread::sleep(wait);
         child.kill();
         let mut store = Store::open(&shelf.path()).unwrap();
         store.check().unwrap();

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::{
     calibrate, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
-    report, simulate, store,
+    replay, report, simulate, store,
 };
 
 /// Makes the list of verbs from the names of their files.
@@ -42,6 +42,7 @@ verbs! {
     Measure: measure,
     Odometry: odometry,
     Predict: predict,
+    Replay: replay,
     Report: report,
     Simulate: simulate,
     Store: store,

@@ -1,5 +1,6 @@
 //! `footplate drive`: trains told what to do, line by line, and what comes of it.
 
+mod beginning;
 mod conductor;
 mod instruction;
 mod learning;
@@ -20,15 +21,14 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use footplate_core::control::Driver;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
-use footplate_store::{Journal, Store, layout_named};
+use footplate_store::{Journal, NewMachine, Store};
 use footplate_wire::marklin_serial::Interface;
 
-use self::conductor::{Conductor, Giver};
+pub(crate) use self::beginning::DriveBeginning;
+use self::conductor::Giver;
 use self::instruction::HELP;
-use self::learning::Learning;
 use self::reader::Known;
 use self::result_line::ResultLine;
 use self::script::read_script;
@@ -38,10 +38,12 @@ use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;
 use super::predict::turnout_state;
+use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
+use crate::witness::Witnessed;
 
 /// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
 ///
@@ -83,32 +85,33 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = self.layout()?;
+        let written = self.layout()?;
+        let layout = &written.layout;
         let store = self.store.as_deref().map(Store::open_or_create).transpose()?;
         let mut named: BTreeSet<TrainId> = self.trains.iter().copied().map(TrainId).collect();
         if let Address::Simulated(simulated) = &self.link {
             named.extend(&simulated.trains);
         }
         let known =
-            KnownTrains::gather(&layout, &Sources { files: &self.models, store: store.as_ref(), named })?;
+            KnownTrains::gather(layout, &Sources { files: &self.models, store: store.as_ref(), named })?;
         drop(store);
-        let conductor = self.conductor(&layout, known)?;
+        let beginning = self.beginning(&written, known)?;
         // A person at the prompt lives in real time; a script need not.
         let pace = if self.script.is_some() { Speed::Unpaced } else { Speed::Times(1.0) };
         match &self.link {
             Address::Simulated(simulated) => {
-                let link = open_simulated(simulated, &layout, pace)?;
-                self.drive(&layout, link, conductor, output)
+                let link = open_simulated(simulated, layout, pace)?;
+                self.drive(layout, link, beginning, output)
             }
             Address::Serial(_) => {
-                let link = open(&self.link, &layout, pace)?;
-                self.drive(&layout, link, conductor, output)
+                let link = open(&self.link, layout, pace)?;
+                self.drive(layout, link, beginning, output)
             }
         }
     }
 
     /// The layout: the one that was named, or the simulated one.
-    fn layout(&self) -> anyhow::Result<Layout> {
+    fn layout(&self) -> anyhow::Result<WrittenLayout> {
         let named = match (&self.layout, &self.link) {
             (Some(named), _) => named,
             (None, Address::Simulated(simulated)) => &simulated.layout,
@@ -116,10 +119,11 @@ impl Arguments {
                 bail!("which layout is it? Name it with `--layout track-a` or `--layout my-layout.toml`")
             }
         };
-        Ok(layout_named(named)?.layout)
+        WrittenLayout::named(named)
     }
 
-    fn conductor(&self, layout: &Layout, known: KnownTrains) -> anyhow::Result<Conductor> {
+    fn beginning(&self, written: &WrittenLayout, known: KnownTrains) -> anyhow::Result<DriveBeginning> {
+        let layout = &written.layout;
         let mut turnouts = known.turnouts;
         for (turnout, leg) in &self.turnouts {
             if layout.branch(*turnout).is_none() {
@@ -140,23 +144,33 @@ impl Arguments {
             None if std::io::stdin().is_terminal() => (Giver::Person, Vec::new()),
             None => (Giver::Script, Vec::new()),
         };
-        let mut driver = Driver::new(layout.clone(), turnouts);
-        known.models.into_values().for_each(|model| driver.add_train(model));
-        let mut conductor = Conductor::new(driver, Learning::new(layout, known.fits), giver, steps);
-        if self.script.is_some() {
-            conductor.complete();
-        }
-        Ok(conductor)
+        Ok(DriveBeginning {
+            layout: written.text.clone(),
+            turnouts: written.legs(&turnouts),
+            models: known.models.into_values().collect(),
+            fits: known.fits,
+            giver,
+            script: steps.into_iter().map(|step| step.text).collect(),
+            is_complete: self.script.is_some(),
+        })
     }
 
     /// What writes the session down; the line's clock stands at `at`.
-    fn journal(&self, layout: &Layout, at: Timestamp) -> anyhow::Result<Option<SessionJournal>> {
+    fn journal(
+        &self,
+        layout: &Layout,
+        at: Timestamp,
+        beginning: &DriveBeginning,
+    ) -> anyhow::Result<Option<SessionJournal>> {
         let Some(path) = &self.store else { return Ok(None) };
         let now = now();
         let began_at = Some(now + (Timestamp::ZERO - at));
         let name = format!("drive {}", local(now));
         let store = Store::open_or_create(path)?;
-        let journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
+        let mut journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
+        let body = serde_json::to_string(beginning)?;
+        let program = env!("CARGO_PKG_VERSION");
+        journal.begin_machine(NewMachine { kind: DriveBeginning::KIND, program, body: &body }, now)?;
         // Only a simulated clock can wait for a disk.
         let when_full = match &self.link {
             Address::Simulated(_) => WhenFull::Wait,
@@ -169,17 +183,20 @@ impl Arguments {
         &self,
         layout: &Layout,
         link: L,
-        mut conductor: Conductor,
+        beginning: DriveBeginning,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let settings = session_settings(&self.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
         let lines = self.script.is_none().then(lines_of_stdin);
         let mut stage = Stage::new(lines, self.json);
+        let mut journal = self.journal(layout, link.now(), &beginning)?;
+        let scribe = journal.as_ref().and_then(SessionJournal::scribe);
+        let conductor = beginning.conductor()?;
         if conductor.listens_to_a_person() && !self.json {
             stage.say(HELP, "");
         }
-        let mut journal = self.journal(layout, link.now())?;
+        let mut conductor = Witnessed::new(conductor, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let mut beginnings = Beginnings::default();
@@ -199,8 +216,10 @@ impl Arguments {
                 break ending;
             }
         };
+        let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
+        let mut conductor = conductor.end(at);
         if !closing.is_complete() {
             eprintln!("{closing}");
         }

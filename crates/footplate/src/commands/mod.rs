@@ -17,9 +17,11 @@ mod log_file;
 mod measure;
 mod odometry;
 mod predict;
+mod replay;
 mod report;
 mod simulate;
 mod store;
 mod web_page;
+mod written_layout;
 
 pub(crate) use command::{Command, Outcome};

@@ -1,5 +1,6 @@
 //! `footplate simulate`: worlds whose truth is known.
 
+mod again;
 mod driving;
 mod layout;
 mod line;

@@ -149,7 +149,7 @@ impl SimulatedAddress {
             "speed" if value == "max" => self.speed = Some(Speed::Unpaced),
             "speed" => self.speed = Some(Speed::Times(times(value)?)),
             "trains" => self.trains = trains(value)?,
-            "law" => self.law = Some(law(value)?),
+            "law" => self.law = Some(law_named(value)?),
             "faults" => {
                 self.faults = match value {
                     "some" => true,
@@ -189,7 +189,11 @@ pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
     Ok(trains)
 }
 
-fn law(value: &str) -> Result<LawFamily, String> {
+/// The law of a name.
+///
+/// # Errors
+/// There is none; those that there are.
+pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
     let names = || LawFamily::ALL.map(LawFamily::name).join(", ");
     let named = LawFamily::ALL.into_iter().find(|law| law.name() == value);
     named.ok_or_else(|| format!("there is no law `{value}`; there are {}", names()))

@@ -18,7 +18,7 @@ mod simulated;
 mod stream;
 mod tapped;
 
-pub(crate) use address::{Address, SimulatedAddress, Speed, trains};
+pub(crate) use address::{Address, SimulatedAddress, Speed, law_named, trains};
 pub(crate) use line::{Heard, Link, Lost};
 pub(crate) use open::{module_count, open, open_simulated, session_settings, station};
 pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};

@@ -6,12 +6,12 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
-use std::time::Duration;
 
 use footplate_core::{SpeedStep, Timestamp, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, built_in};
 use serde_json::Value;
 
+use crate::drawn_moments::DrawnMoments;
 use crate::program::footplate;
 
 fn store(name: &str) -> PathBuf {
@@ -67,10 +67,17 @@ fn the_same_seed_is_the_same_evening() {
     assert_eq!(run("2"), run("2"));
 }
 
-/// Kills a session of the program at moments drawn before, and looks at what is left.
+/// Sessions that are killed, and how long (µs) after the first word: chosen, a few seconds' worth.
+const KILLS: u64 = 10;
+const KILLED_WITHIN_US: std::ops::Range<u64> = 0..800_000;
+
+/// Kills a session of the program at drawn moments, and looks at what is left.
 #[test]
 fn every_acknowledged_event_is_in_the_store_after_a_kill_and_learning_goes_on_from_there() {
-    for (number, wait_ms) in [20, 90, 240, 410, 730].into_iter().enumerate() {
+    let mut moments = DrawnMoments::new();
+    for number in 0..KILLS {
+        let wait = moments.wait_us(KILLED_WITHIN_US);
+        println!("kill {number} of seed {}: after {wait:?}", moments.seed);
         let store = store(&format!("demo-killed-{number}"));
         let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
             .args(["demo", "--json", "--speed", "200", "--seed", &number.to_string(), "--store"])
@@ -85,7 +92,7 @@ fn every_acknowledged_event_is_in_the_store_after_a_kill_and_learning_goes_on_fr
             line["acknowledged"].as_u64()
         };
         let mut last = said.by_ref().find_map(|line| acknowledged(Some(line))).expect("something is kept");
-        thread::sleep(Duration::from_millis(wait_ms));
+        thread::sleep(wait);
         child.kill().unwrap();
         child.wait().unwrap();
         // What it said before the end counts, even if nobody had listened yet; the last line may be torn.

@@ -18,6 +18,7 @@ const BELIEVED_MISSED: usize = 2;
 
 /// The trips of one train, the last of them under way.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Chain {
     pub(super) trips: Vec<Trip>,
     origin: Option<Timestamp>,

@@ -36,9 +36,12 @@ const SETTLED: f64 = 2e-4;
 const ALL_BELIEVED: usize = 3;
 /// Collects what one train does and fits its [`MotionModel`] to all of it.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionFit {
     model: MotionModel,
     chain: Chain,
+    /// Follows from the layout, and is made when it is first needed.
+    #[cfg_attr(feature = "serde", serde(skip))]
     sections: Option<SectionIndex>,
     date: Timestamp,
 }

@@ -19,6 +19,7 @@ use crate::units::{Length, Speed};
 
 /// Whether a step moves the train.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum StepUse {
     /// Never tried.
     Untried,
@@ -48,6 +49,7 @@ pub struct StopForecast {
 /// Everything in it is in the train's own measure of way: a hop is as long as the train needs speed times time for it
 /// ([`length`](Self::length)), curves and slopes included, so that a stop takes as far in a curve as on the straight.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionModel {
     train: TrainId,
     highest: SpeedStep,
@@ -65,6 +67,7 @@ pub struct MotionModel {
 
 /// Measurements at one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Counts {
     pub(super) contacts: u32,
     pub(super) stops: u32,

@@ -5,6 +5,7 @@ use crate::kinematics::RampedLag;
 
 /// What a command asks of a train in the state it is in.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Told {
     /// When the command left the line (s, on the clock of the run).
     pub(crate) sent: f64,

@@ -15,6 +15,7 @@ const STEP: f64 = 1e-4;
 
 /// The covariance of a model's numbers.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Spread {
     side: usize,
     covariance: Vec<f64>,

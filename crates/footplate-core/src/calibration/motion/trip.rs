@@ -7,6 +7,7 @@ use super::segment::{Segment, Told};
 
 /// A contact passed, and the way there from the one before (or from where the trip's ways are counted).
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct TripContact {
     /// Mean time at which it closed (s, on the clock of the run) and the variance of that.
     pub(super) time: f64,
@@ -18,6 +19,7 @@ pub(super) struct TripContact {
 
 /// A trip of one train.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Trip {
     /// Step and approach of a train that was running steadily when it was first seen; `None` from standstill.
     pub(super) running: Option<(u8, bool)>,
@@ -28,6 +30,7 @@ pub(super) struct Trip {
     pub(super) told: Vec<Told>,
     pub(super) contacts: Vec<TripContact>,
     /// When pieces of a constant deviation of speed begin (s).
+    #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
     pub(super) pieces: Vec<f64>,
     /// Whether it ended at rest by the train's own law.
     pub(super) came_to_rest: bool,

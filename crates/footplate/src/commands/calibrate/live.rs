@@ -1,5 +1,6 @@
 //! `footplate calibrate --link`: a train is found, driven by a plan that is made as it goes on, and left standing.
 
+mod beginning;
 mod ended;
 mod figures;
 mod kept;
@@ -20,13 +21,17 @@ use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, layout_named};
 use footplate_wire::marklin_serial::Interface;
 
+pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
 use self::watcher::Watcher;
 use super::write_calibration;
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::written_layout::WrittenLayout;
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
+use crate::session_journal::SessionJournal;
+use crate::witness::Witnessed;
 
 /// The highest step of the decoders that a 6051 can talk to.
 const HIGHEST_STEP: u8 = 14;
@@ -77,11 +82,11 @@ struct Driven<'l> {
 impl Session<'_> {
     /// Drives, tells, keeps.
     pub(super) fn run(&self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = layout_named(self.layout)?.layout;
+        let written = WrittenLayout::named(self.layout)?;
         // A simulated railway is what its address says, whatever people believe it to be.
         let real = match self.link {
             Address::Simulated(simulated) => layout_named(&simulated.layout)?.layout,
-            Address::Serial(_) => layout.clone(),
+            Address::Serial(_) => written.layout.clone(),
         };
         if let Address::Simulated(simulated) = self.link
             && !simulated.trains.contains(&self.train)
@@ -103,31 +108,33 @@ impl Session<'_> {
                     eprintln!("train {other} is taken off the simulated rails meanwhile");
                     link.station_mut().world_mut().lift(*other);
                 }
-                self.drive(&layout, link, output)
+                self.drive(&written, link, output)
             }
-            Address::Serial(_) => self.drive(&layout, open(self.link, &real, Speed::Unpaced)?, output),
+            Address::Serial(_) => self.drive(&written, open(self.link, &real, Speed::Unpaced)?, output),
         }
     }
 
-    fn drive<L: Link>(&self, layout: &Layout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+    fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = &on.layout;
         let (fit, turnouts) = self.known(layout)?;
+        let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
+        let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
         let mut written = match self.store {
-            Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now())?),
+            Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
             None => None,
         };
         let settings = session_settings(self.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
+        let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
-
-        let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
-        let mut calibrator = Calibrator::new(layout, settings, fit);
-        calibrator.set_turnouts(turnouts);
+        let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
         let mut watcher = Watcher::new(layout, self.train, self.budget);
         let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let ended = runtime.run(&mut calibrator, &mut watcher);
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
+        let calibrator = calibrator.end(at);
         watcher.end();
         if !closing.is_complete() {
             eprintln!("{closing}");

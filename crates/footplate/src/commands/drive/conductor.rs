@@ -9,6 +9,7 @@ use footplate_core::control::{Driver, Machine, Order, OrderId, Output, Refusal};
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::Landmark;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use serde::{Deserialize, Serialize};
 
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
@@ -16,6 +17,7 @@ use super::reader::Known;
 use super::script::{Step, step};
 use super::spoken::Spoken;
 use super::told::Tongue;
+use crate::witness::{Input, Listener};
 
 /// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
 const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
@@ -26,7 +28,8 @@ const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
 const SEEN_BY_HAND: Length = Length::from_mm(12.0);
 
 /// Who gives the instructions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum Giver {
     /// A file, or another program: a train ends one order before it begins the next.
     Script,
@@ -36,7 +39,7 @@ pub(super) enum Giver {
 
 /// Drives by instructions.
 #[derive(Debug)]
-pub(super) struct Conductor {
+pub(crate) struct Conductor {
     driver: Driver,
     learning: Learning,
     giver: Giver,
@@ -103,7 +106,7 @@ impl Conductor {
     }
 
     /// A person wrote a line.
-    pub(super) fn hear(&mut self, now: Timestamp, line: &str) {
+    fn hear(&mut self, now: Timestamp, line: &str) {
         let known = Known { layout: self.driver.layout(), trains: &self.trains };
         match step(line, known) {
             Ok(heard) => {
@@ -297,5 +300,15 @@ impl Machine for Conductor {
             Until::At(..) | Until::Located(_) => wait.since + WAIT_LIMIT,
         });
         [self.driver.next_timeout(), now_and_then].into_iter().flatten().min()
+    }
+}
+
+impl Listener for Conductor {
+    fn handle_word(&mut self, now: Timestamp, word: &Input) {
+        match word {
+            Input::Line(line) => self.hear(now, line),
+            Input::NoMoreLines => self.complete(),
+            _ => {}
+        }
     }
 }

@@ -6,7 +6,7 @@ use footplate_core::{Length, TimeSpan, TrainId};
 
 /// Something to be said.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Spoken {
+pub(crate) enum Spoken {
     /// For people, and what could stand below it: where trains are.
     Line {
         /// The line.
@@ -24,7 +24,7 @@ pub(super) enum Spoken {
 
 /// An order that has ended, well or not.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ended {
+pub(crate) struct Ended {
     /// As it was written.
     pub(super) text: String,
     /// Its first word.
@@ -47,7 +47,7 @@ pub(super) struct Ended {
 
 /// Where an order was to lead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Target {
+pub(crate) enum Target {
     /// Nowhere in particular.
     None,
     /// To a place.

@@ -11,6 +11,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::conductor::Conductor;
 use super::spoken::{Ended, Spoken};
 use crate::runtime::{Attendant, Wish};
+use crate::witness::{Input, Witnessed};
 
 /// Lines that a person writes, as they come.
 pub(super) fn lines_of_stdin() -> Receiver<String> {
@@ -70,7 +71,7 @@ impl Stage {
     }
 }
 
-impl Attendant<Conductor> for Stage {
+impl Attendant<Witnessed<Conductor>> for Stage {
     fn hear(&mut self, _: Timestamp, notice: Spoken) {
         match notice {
             Spoken::Line { text, status } => self.screen.say(&text, &status),
@@ -86,17 +87,17 @@ impl Attendant<Conductor> for Stage {
     }
 
     fn hear_of_refusal(&mut self, _: Timestamp, command: Command, error: CommandError) {
-        self.screen.say(&format!("not sent: {}: {error}", super::told::said(&command)), "");
+        self.screen.say(&format!("not sent: {command}: {error}"), "");
     }
 
-    fn attend(&mut self, now: Timestamp, conductor: &mut Conductor) -> Wish {
+    fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) -> Wish {
         while let Some(lines) = &self.lines {
             match lines.try_recv() {
-                Ok(line) => conductor.hear(now, &line),
+                Ok(line) => conductor.handle_word(now, &Input::Line(line)),
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => {
                     self.lines = None;
-                    conductor.complete();
+                    conductor.handle_word(now, &Input::NoMoreLines);
                     conductor.handle_timeout(now);
                 }
             }

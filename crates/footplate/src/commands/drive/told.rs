@@ -3,7 +3,7 @@
 use footplate_core::control::{DriveNotice, Driver, Finished, Order, PlannedStop};
 use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
-use footplate_core::{Command, SensorId, Timestamp, TrainId};
+use footplate_core::{SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
 
@@ -130,7 +130,7 @@ impl Tongue<'_> {
                 self.at(*time),
                 self.sensor(*sensor)
             ),
-            DriveNotice::Unconfirmed { command } => format!("no sign that this has left: {}", said(command)),
+            DriveNotice::Unconfirmed { command } => format!("no sign that this has left: {command}"),
             // Whoever replaced it knows; what was given up is said with the order it was.
             DriveNotice::Replaced { .. } | DriveNotice::GivenUp { .. } => return None,
         })
@@ -190,15 +190,4 @@ impl Tongue<'_> {
 
 const fn leg(curved: bool) -> &'static str {
     if curved { "curved" } else { "straight" }
-}
-
-/// A command in words.
-pub(super) fn said(command: &Command) -> String {
-    match command {
-        Command::Speed { train, step } => format!("step {step} for train {train}"),
-        Command::Reverse { train } => format!("turn around, train {train}"),
-        Command::Turnout { turnout, curved } => format!("turnout {turnout} {}", leg(*curved)),
-        Command::PowerOff => "power off".to_owned(),
-        Command::PowerOn => "power on".to_owned(),
-    }
 }

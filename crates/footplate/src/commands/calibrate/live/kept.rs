@@ -4,8 +4,9 @@ use std::path::Path;
 
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
-use footplate_store::{Journal, Store};
+use footplate_store::{Journal, NewMachine, Store};
 
+use super::beginning::CalibrationBeginning;
 use crate::clock::{local, now};
 use crate::link::Address;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
@@ -20,12 +21,16 @@ pub(super) fn begin(
     train: TrainId,
     link: &Address,
     at: Timestamp,
+    beginning: &CalibrationBeginning,
 ) -> anyhow::Result<SessionJournal> {
     let now = now();
     let began_at = now + (Timestamp::ZERO - at);
     let name = format!("calibration of train {train}, {}", local(now));
     let store = Store::open_or_create(path)?;
-    let journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
+    let mut journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
+    let body = serde_json::to_string(beginning)?;
+    let program = env!("CARGO_PKG_VERSION");
+    journal.begin_machine(NewMachine { kind: CalibrationBeginning::KIND, program, body: &body }, now)?;
     // A simulated clock stands still for a slow disk; trains on a real track do not.
     let when_full = match link {
         Address::Simulated(_) => WhenFull::Wait,

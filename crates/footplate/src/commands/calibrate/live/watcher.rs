@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::figures::minutes;
 use super::told;
 use crate::runtime::{Attendant, Wish};
+use crate::witness::Witnessed;
 
 /// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
 const EXPLAINED: Length = Length::from_mm(40.0);
@@ -69,7 +70,7 @@ impl<'l> Watcher<'l> {
     }
 }
 
-impl<'l> Attendant<Calibrator<'l>> for Watcher<'_> {
+impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
     fn hear(&mut self, now: Timestamp, notice: CalibrationNotice) {
         if let CalibrationNotice::Progress(progress) = &notice {
             self.began = self.began.or(Some(now + (TimeSpan::ZERO - progress.elapsed)));
@@ -95,8 +96,8 @@ impl<'l> Attendant<Calibrator<'l>> for Watcher<'_> {
         self.say(now, &format!("{command:?} was not taken: {error}"));
     }
 
-    fn attend(&mut self, _: Timestamp, machine: &mut Calibrator<'l>) -> Wish {
-        let is_over = machine.ending().is_some() || self.other_layout.is_some();
+    fn attend(&mut self, _: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {
+        let is_over = machine.machine().ending().is_some() || self.other_layout.is_some();
         if is_over { Wish::Finish } else { Wish::GoOn }
     }
 }

@@ -1,0 +1,170 @@
+//! What a machine decided in a live session, and all that it followed from.
+//!
+//! A machine is kept as it began, and behind that, numbered together, what it was told and what it decided. Every row is
+//! one [`Traced`]; what its text means is known to whoever wrote it.
+
+use std::borrow::Cow;
+
+use footplate_core::Timestamp;
+use rusqlite::{Row, Transaction};
+
+use super::error::StoreError;
+use super::file::Store;
+use super::recordings::RecordingKey;
+use crate::content_hash::ContentHash;
+
+/// A machine by its number in the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MachineKey(pub i64);
+
+/// A machine that begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NewMachine<'a> {
+    /// Which kind of machine, such as `drive`.
+    pub kind: &'a str,
+    /// The version of the program.
+    pub program: &'a str,
+    /// All that it is made of, as JSON.
+    pub body: &'a str,
+}
+
+/// A machine as it began in a session that is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredMachine {
+    /// Its number in the store.
+    pub key: MachineKey,
+    /// The session.
+    pub recording: RecordingKey,
+    /// When it was stored.
+    pub stored_at: Timestamp,
+    /// Which kind of machine.
+    pub kind: String,
+    /// The version of the program that ran it.
+    pub program: String,
+    /// All that it was made of, as JSON.
+    pub body: String,
+    /// Whether the body is what was written, byte for byte.
+    pub is_whole: bool,
+    /// How many inputs of it are kept.
+    pub inputs: u64,
+    /// How many of its decisions are kept.
+    pub decisions: u64,
+}
+
+/// Which way something went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The machine was told.
+    Input,
+    /// The machine decided.
+    Decision,
+}
+
+/// One thing that a machine was told or decided.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Traced {
+    /// Counts inputs and decisions of a machine together, from 0 on without a gap.
+    pub number: u64,
+    /// When the machine was told, on the clock of the run; of a decision, when it was told what came before.
+    pub time: Timestamp,
+    /// Told or decided.
+    pub side: Side,
+    /// What kind of input or decision.
+    pub kind: Cow<'static, str>,
+    /// What exactly.
+    pub text: String,
+}
+
+impl Store {
+    /// Keeps how a machine begins in a live session.
+    ///
+    /// # Errors
+    /// The store cannot be written, or the body is no JSON.
+    pub fn begin_machine(
+        &mut self,
+        recording: RecordingKey,
+        new: NewMachine<'_>,
+        now: Timestamp,
+    ) -> Result<MachineKey, StoreError> {
+        let sql = "INSERT INTO machines (recording, stored_at_ns, kind, program, body, body_sha256) \
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+        let hash = ContentHash::of(new.body.as_bytes()).to_string();
+        let row = (recording.0, now.as_ns(), new.kind, new.program, new.body, hash);
+        self.connection.execute(sql, row).map_err(|error| self.error(error))?;
+        Ok(MachineKey(self.connection.last_insert_rowid()))
+    }
+
+    /// The machines of all sessions, in the order in which they began.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub fn machines(&self) -> Result<Vec<StoredMachine>, StoreError> {
+        let sql = "SELECT id, recording, stored_at_ns, kind, program, body, body_sha256, \
+                   (SELECT count(*) FROM inputs WHERE machine = machines.id), \
+                   (SELECT count(*) FROM decisions WHERE machine = machines.id) FROM machines ORDER BY id";
+        let read = || {
+            let mut statement = self.connection.prepare(sql)?;
+            statement.query_map([], machine)?.collect::<rusqlite::Result<Vec<StoredMachine>>>()
+        };
+        read().map_err(|error| self.error(error))
+    }
+
+    /// All that a machine was told and decided, in its order.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub fn trace(&self, machine: MachineKey) -> Result<Vec<Traced>, StoreError> {
+        let sql = "SELECT number, time_ns, 0, kind, text FROM inputs WHERE machine = ?1 UNION ALL \
+                   SELECT number, time_ns, 1, kind, text FROM decisions WHERE machine = ?1 ORDER BY number";
+        let read = || {
+            let mut statement = self.connection.prepare(sql)?;
+            statement.query_map([machine.0], traced)?.collect::<rusqlite::Result<Vec<Traced>>>()
+        };
+        read().map_err(|error| self.error(error))
+    }
+}
+
+fn machine(row: &Row<'_>) -> rusqlite::Result<StoredMachine> {
+    let body: String = row.get(5)?;
+    let hash: String = row.get(6)?;
+    Ok(StoredMachine {
+        key: MachineKey(row.get(0)?),
+        recording: RecordingKey(row.get(1)?),
+        stored_at: Timestamp::from_ns(row.get(2)?),
+        kind: row.get(3)?,
+        program: row.get(4)?,
+        is_whole: ContentHash::of(body.as_bytes()).to_string() == hash,
+        body,
+        inputs: row.get(7)?,
+        decisions: row.get(8)?,
+    })
+}
+
+fn traced(row: &Row<'_>) -> rusqlite::Result<Traced> {
+    Ok(Traced {
+        number: row.get(0)?,
+        time: Timestamp::from_ns(row.get(1)?),
+        side: if row.get::<_, bool>(2)? { Side::Decision } else { Side::Input },
+        kind: Cow::Owned(row.get(3)?),
+        text: row.get(4)?,
+    })
+}
+
+/// Appends one thing that a machine was told or decided.
+pub(super) fn insert(
+    transaction: &Transaction<'_>,
+    machine: MachineKey,
+    traced: &Traced,
+) -> rusqlite::Result<()> {
+    let sql = match traced.side {
+        Side::Input => {
+            "INSERT INTO inputs (machine, number, time_ns, kind, text) VALUES (?1, ?2, ?3, ?4, ?5)"
+        }
+        Side::Decision => {
+            "INSERT INTO decisions (machine, number, time_ns, kind, text) VALUES (?1, ?2, ?3, ?4, ?5)"
+        }
+    };
+    let row = (machine.0, traced.number, traced.time.as_ns(), traced.kind.as_ref(), traced.text.as_str());
+    transaction.prepare_cached(sql)?.execute(row)?;
+    Ok(())
+}

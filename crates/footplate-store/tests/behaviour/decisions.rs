@@ -1,0 +1,80 @@
+//! What a machine was told and decided comes back as it was, and belongs to a machine that began.
+
+use std::borrow::Cow;
+
+use footplate_core::{Event, EventKind, Timestamp, TrainId};
+use footplate_store::{Journal, JournalEntry, MachineKey, NewMachine, Side, Store, Traced, salvage};
+
+use crate::stores::{Shelf, minute};
+
+const DRIVE: NewMachine<'_> =
+    NewMachine { kind: "drive", program: "0.1.0", body: r#"{"number":0.30000000000000004}"# };
+
+fn traced(number: u64) -> Traced {
+    let (side, kind) = match number % 3 {
+        0 => (Side::Input, "timeout"),
+        1 => (Side::Decision, "command"),
+        _ => (Side::Decision, "notice"),
+    };
+    let text = format!("\"{number} \u{b1} ä\"\n");
+    Traced { number, time: Timestamp::from_ns(number as i64 * 7), side, kind: Cow::Borrowed(kind), text }
+}
+
+fn journal(shelf: &Shelf) -> Journal {
+    Journal::begin(shelf.store(), "evening", "track-a", None, &[], minute(0)).unwrap()
+}
+
+#[test]
+fn a_trace_comes_back_in_its_order_whatever_stands_between() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    let event = Event { time: Timestamp::ZERO, kind: EventKind::Reverse { train: TrainId(24) } };
+    for number in 0..50 {
+        let entries = [JournalEntry::Event(event), JournalEntry::Traced(traced(number))];
+        assert_eq!(journal.append_all(&entries, minute(1)).unwrap(), number + 1, "only events are counted");
+    }
+    // Another machine of the same session counts anew.
+    journal.begin_machine(NewMachine { kind: "calibrate", ..DRIVE }, minute(2)).unwrap();
+    journal.append_all(&[JournalEntry::Traced(traced(0))], minute(2)).unwrap();
+
+    let store = journal.end();
+    let machines = store.machines().unwrap();
+    let counts: Vec<_> =
+        machines.iter().map(|one| (one.kind.as_str(), one.is_whole, one.inputs, one.decisions)).collect();
+    assert_eq!(counts, [("drive", true, 17, 33), ("calibrate", true, 1, 0)]);
+    assert_eq!(machines[0].body, DRIVE.body);
+    assert_eq!(store.trace(machines[0].key).unwrap(), (0..50).map(traced).collect::<Vec<_>>());
+    assert_eq!(store.trace(machines[1].key).unwrap(), [traced(0)]);
+    assert_eq!(store.trace(MachineKey(9)).unwrap(), []);
+    // And all of it comes over when the store is salvaged.
+    drop(store);
+    let into = shelf.file("new.db");
+    salvage(&shelf.path(), &into).unwrap();
+    let salvaged = Store::open(&into).unwrap();
+    assert_eq!(salvaged.machines().unwrap(), machines);
+    assert_eq!(salvaged.trace(machines[0].key).unwrap(), (0..50).map(traced).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_no_machine_decided_is_refused_with_all_that_came_together_with_it() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    let event = Event { time: Timestamp::ZERO, kind: EventKind::Reverse { train: TrainId(24) } };
+    let entries = [JournalEntry::Event(event), JournalEntry::Traced(traced(0))];
+    assert!(journal.append_all(&entries, minute(1)).is_err());
+    assert_eq!(journal.acknowledged(), 0);
+    let recording = journal.recording();
+    assert!(journal.end().runs(recording, minute(2)).unwrap()[0].events.is_empty());
+}
+
+#[test]
+fn a_beginning_that_was_changed_from_outside_is_noticed() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    drop(journal);
+    let other = rusqlite::Connection::open(shelf.path()).unwrap();
+    other.execute_batch("DROP TRIGGER machines_are_not_changed; UPDATE machines SET body = '{}'").unwrap();
+    assert!(!shelf.store().machines().unwrap()[0].is_whole);
+}

@@ -1,0 +1,49 @@
+//! How a calibration begins, as it is kept: all that its machine is made of.
+
+use footplate_core::calibration::motion::MotionFit;
+use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
+use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::{Length, StretchId, TimeSpan, TurnoutId};
+use serde::{Deserialize, Serialize};
+
+use crate::commands::written_layout::WrittenLayout;
+use crate::witness::Listener;
+
+/// All that a [`Calibrator`] is made of. A session and its replay both make theirs of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct CalibrationBeginning {
+    /// The text of the layout.
+    pub(crate) layout: String,
+    turnouts: Vec<(TurnoutId, Leg)>,
+    budget: TimeSpan,
+    train_length: Length,
+    avoid: Vec<StretchId>,
+    fit: MotionFit,
+}
+
+impl CalibrationBeginning {
+    /// The name of such a machine in a store.
+    pub(crate) const KIND: &'static str = "calibrate";
+
+    pub(super) fn new(
+        written: &WrittenLayout,
+        settings: CalibratorSettings,
+        fit: MotionFit,
+        turnouts: &TurnoutStates,
+    ) -> Self {
+        let CalibratorSettings { budget, train_length, avoid } = settings;
+        let turnouts = written.legs(turnouts);
+        Self { layout: written.text.clone(), turnouts, budget, train_length, avoid, fit }
+    }
+
+    /// The calibrator that begins so, on the layout that the text says.
+    pub(crate) fn calibrator(self, layout: &Layout) -> Calibrator<'_> {
+        let Self { turnouts, budget, train_length, avoid, fit, .. } = self;
+        let mut calibrator = Calibrator::new(layout, CalibratorSettings { budget, train_length, avoid }, fit);
+        calibrator.set_turnouts(turnouts.into_iter().collect());
+        calibrator
+    }
+}
+
+/// Nobody speaks to it.
+impl Listener for Calibrator<'_> {}

@@ -1,0 +1,60 @@
+//! How a session of driving begins, as it is kept: all that its conductor is made of.
+
+use anyhow::Context;
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::control::Driver;
+use footplate_core::track::Leg;
+use footplate_core::{SpeedStep, TrainId, TurnoutId};
+use serde::{Deserialize, Serialize};
+
+use super::conductor::{Conductor, Giver};
+use super::learning::Learning;
+use super::reader::Known;
+use super::script::step;
+use crate::commands::written_layout::WrittenLayout;
+
+/// All that a [`Conductor`] is made of. A session and its replay both make theirs of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct DriveBeginning {
+    /// The text of the layout.
+    pub(super) layout: String,
+    /// How turnouts lie, as far as that is known.
+    pub(super) turnouts: Vec<(TurnoutId, Leg)>,
+    /// How each train moves.
+    pub(super) models: Vec<MotionModel>,
+    /// What trains taught before, to learn on from.
+    pub(super) fits: Vec<MotionFit>,
+    pub(super) giver: Giver,
+    /// Lines that are known from the beginning ...
+    pub(super) script: Vec<String>,
+    /// ... and whether more may come.
+    pub(super) is_complete: bool,
+}
+
+impl DriveBeginning {
+    /// The name of such a machine in a store.
+    pub(crate) const KIND: &'static str = "drive";
+
+    /// The conductor that begins so.
+    ///
+    /// # Errors
+    /// What makes no conductor: the text of the layout, or a line of the script.
+    pub(crate) fn conductor(self) -> anyhow::Result<Conductor> {
+        let layout = WrittenLayout::of("the layout of the session", self.layout)?.layout;
+        let highest = self.models.iter().map(|model| (model.train(), model.highest()));
+        let highest: std::collections::BTreeMap<TrainId, SpeedStep> = highest.collect();
+        let known = Known { layout: &layout, trains: &highest };
+        let mut steps = Vec::new();
+        for line in &self.script {
+            let read = step(line, known).map_err(|mistake| anyhow::anyhow!("{mistake}"));
+            steps.extend(read.with_context(|| format!("the line `{line}` of the script"))?);
+        }
+        let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
+        self.models.into_iter().for_each(|model| driver.add_train(model));
+        let mut conductor = Conductor::new(driver, Learning::new(&layout, self.fits), self.giver, steps);
+        if self.is_complete {
+            conductor.complete();
+        }
+        Ok(conductor)
+    }
+}

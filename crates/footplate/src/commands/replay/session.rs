@@ -1,0 +1,56 @@
+//! The machine of a session made again, and told what it was told.
+
+use anyhow::{Context, bail};
+use footplate_store::{StoredMachine, Traced};
+use serde::de::DeserializeOwned;
+
+use crate::commands::calibrate::CalibrationBeginning;
+use crate::commands::drive::DriveBeginning;
+use crate::commands::written_layout::WrittenLayout;
+use crate::witness::{Extent, Rehearing, rehear};
+
+/// Makes a machine as it began, and compares what it decides now with what it decided then.
+///
+/// # Errors
+/// This program cannot make the machine: what it is made of is damaged, or of another version.
+pub(super) fn rehearse(
+    stored: &StoredMachine,
+    trace: Vec<Traced>,
+    extent: Extent,
+) -> anyhow::Result<Rehearing> {
+    if !stored.is_whole {
+        bail!(
+            "how the machine of recording {} began is not what was written down: the store is damaged",
+            stored.recording
+        );
+    }
+    match stored.kind.as_str() {
+        DriveBeginning::KIND => {
+            let beginning: DriveBeginning = read(stored)?;
+            Ok(rehear(&mut beginning.conductor()?, trace, extent))
+        }
+        CalibrationBeginning::KIND => {
+            let beginning: CalibrationBeginning = read(stored)?;
+            let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
+            Ok(rehear(&mut beginning.calibrator(&layout), trace, extent))
+        }
+        other => bail!(
+            "recording {} was decided by a machine of the kind `{other}`, which this version ({}) does not have; it \
+             was recorded by version {}",
+            stored.recording,
+            env!("CARGO_PKG_VERSION"),
+            stored.program
+        ),
+    }
+}
+
+fn read<B: DeserializeOwned>(stored: &StoredMachine) -> anyhow::Result<B> {
+    serde_json::from_str(&stored.body).with_context(|| {
+        format!(
+            "the machine of recording {} began as version {} of the program knew it, and this one ({}) misses something",
+            stored.recording,
+            stored.program,
+            env!("CARGO_PKG_VERSION")
+        )
+    })
+}

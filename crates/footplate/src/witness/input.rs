@@ -1,0 +1,124 @@
+//! What a machine can be told, and the words for it in a recording.
+
+use footplate_core::Event;
+
+/// Something that a machine is told. All that it decides follows from how it began and these, in their order and at
+/// their times.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Input {
+    /// An entry of the recording.
+    Event(Event),
+    /// The time that it asked for has come.
+    Timeout,
+    /// Somebody wrote a line.
+    Line(String),
+    /// No more lines will come.
+    NoMoreLines,
+    /// Nothing more: whoever ran it had enough. Not told to the machine; a recording without it was cut off.
+    End,
+}
+
+/// Why a row of a recording is no input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum InputError {
+    /// A kind that this program does not know.
+    Unknown { kind: String },
+    /// An event that is none.
+    NoEvent { text: String, why: String },
+}
+
+impl std::fmt::Display for InputError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unknown { kind } => {
+                write!(f, "an input of the kind `{kind}`, which this version of the program does not know")
+            }
+            Self::NoEvent { text, why } => write!(f, "an event that is none, `{text}`: {why}"),
+        }
+    }
+}
+
+impl std::error::Error for InputError {}
+
+impl Input {
+    /// The kind and the text of its row.
+    pub(crate) fn written(&self) -> (&'static str, String) {
+        match self {
+            // Numbers and names of variants have a form in JSON, so this cannot fail; an empty text is no event.
+            Self::Event(event) => ("event", serde_json::to_string(event).unwrap_or_default()),
+            Self::Timeout => ("timeout", String::new()),
+            Self::Line(line) => ("line", line.clone()),
+            Self::NoMoreLines => ("no-more-lines", String::new()),
+            Self::End => ("end", String::new()),
+        }
+    }
+
+    /// Reads what [`written`](Self::written) writes.
+    ///
+    /// # Errors
+    /// The row is of another version of the program, or damaged.
+    pub(crate) fn read(kind: &str, text: &str) -> Result<Self, InputError> {
+        Ok(match kind {
+            "event" => {
+                let event = serde_json::from_str(text);
+                Self::Event(
+                    event.map_err(|error| InputError::NoEvent {
+                        text: text.to_owned(),
+                        why: error.to_string(),
+                    })?,
+                )
+            }
+            "timeout" => Self::Timeout,
+            "line" => Self::Line(text.to_owned()),
+            "no-more-lines" => Self::NoMoreLines,
+            "end" => Self::End,
+            _ => return Err(InputError::Unknown { kind: kind.to_owned() }),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::{
+        EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    };
+
+    use super::*;
+
+    #[test]
+    fn every_input_comes_back_from_its_row_to_the_last_bit() {
+        let train = TrainId(24);
+        let report = Report { sensor: SensorId(77), poll_interval: Some(TimeSpan::from_ns(57_812_345)) };
+        let step = SpeedStep::new(9).unwrap();
+        let kinds = [
+            EventKind::Sensor(report),
+            EventKind::Sensor(Report { poll_interval: None, ..report }),
+            EventKind::Speed { train, step },
+            EventKind::Reverse { train },
+            EventKind::Turnout { turnout: TurnoutId(11), curved: true },
+            EventKind::Stopped { train, landmark: SensorId(3), offset: Length::from_m(0.1 + 0.2) },
+        ];
+        let time = Timestamp::from_ns(1_234_567_890_123);
+        let mut inputs: Vec<Input> = kinds.map(|kind| Input::Event(Event { time, kind })).into();
+        inputs.extend([
+            Input::Timeout,
+            Input::Line("stop 24 at C13+120mm  # näher".to_owned()),
+            Input::NoMoreLines,
+            Input::End,
+        ]);
+        for input in inputs {
+            let (kind, text) = input.written();
+            assert_eq!(Input::read(kind, &text), Ok(input));
+        }
+    }
+
+    #[test]
+    fn what_is_no_input_is_named() {
+        let unknown = Input::read("telepathy", "").unwrap_err().to_string();
+        assert!(
+            unknown.contains("`telepathy`, which this version of the program does not know"),
+            "{unknown}"
+        );
+        assert!(matches!(Input::read("event", "{\"time\":1"), Err(InputError::NoEvent { .. })));
+    }
+}

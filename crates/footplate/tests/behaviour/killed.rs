@@ -1,0 +1,100 @@
+//! A session that is killed leaves a beginning of itself in the store: whole rows, in order, and decided alike again.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+
+use footplate_core::{Event, Timestamp};
+use footplate_store::{Side, Store, Traced};
+
+use crate::drawn_moments::DrawnMoments;
+use crate::program::footplate;
+
+/// Sessions that are killed, chosen: some seconds' worth.
+const KILLS: usize = 12;
+/// Kills come so long (µs) after the program was started: a calibration takes a second or two.
+const KILLED_WITHIN_US: std::ops::Range<u64> = 20_000..1_200_000;
+
+const CALIBRATE: [&str; 7] =
+    ["calibrate", "--link", "sim:track-a?seed=4", "--layout", "track-a", "--train", "24"];
+
+fn path_of(name: impl std::fmt::Display) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("killed");
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    folder.join(format!("{name}.db"))
+}
+
+/// A place where no store is.
+fn fresh(name: impl std::fmt::Display) -> PathBuf {
+    let path = path_of(name);
+    for ending in ["", "-wal", "-shm"] {
+        let _ = std::fs::remove_file(format!("{}{ending}", path.display()));
+    }
+    path
+}
+
+/// The events and the trace of the only session in a store, if it got so far.
+fn kept(path: &Path) -> (Vec<Event>, Vec<Traced>) {
+    let late = Timestamp::from_ns(i64::MAX);
+    let Ok(store) = Store::open(path) else { return Default::default() };
+    store.check().expect("it is sound");
+    let runs = store.recordings(late).expect("readable");
+    let runs = runs.first().map(|recording| store.runs(recording.key, late).expect("readable"));
+    let events = runs.into_iter().flatten().flat_map(|run| run.events).map(|stored| stored.raw.event);
+    let machines = store.machines().expect("readable");
+    let trace = machines.first().map(|machine| store.trace(machine.key).expect("readable"));
+    (events.collect(), trace.unwrap_or_default())
+}
+
+#[test]
+fn a_calibration_that_is_killed_leaves_the_beginning_of_the_one_that_is_not() {
+    let whole = fresh("whole");
+    let run = footplate(&[&CALIBRATE[..], &["--store", whole.to_str().expect("a plain name")]].concat());
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let (events, trace) = kept(&whole);
+    assert_eq!(trace.last().map(|row| row.kind.as_ref()), Some("end"));
+
+    let mut moments = DrawnMoments::new();
+    let mut cut_off = 0;
+    for kill in 0..KILLS {
+        let wait = moments.wait_us(KILLED_WITHIN_US);
+        println!("kill {kill} of seed {}: after {wait:?}", moments.seed);
+        let path = fresh(kill);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
+            .args(CALIBRATE)
+            .arg("--store")
+            .arg(&path)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        thread::sleep(wait);
+        child.kill().expect("it can be killed");
+        child.wait().expect("it ends");
+
+        let (some, told) = kept(&path);
+        assert!(some.len() <= events.len() && told.len() <= trace.len());
+        assert_eq!(some, events[..some.len()], "events are those of the whole session, from its beginning");
+        assert_eq!(told, trace[..told.len()], "and so is what was told and decided");
+        // No event reached the machine, and no command a train, before it was on its way to the disk.
+        let inputs = told.iter().filter(|row| row.side == Side::Input && row.kind == "event").count();
+        assert!(inputs <= some.len());
+        if told.is_empty() {
+            continue;
+        }
+        cut_off += usize::from(told.len() < trace.len());
+        let replay = footplate(&["replay", path.to_str().expect("a plain name"), "--diff"]);
+        assert_eq!(replay.status, 0, "{}{}", replay.output, replay.errors);
+        assert!(replay.output.contains("all the same"), "{}", replay.output);
+        assert_eq!(replay.output.contains("it was killed"), told.len() < trace.len(), "{}", replay.output);
+    }
+    assert!(cut_off > 0, "no session was killed while it ran");
+
+    // And the next session goes on from what is there.
+    let path = (0..KILLS).map(path_of).find(|path| kept(path).0.len() > 50);
+    if let Some(path) = path {
+        let store = path.to_str().expect("a plain name");
+        let next = footplate(&[&CALIBRATE[..], &["--budget", "60s", "--store", store]].concat());
+        assert!(next.status < 2 && next.errors.contains("going on from 1 runs"), "{}", next.errors);
+    }
+}
