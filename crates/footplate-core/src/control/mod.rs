@@ -11,7 +11,7 @@ mod machine;
 
 pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use drive::{
-    Achieved, Aim, DriveNotice, Driver, Finished, Gap, Order, OrderId, PlannedStop, Promise, Refusal,
-    StopOrder,
+    Achieved, Aim, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine, PlannedStop, Promise,
+    Refusal, StopOrder,
 };
 pub use machine::{Machine, Output};

@@ -6,6 +6,7 @@
 
 use super::felt_way::{FeltReach, felt_reach, felt_reaches, taping_doubt};
 use super::ground::Ground;
+use super::outlook::Outlook;
 use crate::calibration::motion::{Following, Guess, MotionModel};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
@@ -291,6 +292,11 @@ impl Locator {
             });
         }
         None
+    }
+
+    /// Where it most likely goes from here; `None` while it is lost.
+    pub(crate) fn outlook(&self) -> Option<Outlook> {
+        Some(Outlook::new(self.node?, self.epoch, self.following.course()))
     }
 
     /// Where it would come to rest if step 0 left the line at a time (not before the last entry), after any commands

@@ -8,8 +8,8 @@ use footplate_core::control::{Aim, DriveNotice, Driver, Machine, Order, Output, 
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::Landmark;
 use footplate_core::{
-    Command, Event, EventKind, Length, NodeId, Ratio, Report, SensorId, SpeedStep, TimeSpan, Timestamp,
-    TrainId, TurnoutId,
+    Command, Event, EventKind, Length, NodeId, Ratio, Report, SensorId, Speed, SpeedStep, TimeSpan,
+    Timestamp, TrainId, TurnoutId,
 };
 use proptest::collection::vec;
 use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_oneof, proptest};
@@ -40,6 +40,10 @@ fn any_mm() -> impl Strategy<Value = Length> {
     prop_oneof![8 => -500.0..3_000.0_f64, 1 => any::<f64>()].prop_map(Length::from_mm)
 }
 
+fn any_speed() -> impl Strategy<Value = Speed> {
+    prop_oneof![8 => 0.0..700.0_f64, 1 => any::<f64>()].prop_map(Speed::from_mm_per_s)
+}
+
 fn any_order() -> impl Strategy<Value = Order> {
     let aim = prop_oneof![
         Just(Aim::Median),
@@ -57,6 +61,7 @@ fn any_order() -> impl Strategy<Value = Order> {
             Order::Stop(StopOrder { train, target, aim, step, next_round })
         }),
         (any_train(), any_mm()).prop_map(|(train, distance)| Order::Move { train, distance }),
+        (any_train(), any_speed()).prop_map(|(train, speed)| Order::Hold { train, speed }),
     ]
 }
 

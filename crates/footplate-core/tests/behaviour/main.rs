@@ -10,6 +10,7 @@ mod inertial;
 mod motion_checks;
 mod motion_models;
 mod odometer;
+mod pacing;
 mod profiles;
 mod short_moves;
 mod speed_change_laws;

@@ -330,6 +330,16 @@ impl ToyRailway {
 
 /// What is known of a toy train after three minutes of runs and stops at eight steps.
 pub(crate) fn known_model(train: u16) -> MotionModel {
+    known_after(train, &[])
+}
+
+/// The same after some minutes more, in which every step was reached from below and from above.
+pub(crate) fn known_model_both_ways(train: u16) -> MotionModel {
+    let up_and_down: Vec<u8> = (3..=14).chain((3..14).rev()).collect();
+    known_after(train, &up_and_down)
+}
+
+fn known_after(train: u16, steps: &[u8]) -> MotionModel {
     let mut world = ToyRailway::new(train, "D1", 300.0);
     let id = TrainId(train);
     let mut fit = MotionFit::new(id, step(14));
@@ -349,8 +359,29 @@ pub(crate) fn known_model(train: u16) -> MotionModel {
         }
         fit.note_use(step(speed), StepUse::Moves);
     }
+    let rest = if steps.is_empty() { None } else { Some((0, 5.0)) };
+    for (speed, runs_for) in steps.iter().map(|speed| (*speed, 9.0)).chain(rest) {
+        world.command(Command::Speed { train: id, step: step(speed) });
+        let end = world.now + TimeSpan::from_s(runs_for);
+        while world.now < end {
+            for event in world.tick() {
+                fit.take(&world.layout, &turnouts, &event);
+            }
+        }
+        if speed > 0 {
+            fit.note_use(step(speed), StepUse::Moves);
+        }
+    }
     fit.refit(&SectionIndex::of(&world.layout));
     fit.model().clone()
+}
+
+/// A driver of train 24 as after [`known_model_both_ways`].
+pub(crate) fn driver_of_both_ways(world: &ToyRailway, node: &str, mm: f64) -> Driver {
+    static MODEL: OnceLock<MotionModel> = OnceLock::new();
+    let mut driver = driver_of(world, node, mm);
+    driver.set_model(MODEL.get_or_init(|| known_model_both_ways(24)).clone());
+    driver
 }
 
 /// One more train for a driver, which moves as all toy trains do.

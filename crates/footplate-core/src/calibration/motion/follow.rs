@@ -1,34 +1,20 @@
 //! A train under way: where its laws take it from one command to the next, with the doubts that come with each.
 //!
-//! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
-//! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
-//! the laws, `r(t)` share of its change that is done. The train is at
-//!
-//! ```text
-//! x(t) = b + e^ε S(t − η) + ζ r(t)
-//! ```
-//!
-//! `(b, ε, η, ζ)` is a Kalman filter's state. A new command begins a new segment: its `b` is the `x` at which it takes
-//! effect, and the doubt of its own speed and displacement come to `ε` and `ζ`.
+//! The letters `(b, ε, η, ζ)` of its [`Course`] are a Kalman filter's state. A new command begins a new segment: its `b` is
+//! the `x` at which it takes effect, and the doubt of its own speed and displacement come to `ε` and `ζ`.
 #![expect(clippy::indexing_slicing, reason = "arrays of four letters, indexed below four")]
 
+use super::course::{B, Course, E, H, N, Told, Z};
 use super::model::MotionModel;
 use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
-pub(crate) use super::segment::Told;
-use super::segment::{Pace, Segment};
 
-const B: usize = 0;
-const E: usize = 1;
-const H: usize = 2;
-const Z: usize = 3;
-const N: usize = 4;
-
-/// Commands that can wait for their effect: more than a line carries within a start's delay.
-const MOST_PENDING: usize = 6;
 /// Over this time (s) a run's speed wanders by [`WANDER`].
 const WANDERS_IN: f64 = 4.0;
 /// Looks at one contact from ever better points: speed and place bend the way while little is known.
 const LOOKS: usize = 3;
+/// A change that begins while another is under way goes another way than the sum of both, by the speed that was still
+/// missing over this time (s): an eased decoder begins again at no rate at all, a counter goes on at its own.
+pub(crate) const INTERRUPTED: f64 = 0.2;
 /// Part of a change's displacement by which no shape is true in its middle, ...
 const SHAPE_ERROR: f64 = 0.04;
 /// ... and part of its change of speed by which the speed there is not: an eased ramp (3τ² − 2τ³) and an even one are apart
@@ -47,13 +33,8 @@ pub(crate) struct Guess {
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Following {
-    segment: Segment,
-    /// What the segment is an answer to.
-    step: u8,
-    from: u8,
-    x: [f64; N],
+    course: Course,
     p: [[f64; N]; N],
-    pending: [Option<Told>; MOST_PENDING],
     /// Until when wander is in the variance of `ε`.
     wandered: f64,
 }
@@ -63,57 +44,41 @@ impl Following {
     pub(crate) fn at_rest(time: f64, place: Guess) -> Self {
         let mut p = [[0.0; N]; N];
         p[B][B] = place.variance;
-        Self {
-            segment: Segment::steady(time, 0.0),
-            step: 0,
-            from: 0,
-            x: [place.mean, 0.0, 0.0, 0.0],
-            p,
-            pending: [None; MOST_PENDING],
-            wandered: time,
-        }
+        Self { course: Course::at_rest(time, place.mean), p, wandered: time }
+    }
+
+    /// Where it most likely goes from here, doubts apart.
+    pub(crate) const fn course(&self) -> Course {
+        self.course
     }
 
     /// The step told last, whether it has taken effect or not.
     pub(crate) fn step(&self) -> u8 {
-        self.pending.iter().flatten().last().map_or(self.step, |told| told.to)
+        self.course.step()
     }
 
     /// A command has left the line.
     pub(crate) fn tell(&mut self, model: &MotionModel, sent: f64, step: u8) {
-        let from = self.step();
-        if from == step {
+        if self.step() == step {
             return;
         }
         self.settle(model, sent);
-        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
-        if let Some(slot) = self.pending.iter_mut().find(|slot| slot.is_none()) {
-            *slot = Some(Told { sent, from, to: step, at_rest });
-        }
+        self.course.tell(sent, step);
     }
 
     /// Whether a train that was told to stop stands by a time.
     pub(crate) fn rests_at(&self, time: f64) -> bool {
-        self.step == 0 && time >= self.rest_time()
-    }
-
-    fn rest_time(&self) -> f64 {
-        if self.segment.from.speed == 0.0 { self.segment.begins } else { self.segment.settled() }
+        self.course.rests_at(time)
     }
 
     /// Takes all that has taken effect by a time into the state.
     fn settle(&mut self, model: &MotionModel, time: f64) {
-        while let Some(told) = self.pending[0] {
-            let begins = told.effect(&model.answers()).max(self.segment.begins);
-            if begins > time {
-                break;
-            }
-            self.pending.rotate_left(1);
-            self.pending[MOST_PENDING - 1] = None;
+        while let Some((told, begins)) = self.course.next_effect(model).filter(|(_, begins)| *begins <= time)
+        {
             self.begin(model, told, begins);
         }
         let since = time - self.wandered;
-        if since > 0.0 && self.step != 0 {
+        if since > 0.0 && self.course.step != 0 {
             self.p[E][E] += WANDER * WANDER * since / WANDERS_IN;
         }
         self.wandered = self.wandered.max(time);
@@ -124,16 +89,11 @@ impl Following {
         let from_rest = told.at_rest;
         // A train at rest has run its whole way to rest, whenever it is told the next step.
         let time = if from_rest { f64::INFINITY } else { begins };
-        let (way, slope) = self.way_and_slope(time);
-        let pace = if from_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
-        let speed = pace.speed;
+        let (way, slope) = self.course.way_and_slope(time);
         let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
+        let unsettled = self.course.unsettled(begins);
         self.transform(slope);
-        self.x[B] = way;
-        let answers = model.answers();
-        self.segment = Segment::of(&told, &answers, pace);
-        self.segment.begins = begins;
-        (self.step, self.from) = (told.to, told.from);
+        let speed = self.course.begin(model, told, begins, way);
         for letter in [H, Z] {
             self.forget(letter);
         }
@@ -145,7 +105,7 @@ impl Following {
         if told.to != 0 {
             self.p[E][E] += model.ln_speed_variance(told.to, told.above());
         }
-        let to = self.segment.to;
+        let to = self.course.segment.to;
         let doubt = if told.to == 0 {
             model.stop_doubt(speed)
         } else if from_rest {
@@ -153,32 +113,18 @@ impl Following {
         } else {
             model.change_doubt(speed, to)
         };
-        let error = if told.to == 0 || from_rest { 0.0 } else { change_error(to - speed) };
+        let error = if told.to == 0 || from_rest {
+            0.0
+        } else {
+            libm::hypot(change_error(to - speed), INTERRUPTED * unsettled)
+        };
         // Who begins faster than was thought is farther by so much once the change is done.
-        let carried = unshaped * self.segment.delay();
+        let carried = unshaped * self.course.segment.delay();
         self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
         if told.to == 0 {
-            let scatter = model.scatter(speed * libm::exp(self.x[E]));
+            let scatter = model.scatter(speed * libm::exp(self.course.x[E]));
             self.p[Z][Z] += scatter * scatter;
         }
-    }
-
-    /// `x(t)` and its slopes; at an infinite time the whole way of a stop.
-    fn way_and_slope(&self, time: f64) -> (f64, [f64; N]) {
-        let grown = libm::exp(self.x[E]);
-        if time.is_infinite() {
-            let way = self.segment.way_to_rest();
-            return (self.x[B] + grown * way + self.x[Z], [1.0, grown * way, 0.0, 1.0]);
-        }
-        let late = time - self.x[H];
-        let way = if self.is_still() { 0.0 } else { self.segment.way(late) };
-        let (speed, share) = (self.segment.speed(late), self.segment.share(time));
-        let place = self.x[B] + grown * way + self.x[Z] * share;
-        (place, [1.0, grown * way, -grown * speed, share])
-    }
-
-    const fn is_still(&self) -> bool {
-        self.segment.from.speed == 0.0 && self.segment.to == 0.0
     }
 
     /// Moves the origin along a slope: `b` takes in all of it.
@@ -193,7 +139,6 @@ impl Following {
     }
 
     fn forget(&mut self, letter: usize) {
-        self.x[letter] = 0.0;
         for i in 0..N {
             self.p[letter][i] = 0.0;
             self.p[i][letter] = 0.0;
@@ -210,8 +155,11 @@ impl Following {
     /// Where it is (m) at a time.
     pub(crate) fn place(&self, model: &MotionModel, time: f64) -> Guess {
         let later = self.at(model, time);
-        let (mean, slope) =
-            later.way_and_slope(if later.rests_at(time) && !later.is_still() { f64::INFINITY } else { time });
+        let (mean, slope) = later.course.way_and_slope(if later.rests_at(time) && !later.course.is_still() {
+            f64::INFINITY
+        } else {
+            time
+        });
         let shape = later.shape_error(time);
         Guess { mean, variance: later.variance_along(slope) + shape * shape }
     }
@@ -219,7 +167,7 @@ impl Following {
     /// Its speed (m/s) at a time.
     pub(crate) fn speed(&self, model: &MotionModel, time: f64) -> Guess {
         let later = self.at(model, time);
-        let speed = libm::exp(later.x[E]) * later.segment.speed(time - later.x[H]);
+        let speed = libm::exp(later.course.x[E]) * later.course.segment.speed(time - later.course.x[H]);
         Guess { mean: speed, variance: speed * speed * later.p[E][E] }
     }
 
@@ -227,30 +175,30 @@ impl Following {
     /// train that was told to run.
     pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Guess, f64, f64)> {
         let mut later = *self;
-        while let Some(told) = later.pending[0] {
-            let begins = told.effect(&model.answers()).max(later.segment.begins);
+        while let Some((_, begins)) = later.course.next_effect(model) {
             later.settle(model, begins);
         }
-        if later.step != 0 {
+        if later.course.step != 0 {
             return None;
         }
-        let (mean, slope) = later.way_and_slope(f64::INFINITY);
-        let speed = later.segment.from.speed * libm::exp(later.x[E]);
+        let (mean, slope) = later.course.way_and_slope(f64::INFINITY);
+        let speed = later.course.segment.from.speed * libm::exp(later.course.x[E]);
         let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);
-        Some((Guess { mean, variance }, scatter, later.rest_time()))
+        Some((Guess { mean, variance }, scatter, later.course.rest_time()))
     }
 
     /// One standard deviation (m/s) of the speed in the middle of a change.
     fn shape_speed_error(&self, time: f64) -> f64 {
-        let share = self.segment.share(time);
-        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.segment.to - self.segment.from.speed).abs()
+        let segment = self.course.segment;
+        let share = segment.share(time);
+        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (segment.to - segment.from.speed).abs()
     }
 
     fn shape_error(&self, time: f64) -> f64 {
-        let share = self.segment.share(time);
-        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.segment.displacement().abs()
+        let share = self.course.segment.share(time);
+        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.course.segment.displacement().abs()
     }
 
     fn variance_along(&self, slope: [f64; N]) -> f64 {
@@ -267,29 +215,29 @@ impl Following {
     /// Returns by how much (m) it was short of the place, and the variance of that.
     pub(crate) fn pass(&mut self, model: &MotionModel, time: f64, time_variance: f64, place: Guess) -> Guess {
         self.settle(model, time);
-        let speed = self.segment.speed(time - self.x[H]) * libm::exp(self.x[E]);
+        let speed = self.course.segment.speed(time - self.course.x[H]) * libm::exp(self.course.x[E]);
         let shape = self.shape_error(time);
         let noise = place.variance + speed * speed * time_variance + shape * shape;
-        let (mean, p) = (self.x, self.p);
-        let (first, slope) = self.way_and_slope(time);
+        let (mean, p) = (self.course.x, self.p);
+        let (first, slope) = self.course.way_and_slope(time);
         let short = Guess { mean: place.mean - first, variance: self.variance_along(slope) + noise };
         let mut slope = slope;
         let mut seen = first;
         for _ in 0..LOOKS {
             let with: [f64; N] = core::array::from_fn(|i| (0..N).map(|j| p[i][j] * slope[j]).sum());
             let s = (0..N).map(|j| slope[j] * with[j]).sum::<f64>() + noise;
-            let back: f64 = (0..N).map(|j| slope[j] * (mean[j] - self.x[j])).sum();
+            let back: f64 = (0..N).map(|j| slope[j] * (mean[j] - self.course.x[j])).sum();
             let off = place.mean - seen - back;
             for i in 0..N {
-                self.x[i] = mean[i] + with[i] / s * off;
+                self.course.x[i] = mean[i] + with[i] / s * off;
             }
-            self.x[E] = self.x[E].clamp(-FARTHEST_DEVIATION, FARTHEST_DEVIATION);
+            self.course.x[E] = self.course.x[E].clamp(-FARTHEST_DEVIATION, FARTHEST_DEVIATION);
             for i in 0..N {
                 for j in 0..N {
                     self.p[i][j] = p[i][j] - with[i] * with[j] / s;
                 }
             }
-            (seen, slope) = self.way_and_slope(time);
+            (seen, slope) = self.course.way_and_slope(time);
         }
         short
     }
@@ -304,7 +252,7 @@ impl Following {
 
     /// All ways are counted from elsewhere from now on.
     pub(crate) fn shift(&mut self, by: f64) {
-        self.x[B] += by;
+        self.course.x[B] += by;
     }
 
     /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.

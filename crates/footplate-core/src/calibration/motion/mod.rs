@@ -7,6 +7,7 @@
 #[cfg(feature = "serde")]
 mod bits;
 mod chain;
+mod course;
 mod doubts;
 mod fit;
 mod follow;
@@ -24,8 +25,9 @@ mod spread;
 mod trip;
 mod unknowns;
 
+pub(crate) use course::Course;
 pub use fit::MotionFit;
-pub(crate) use follow::{Following, Guess};
+pub(crate) use follow::{Following, Guess, INTERRUPTED};
 pub use model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;

@@ -138,6 +138,12 @@ impl MotionModel {
         }
     }
 
+    /// The most likely steady speed at a step, without its uncertainty, which takes a hundred times as long.
+    pub(crate) fn steady_speed(&self, step: SpeedStep, approach: Approach) -> Speed {
+        let above = approach == Approach::Above;
+        Speed::from_m_per_s(self.answers().speed(usize::from(step.get()), above))
+    }
+
     /// One standard deviation of what follows from the model's numbers, by its slopes.
     pub(super) fn deviation(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
         self.spread.deviation(&self.values, self.steps(), of)

@@ -33,7 +33,7 @@ const STOP_MARGIN: f64 = 3.0;
 
 impl DrivenTrain {
     /// The steps that move the train; all that were not found wanting where none is known to.
-    fn usable_steps(&self) -> Vec<SpeedStep> {
+    pub(super) fn usable_steps(&self) -> Vec<SpeedStep> {
         let steps = || (1..=self.model.highest().get()).filter_map(SpeedStep::new);
         let known: Vec<SpeedStep> = steps().filter(|step| self.model.uses(*step) == StepUse::Moves).collect();
         if known.is_empty() {

@@ -12,6 +12,7 @@ use super::felt_way::{contacts_until, counted_from};
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
+use super::pacing::Pacing;
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
@@ -48,6 +49,8 @@ pub(super) struct DrivenTrain {
     pub(super) limit: Option<WayPoint>,
     /// From its pickup to the end that is further from it.
     pub(super) reach: Length,
+    /// What it is paced for, while that is its goal.
+    pub(super) pacing: Option<Pacing>,
 }
 
 impl DrivenTrain {
@@ -61,6 +64,7 @@ impl DrivenTrain {
             expected: Expectation::default(),
             limit: None,
             reach: TRAIN_REACH,
+            pacing: None,
         }
     }
 
@@ -165,6 +169,7 @@ impl DrivenTrain {
                     self.told = step;
                 }
                 self.expect_on(ground, now);
+                self.paced_step_left(event.time);
                 self.step_left(ground, now, step, out);
             }
             EventKind::Reverse { .. } => {
@@ -239,6 +244,7 @@ impl DrivenTrain {
         self.count_limit_from(ground, node);
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
+        self.paced_passed(ground, now, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
@@ -268,7 +274,7 @@ impl DrivenTrain {
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
-        [phase, unsent, self.next_doubt(), self.guard()].into_iter().flatten().min()
+        [phase, unsent, self.next_doubt(), self.guard(), self.next_look()].into_iter().flatten().min()
     }
 
     pub(super) fn handle_timeout(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
@@ -341,7 +347,7 @@ impl DrivenTrain {
                 self.tell(now, Command::Reverse { train: self.id() }, out);
             }
             Goal::RestAt(Destination { at, .. }) => self.finish(ground, now, task.order, at, promise, out),
-            Goal::Rest | Goal::Run => self.finish(ground, now, task.order, None, None, out),
+            Goal::Rest | Goal::Run | Goal::Pace => self.finish(ground, now, task.order, None, None, out),
         }
     }
 

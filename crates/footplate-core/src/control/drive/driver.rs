@@ -40,13 +40,15 @@ const LONGEST_MOVE: Length = Length::from_m(100.0);
 pub struct Driver {
     pub(super) track: KnownTrack,
     pub(super) trains: BTreeMap<TrainId, DrivenTrain>,
-    outputs: Outputs,
+    pub(super) outputs: Outputs,
     /// When each contact was last seen closed.
     closed: BTreeMap<SensorId, Timestamp>,
     /// Turnouts that were asked for and have not been told yet, by which order.
     throwing: Vec<(TurnoutId, OrderId)>,
     attribution: Attribution,
     orders: u32,
+    /// When the contact to be watched changes.
+    pub(super) watch_changes: Option<Timestamp>,
 }
 
 impl Driver {
@@ -61,6 +63,7 @@ impl Driver {
             throwing: Vec::new(),
             attribution: Attribution::default(),
             orders: 0,
+            watch_changes: None,
         }
     }
 
@@ -157,11 +160,13 @@ impl Driver {
             (Order::Reverse { then, .. }, Some(train)) => train.reverse(ground, now, id, then, out),
             (Order::Stop(stop), Some(train)) => train.stop_at(ground, now, id, &stop, out)?,
             (Order::Move { distance, .. }, Some(train)) => train.move_on(ground, now, id, distance, out)?,
+            (Order::Hold { speed, .. }, Some(train)) => train.hold(now, id, speed, out)?,
             (Order::Turnout { turnout, curved }, _) => self.throw(now, id, turnout, curved)?,
             _ => {}
         }
         self.orders = self.orders.wrapping_add(1);
-        self.wish();
+        self.pace(now);
+        self.wish(now);
         Ok(id)
     }
 
@@ -191,10 +196,8 @@ impl Driver {
             Order::Move { distance, .. } if !(distance > Length::ZERO && distance <= LONGEST_MOVE) => {
                 Err(Refusal::IllegalDistance { found: distance })
             }
-            Order::Hold { train, .. } | Order::Follow { train, .. } | Order::Arrive { train, .. } => {
-                Err(Refusal::NotPaced { train })
-            }
-            Order::Move { .. } | Order::Turnout { .. } => Ok(()),
+            Order::Follow { train, .. } | Order::Arrive { train, .. } => Err(Refusal::NotPaced { train }),
+            Order::Move { .. } | Order::Turnout { .. } | Order::Hold { .. } => Ok(()),
         }
     }
 
@@ -337,7 +340,7 @@ impl Driver {
     }
 
     /// Says of the line what the plans want of it.
-    pub(super) fn wish(&mut self) {
+    pub(super) fn wish(&mut self, now: Timestamp) {
         let plans = || {
             self.trains.values().filter_map(|train| match train.task?.phase {
                 Phase::Running { plan } => plan,
@@ -353,6 +356,7 @@ impl Driver {
             .find(|sensor| triggers().any(|trigger| trigger == *sensor));
         let guard = self.trains.values().filter_map(DrivenTrain::guard);
         let hold = next.map(|plan| plan.leaves - LINE_TIME).into_iter().chain(guard).min();
+        let watched = watched.or_else(|| self.due_of_paced(now));
         self.outputs.hold_line(hold);
         self.outputs.watch(watched);
     }
@@ -374,7 +378,8 @@ impl Machine for Driver {
             EventKind::Turnout { turnout, curved } => self.turnout_left(now, turnout, curved),
             EventKind::Stopped { .. } => {}
         }
-        self.wish();
+        self.pace(now);
+        self.wish(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
@@ -382,7 +387,8 @@ impl Machine for Driver {
         for train in self.trains.values_mut() {
             train.handle_timeout(ground, now, &mut self.outputs);
         }
-        self.wish();
+        self.pace(now);
+        self.wish(now);
     }
 
     fn poll_output(&mut self) -> Option<Output<DriveNotice>> {
@@ -390,6 +396,7 @@ impl Machine for Driver {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        self.trains.values().filter_map(DrivenTrain::next_timeout).min()
+        let trains = self.trains.values().filter_map(DrivenTrain::next_timeout);
+        trains.chain(self.watch_changes).min()
     }
 }

@@ -20,7 +20,7 @@ impl Driver {
         if let Some(train) = self.trains.get_mut(&train) {
             train.set_limit(ground, now, limit);
         }
-        self.wish();
+        self.wish(now);
     }
 
     /// How far a train reaches from its pickup, to the end that is further from it. Unless it is said, that of a long

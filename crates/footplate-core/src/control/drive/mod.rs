@@ -18,6 +18,7 @@ mod limit;
 mod notice;
 mod order;
 mod outputs;
+mod pacing;
 mod refusal;
 mod stop_planning;
 mod task;
@@ -25,6 +26,6 @@ mod turning;
 mod turnout_guard;
 
 pub use driver::Driver;
-pub use notice::{Achieved, DriveNotice, Finished, PlannedStop, Promise};
+pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedStop, Promise};
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use refusal::Refusal;

@@ -5,7 +5,7 @@ use crate::event::Command;
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
-use crate::units::Length;
+use crate::units::{Length, Speed};
 
 use super::order::OrderId;
 use super::refusal::Refusal;
@@ -33,6 +33,8 @@ pub enum DriveNotice {
         /// By how much, in the middle of what may be.
         by: Length,
     },
+    /// From now on a train that was told to hold a speed keeps to a line.
+    Paced(PacedLine),
     /// An order has been carried out.
     Done(Finished),
     /// An order was given up on the way; the train has been told to stop.
@@ -146,6 +148,23 @@ pub struct PlannedStop {
     pub after_trigger: Option<TimeSpan>,
     /// Where it will come to rest against the target.
     pub promise: Promise,
+}
+
+/// Where a train is from now on that holds a speed, in surveyed lengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PacedLine {
+    /// The order.
+    pub order: OrderId,
+    /// The train.
+    pub train: TrainId,
+    /// A contact of its way.
+    pub node: NodeId,
+    /// So far past it ...
+    pub way: Length,
+    /// ... at this time, and onwards ...
+    pub time: Timestamp,
+    /// ... at this speed.
+    pub speed: Speed,
 }
 
 /// Where a train comes to rest, counted from the target, negative short of it.

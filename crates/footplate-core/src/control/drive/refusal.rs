@@ -6,7 +6,7 @@ use core::fmt;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::time::TimeSpan;
 use crate::track::WayError;
-use crate::units::{Length, Ratio};
+use crate::units::{Length, Ratio, Speed};
 
 /// Why an order was refused, or given up on the way. Places are named so that `Layout::landmark` reads them.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,6 +119,15 @@ pub enum Refusal {
         /// The train.
         train: TrainId,
     },
+    /// No steps of the train bracket the speed.
+    SpeedOutOfRange {
+        /// What was asked for.
+        found: Speed,
+        /// The slowest that can be held ...
+        lowest: Speed,
+        /// ... and the fastest.
+        highest: Speed,
+    },
     /// No contact reported the train within the time in which one should have.
     NotFound {
         /// The train.
@@ -195,6 +204,13 @@ impl fmt::Display for Refusal {
             Self::NotPaced { train } => {
                 write!(f, "train {train} cannot be held at a speed: name a step, as with `speed {train} 6`")
             }
+            Self::SpeedOutOfRange { found, lowest, highest } => write!(
+                f,
+                "{:.0} mm/s cannot be held: name {:.0} to {:.0} mm/s",
+                found.as_mm_per_s(),
+                libm::ceil(lowest.as_mm_per_s()),
+                libm::floor(highest.as_mm_per_s())
+            ),
             Self::NotFound { train, within } => write!(
                 f,
                 "no contact reported train {train} within {:.0} s: does it run, and is it on this layout?",

@@ -17,7 +17,7 @@ pub(super) struct Task {
 }
 
 /// What comes of it in the end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
     /// Run at the step it is told.
     Run,
@@ -27,10 +27,12 @@ pub(super) enum Goal {
     RestAt(Destination),
     /// Rest, then the other direction, then this step.
     Reverse(SpeedStep),
+    /// Keep to a pace, which the train knows.
+    Pace,
 }
 
 /// The place to come to rest at, and how.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Destination {
     /// As it was named; a move has no name for it.
     pub(super) named: Option<Landmark>,
@@ -55,6 +57,8 @@ pub(super) enum Phase {
     Settling { promise: Option<Promise>, until: Timestamp },
     /// It has been told to turn around.
     Turning,
+    /// It is told step after step.
+    Pacing,
 }
 
 /// When to stop.

@@ -88,6 +88,12 @@ impl Tongue<'_> {
                     by.as_mm()
                 )
             }
+            DriveNotice::Paced(line) => format!(
+                "{}  train {} holds {:.0} mm/s from here on",
+                self.at(line.time),
+                line.train,
+                line.speed.as_mm_per_s()
+            ),
             DriveNotice::Done(finished) => self.done(finished)?,
             DriveNotice::Thrown { turnout, curved, .. } => {
                 format!("turnout {turnout} told to lie {}", leg(*curved))

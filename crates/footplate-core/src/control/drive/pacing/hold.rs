@@ -1,0 +1,102 @@
+//! A train that runs at a speed between those of its steps.
+
+use crate::control::drive::driven_train::DrivenTrain;
+use crate::control::drive::notice::{DriveNotice, PacedLine};
+use crate::control::drive::order::OrderId;
+use crate::control::drive::outputs::Outputs;
+use crate::control::drive::refusal::Refusal;
+use crate::control::drive::task::{Goal, Phase, Task};
+use crate::estimation::Ground;
+use crate::event::Approach;
+use crate::ids::{NodeId, SpeedStep};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Speed};
+
+use super::ideal_line::IdealLine;
+use super::reference::Reference;
+use super::surveyed_way::SurveyedWay;
+use super::task::{Pace, Pacing};
+
+/// The speed to be held, and the line since there is one.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::control::drive) struct Holding {
+    speed: Speed,
+    /// From when on the train runs steadily at the step it was told first.
+    settled: Timestamp,
+    line: Option<IdealLine>,
+}
+
+impl Holding {
+    /// Where it should be; `None` before there is a line, and when the way does not lead on from it any more.
+    pub(super) fn reference(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        node: NodeId,
+    ) -> Option<Reference> {
+        if self.line?.node != node {
+            self.line = self.line?.counted_from(ground, node, now);
+        }
+        let line = self.line?;
+        let speed = line.speed.as_m_per_s();
+        Some(Reference::of(|ahead| line.place(now + TimeSpan::from_s(ahead)), [speed; 2]))
+    }
+}
+
+impl DrivenTrain {
+    /// Takes an order to hold a speed.
+    pub(in crate::control::drive) fn hold(
+        &mut self,
+        now: Timestamp,
+        order: OrderId,
+        speed: Speed,
+        out: &mut Outputs,
+    ) -> Result<(), Refusal> {
+        let usable = self.usable_steps();
+        let ends = [usable.first(), usable.last()].map(|step| {
+            let steady = |step: &SpeedStep| self.model.steady_speed(*step, Approach::Below);
+            step.map_or(Speed::ZERO, steady)
+        });
+        let [lowest, highest] = ends;
+        if !(speed >= lowest && speed <= highest && speed > Speed::ZERO) {
+            return Err(Refusal::SpeedOutOfRange { found: speed, lowest, highest });
+        }
+        let off = |step: &SpeedStep| (self.model.steady_speed(*step, Approach::Below) - speed).abs();
+        let nearest = usable
+            .iter()
+            .copied()
+            .min_by(|one, other| off(one).as_m_per_s().total_cmp(&off(other).as_m_per_s()));
+        let step = nearest.unwrap_or(self.told);
+        let settles =
+            if step == self.told { TimeSpan::ZERO } else { self.model.settles_within(self.told, step) };
+        let holding = Holding { speed, settled: now + settles, line: None };
+        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
+        if step != self.told {
+            self.tell_step(now, step, out);
+        }
+        Ok(())
+    }
+
+    /// The first contact that is passed at a settled speed begins the line; from then on it is counted from every one.
+    pub(super) fn begin_line(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        holding: &mut Holding,
+        out: &mut Outputs,
+    ) {
+        let Some(located) = self.located(ground, now) else { return };
+        let node = located.at.node;
+        holding.line = holding.line.and_then(|line| line.counted_from(ground, node, now));
+        if holding.line.is_some() || now < holding.settled {
+            return;
+        }
+        let way = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
+        let line = IdealLine { node, way: Length::from_m(way), time: now, speed: holding.speed };
+        holding.line = Some(line);
+        let IdealLine { way, time, speed, .. } = line;
+        out.say(DriveNotice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+    }
+}

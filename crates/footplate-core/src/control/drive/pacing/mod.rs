@@ -1,0 +1,15 @@
+//! Keeping trains to a pace: any speed out of coarse steps, behind another train, or in time at a place.
+//!
+//! What a train should do is a [`Reference`]: where it should be at a few moments ahead, in surveyed lengths. A
+//! [`StepSearch`] finds the commands that bring its most likely course nearest to that, within a budget of commands; the
+//! first of them is given, and everything is looked at again when something was learnt.
+
+mod hold;
+mod ideal_line;
+mod pacer;
+mod reference;
+mod step_search;
+mod surveyed_way;
+mod task;
+
+pub(super) use task::Pacing;

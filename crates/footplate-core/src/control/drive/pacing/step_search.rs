@@ -1,0 +1,135 @@
+//! Which step to command next, and when, so that a train stays where it should be.
+//!
+//! All sequences of commands on a grid of times are looked at, none sooner after another than the budget allows, with the
+//! steps about the speed that is wanted. Letters: `x(t)` the course that a sequence would bring about, `r(t)` the
+//! reference, `z(t)` the course at the end if the speed that it will settle to had always been run at: what the
+//! commands of the last moments still will do. What a sequence costs is
+//!
+//! ```text
+//! Σ (x − r)² δ  +  W (z − r)²  +  V (v − v_r)²  +  C per command
+//! ```
+//!
+//! Sequences that already cost more than the best one found are not followed further (branch and bound).
+
+use super::reference::{GRID, LOOKS, Reference};
+use super::surveyed_way::SurveyedWay;
+use crate::calibration::motion::MotionModel;
+use crate::estimation::Outlook;
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+
+/// Grid times from one command to the next.
+const SPACING: usize = 1;
+/// Commands in one plan: what the budget leaves for its time, and few enough to look at all of them.
+const MOST_COMMANDS: usize = 3;
+/// Weight of where the course leads at the end, as time (s) for which that error would last.
+const END_WEIGHT: f64 = 0.8;
+/// Weight of a speed at the end that is not the ideal's (s³): a tenth of it over two seconds counts little.
+const SPEED_WEIGHT: f64 = 0.02;
+/// A command costs as much as being 1 mm off for a second (m² s).
+const COMMAND_COST: f64 = 1e-6;
+/// Steps tried: those about the ideal speed, and one more on either side to catch up or fall back with.
+const STEPS: usize = 4;
+
+/// What to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Choice {
+    /// The first command and the grid time at which it should leave.
+    pub(super) first: Option<(usize, SpeedStep)>,
+    pub(super) cost: f64,
+}
+
+/// The commands up to a grid time.
+#[derive(Debug, Clone, Copy)]
+struct Sequence {
+    /// The grid time before which the next may not be given.
+    soonest: usize,
+    first: Option<(usize, SpeedStep)>,
+    commands: usize,
+    cost: f64,
+}
+
+/// The search from one moment.
+pub(super) struct StepSearch<'a> {
+    pub(super) model: &'a MotionModel,
+    pub(super) way: &'a SurveyedWay,
+    pub(super) reference: &'a Reference,
+    /// The moment (s on the clock of the outlook) from which the grid counts, and how much later a command leaves than it
+    /// is given.
+    pub(super) now: f64,
+    pub(super) leaves_after: f64,
+    steps: [Option<SpeedStep>; STEPS],
+    best: Choice,
+}
+
+impl<'a> StepSearch<'a> {
+    /// With the steps about the speed that is wanted in the middle of the time looked at.
+    pub(super) fn new(
+        model: &'a MotionModel,
+        way: &'a SurveyedWay,
+        reference: &'a Reference,
+        usable: &[SpeedStep],
+        now: f64,
+        leaves_after: f64,
+    ) -> Self {
+        let [first, last] = reference.speeds;
+        let wanted = 0.5 * (first + last);
+        let below = |step: &SpeedStep| model.steady_speed(*step, Approach::Below).as_m_per_s() <= wanted;
+        let under = usable.iter().take_while(|step| below(step)).count();
+        let from = under.saturating_sub(2).min(usable.len().saturating_sub(STEPS));
+        let steps = core::array::from_fn(|nth| usable.get(from + nth).copied());
+        let best = Choice { first: None, cost: f64::INFINITY };
+        Self { model, way, reference, now, leaves_after, steps, best }
+    }
+
+    /// The best of all sequences whose first command comes no sooner than at a grid time.
+    pub(super) fn best(mut self, outlook: Outlook, soonest: usize) -> Choice {
+        self.go_on(0, &outlook, Sequence { soonest, first: None, commands: 0, cost: 0.0 });
+        self.best
+    }
+
+    fn go_on(&mut self, at: usize, outlook: &Outlook, sequence: Sequence) {
+        if sequence.cost >= self.best.cost {
+            return;
+        }
+        let Some(ideal) = self.reference.places.get(at).copied() else {
+            return self.end(outlook, sequence);
+        };
+        let Sequence { soonest, first, commands, .. } = sequence;
+        let time = self.now + GRID * at as f64;
+        let told = outlook.step();
+        let steps = self.steps;
+        let may = at >= soonest && commands < MOST_COMMANDS;
+        let others = steps.iter().flatten().filter(|step| may && step.get() != told);
+        for command in core::iter::once(None).chain(others.map(Some)) {
+            let mut next = *outlook;
+            let mut paid = 0.0;
+            if let Some(step) = command {
+                let doubt = next.doubt_of_interruption(self.model, time + self.leaves_after);
+                paid = COMMAND_COST + END_WEIGHT * doubt * doubt;
+                next.tell(self.model, time + self.leaves_after, *step);
+            }
+            let place = self.way.of_felt(next.place(self.model, time + GRID));
+            let off = place - ideal;
+            let so_far = Sequence {
+                soonest: if command.is_some() { at + SPACING } else { soonest },
+                first: first.or(command.map(|step| (at, *step))),
+                commands: commands + usize::from(command.is_some()),
+                cost: sequence.cost + paid + off * off * GRID,
+            };
+            self.go_on(at + 1, &next, so_far);
+        }
+    }
+
+    fn end(&mut self, outlook: &Outlook, Sequence { cost, first, .. }: Sequence) {
+        let time = self.now + GRID * LOOKS as f64;
+        let [place, speed] = outlook.settled_place_and_speed(self.model, time);
+        let off = self.way.of_felt(place) - self.reference.last();
+        let [_, wanted] = self.reference.speeds;
+        let faster = speed - wanted;
+        let cost = cost + END_WEIGHT * off * off + SPEED_WEIGHT * faster * faster;
+        if cost < self.best.cost {
+            self.best = Choice { first, cost };
+        }
+    }
+}

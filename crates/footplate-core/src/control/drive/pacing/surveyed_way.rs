@@ -1,0 +1,60 @@
+//! The way ahead of a train as the survey has it, beside the way as the train feels it.
+
+use crate::calibration::motion::MotionModel;
+use crate::estimation::Ground;
+use crate::ids::NodeId;
+use crate::units::Length;
+
+/// Contact-to-contact hops looked at: 3 m of the densest known track.
+const MOST_HOPS: usize = 12;
+
+/// Hops ahead of a contact, by their ends in both measures (m past the contact).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SurveyedWay {
+    ends: [[f64; 2]; MOST_HOPS],
+    count: usize,
+}
+
+impl SurveyedWay {
+    /// The way ahead of a node as the turnouts lie.
+    pub(super) fn ahead(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Self {
+        let mut way = Self { ends: [[0.0; 2]; MOST_HOPS], count: 0 };
+        let (mut felt, mut surveyed) = (0.0, 0.0);
+        for (hop, end) in ground.hops_ahead(node).zip(&mut way.ends) {
+            felt += model.length(ground.sections, &hop)[0].as_m();
+            surveyed += hop.length.as_m();
+            *end = [felt, surveyed];
+            way.count += 1;
+        }
+        way
+    }
+
+    /// The surveyed way to where the train feels it has come so far: in proportion within a hop, and beyond the hops that
+    /// are known as within the last.
+    pub(super) fn of_felt(&self, way: f64) -> f64 {
+        let ([mut felt, mut surveyed], mut slope) = ([0.0, 0.0], 1.0);
+        for (nth, [until, there]) in self.ends.iter().take(self.count).enumerate() {
+            if *until > felt {
+                slope = (there - surveyed) / (until - felt);
+            }
+            // The last one goes on for ever.
+            if way <= *until || nth + 1 == self.count {
+                break;
+            }
+            [felt, surveyed] = [*until, *there];
+        }
+        surveyed + (way - felt) * slope
+    }
+}
+
+/// The surveyed way from one contact to the next time another is passed: once round if it is the same.
+pub(super) fn surveyed_between(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<Length> {
+    let mut way = Length::ZERO;
+    for hop in ground.hops_ahead(from).take(ground.layout.nodes().len()) {
+        way += hop.length;
+        if hop.to == to {
+            return Some(way);
+        }
+    }
+    None
+}

@@ -1,0 +1,114 @@
+//! A train runs at any speed between its slowest and its fastest step, as exactly as contacts tell, and with few commands.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
+use footplate_core::control::{DriveNotice, Driver, Order, PacedLine, Refusal};
+use footplate_core::{Command, Speed, TimeSpan, Timestamp, TrainId};
+use proptest::prelude::{ProptestConfig, prop_assert, proptest};
+
+use crate::toy_railway::{ToyRailway, driver_of_both_ways as driver_of, step};
+
+const TRAIN: TrainId = TrainId(24);
+
+fn hold(mm_per_s: f64) -> Order {
+    Order::Hold { train: TRAIN, speed: Speed::from_mm_per_s(mm_per_s) }
+}
+
+fn line(world: &ToyRailway) -> Option<PacedLine> {
+    world.notices.iter().find_map(|notice| match notice {
+        DriveNotice::Paced(line) => Some(*line),
+        _ => None,
+    })
+}
+
+/// Runs until a line has begun.
+fn begin(world: &mut ToyRailway, driver: &mut Driver) -> PacedLine {
+    assert!(world.run_until(driver, 30.0, |world| line(world).is_some()), "{:#?}", world.notices);
+    line(world).expect("a line")
+}
+
+/// When steps were commanded.
+fn commanded(world: &ToyRailway) -> Vec<Timestamp> {
+    let steps = world.commands.iter().filter(|(_, command)| matches!(command, Command::Speed { .. }));
+    steps.map(|(at, _)| *at).collect()
+}
+
+#[test]
+fn a_speed_between_two_steps_is_held_for_as_long_as_asked() {
+    // Steps of the toy train are 32 mm/s apart; 240 is between two of them, 256 is one. Contacts are up to 900 mm apart: a
+    // speed that is known to one per cent is 9 mm off at the next.
+    for mm_per_s in [200.0, 240.0, 256.0, 270.0, 390.0] {
+        let mut world = ToyRailway::new(24, "D1", 300.0);
+        let mut driver = driver_of(&world, "D1", 300.0);
+        driver.order(world.now, hold(mm_per_s)).expect("a speed between its steps");
+        let line = begin(&mut world, &mut driver);
+        let name = world.layout.node_name(line.node).to_owned();
+        let zero = world.train().travelled_mm - world.beyond_mm(&name);
+        let mut worst = 0.0_f64;
+        let (from_mm, from) = (world.train().travelled_mm, world.now);
+        for _ in 0..300 {
+            world.run(&mut driver, 0.1);
+            let ideal = line.way.as_mm() + mm_per_s * (world.now - line.time).as_s();
+            worst = worst.max((world.train().travelled_mm - zero - ideal).abs());
+        }
+        let mean = (world.train().travelled_mm - from_mm) / (world.now - from).as_s();
+        assert!(worst < 35.0, "{mm_per_s}: {worst} mm off");
+        assert!((mean / mm_per_s - 1.0).abs() < 0.005, "{mm_per_s}: {mean}");
+        assert!(driver.busy(TRAIN).is_some());
+    }
+}
+
+#[test]
+fn a_speed_that_no_steps_bracket_is_refused_with_those_that_can_be_held() {
+    let world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    for mm_per_s in [0.0, -100.0, 20.0, 900.0, f64::NAN, f64::INFINITY] {
+        let refused = driver.order(world.now, hold(mm_per_s)).expect_err("no such speed");
+        let Refusal::SpeedOutOfRange { lowest, highest, .. } = refused else { panic!("{refused}") };
+        assert!(lowest < highest, "{refused}");
+        driver.clone().order(world.now, hold(0.5 * (lowest + highest).as_mm_per_s())).expect("in between");
+    }
+}
+
+#[test]
+fn another_order_ends_it() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, hold(240.0)).expect("a speed");
+    begin(&mut world, &mut driver);
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(0) }).expect("a step");
+    world.run(&mut driver, 10.0);
+    assert!(world.train().speed_mm_per_s == 0.0 && driver.busy(TRAIN).is_none());
+    let told = commanded(&world).len();
+    world.run(&mut driver, 20.0);
+    assert_eq!(commanded(&world).len(), told, "nothing is told to a train that should stand");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn the_budget_of_commands_is_kept_whatever_is_held(
+        speeds in proptest::collection::vec(60.0..440.0_f64, 1..4),
+        from_mm in 250.0..850.0_f64,
+        dead in proptest::option::of(0_u16..8),
+    ) {
+        let mut world = ToyRailway::new(24, "D1", from_mm);
+        let mut driver = driver_of(&world, "D1", from_mm);
+        world.dead = dead.into_iter().map(footplate_core::SensorId).collect();
+        for mm_per_s in speeds {
+            if driver.order(world.now, hold(mm_per_s)).is_err() {
+                continue;
+            }
+            let since = world.commands.len();
+            world.run(&mut driver, 25.0);
+            // The order's own command comes at once, and one of the order before may still have been on its way.
+            let told: Vec<Timestamp> = commanded(&world).into_iter().skip(since + 1).collect();
+            for pair in told.windows(2) {
+                prop_assert!(pair[1] - pair[0] >= TimeSpan::from_ms(195), "{pair:?}");
+            }
+            for four in told.windows(4) {
+                prop_assert!(four[3] - four[0] >= TimeSpan::from_ms(1_990), "{four:?}");
+            }
+        }
+    }
+}
