@@ -15,13 +15,16 @@ use std::time::Duration;
 
 use anyhow::bail;
 use footplate_core::{Event, Timestamp};
-use footplate_store::{Journal, JournalEntry, StoreError, TrainAtStart};
+use footplate_store::{Journal, JournalEntry, NewMachine, StoreError, TrainAtStart};
 
 pub(crate) use self::scribe::Scribe;
 use crate::clock::now;
 use crate::runtime::Recorder;
 
-/// Entries that can wait: twenty minutes of the 50 a second that a busy line brings, in 4 MB.
+/// The version of the program that decides.
+pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+/// Entries that can wait: more than five minutes of the 50 events a second that a busy line brings, with what follows from
+/// each of them, in some 10 MB.
 const QUEUE: usize = 60_000;
 /// The most that goes to the disk together: so many are written in a few milliseconds, and then acknowledged.
 const MOST_TOGETHER: usize = 2_000;
@@ -95,6 +98,8 @@ struct Beginning {
 enum Entry {
     Of(JournalEntry),
     Run(Beginning),
+    /// What is traced from here on is of this machine: its kind and its body.
+    Machine(&'static str, String),
     /// No more will come; only wakes the thread.
     End,
 }
@@ -175,6 +180,16 @@ impl SessionJournal {
     /// Whether the queue took it.
     fn offer(&self, entry: Entry) -> bool {
         self.queue.as_ref().is_some_and(|queue| self.when_full.offer(queue, entry))
+    }
+
+    /// Another machine begins to decide, and the one before has ended; what writes down of it.
+    pub(crate) fn begin_machine(&mut self, kind: &'static str, body: String) -> Option<Scribe> {
+        if !self.offer(Entry::Machine(kind, body)) {
+            // Nothing of it can be told apart from the one before.
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+            return None;
+        }
+        self.scribe()
     }
 
     /// What writes down, in the same order, what a machine is told and decides. The journal has
@@ -265,7 +280,7 @@ impl Writer {
             self.say(written.err().map(|error| error.to_string()));
             if ended {
                 let left = pending.drain(..).chain(entries.try_iter());
-                let lost = left.filter(|entry| matches!(entry, Entry::Of(_))).count();
+                let lost = left.filter(|entry| !matches!(entry, Entry::Run(_) | Entry::End)).count();
                 self.shared.lost.fetch_add(lost as u64, Ordering::Relaxed);
                 return self.journal;
             }
@@ -288,6 +303,9 @@ impl Writer {
                     continue;
                 }
                 Entry::Run(beginning) => self.journal.begin_run(beginning.began_at, &beginning.trains)?,
+                Entry::Machine(kind, body) => {
+                    self.journal.begin_machine(NewMachine { kind, program: PROGRAM, body }, now())?;
+                }
                 Entry::End => {}
             }
             pending.remove(0);
@@ -304,7 +322,7 @@ impl Entry {
     const fn of_journal(&self) -> Option<&JournalEntry> {
         match self {
             Self::Of(entry) => Some(entry),
-            Self::Run(_) | Self::End => None,
+            Self::Run(_) | Self::Machine(..) | Self::End => None,
         }
     }
 }

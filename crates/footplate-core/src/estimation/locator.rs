@@ -95,6 +95,7 @@ pub struct PassedContact {
 
 /// Follows one train.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Locator {
     train: TrainId,
     /// Where the clock of `following` begins.

@@ -20,6 +20,7 @@ const SHORTEST_LAG: f64 = 1e-4;
 
 /// The shape of one change.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RampedLag {
     ramp: f64,
     lag: f64,

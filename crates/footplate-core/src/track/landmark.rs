@@ -10,6 +10,7 @@ use crate::units::Length;
 
 /// A place named by a node and how far beyond it, in the direction of travel of the node.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Landmark {
     /// The node: mostly a sensor, but a turnout or track end has a name, too.
     pub node: NodeId,

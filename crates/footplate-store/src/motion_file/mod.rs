@@ -6,7 +6,9 @@
 
 mod export;
 mod form;
+mod kept;
 mod read;
 
 pub use form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
+pub use kept::KeptModel;
 pub use read::MotionFileError;

@@ -1,5 +1,6 @@
 //! `footplate demo`: two trains that nobody has measured, calibrated and stopped to the millimetre.
 
+mod beginning;
 mod calibrating;
 mod driving;
 mod outcome;
@@ -14,13 +15,15 @@ use std::path::PathBuf;
 use clap::Args;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, Timestamp, TrainId};
-use footplate_store::{Journal, MotionFile, Store, TrainAtStart, built_in};
+use footplate_store::{Journal, MotionFile, Store, TrainAtStart};
 use serde_json::json;
 
 use super::Outcome;
+use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::link::Speed;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
+pub(crate) use beginning::TourBeginning;
 use driving::Tour;
 use railway::{Railway, SharedRecord};
 use screen::{Manner, Screen};
@@ -74,20 +77,21 @@ impl Default for Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = built_in("track-a")?.layout;
+        let on = WrittenLayout::named("track-a")?;
+        let layout = &on.layout;
         let screen = Screen::new(output, if self.json { Manner::Json } else { Manner::Text });
         let watched = screen.is_watched().then_some(WATCHED_SPEED);
         let speed = self.speed.or(watched).map_or(Speed::Unpaced, Speed::Times);
         let record = SharedRecord::default();
         let mut recorder = record.clone();
-        let railway = Railway::new(&layout, self.seed, &TRAINS, speed, &mut recorder)?;
-        record.0.borrow_mut().journal = self.journal(&layout, railway.now())?;
+        let railway = Railway::new(layout, self.seed, &TRAINS, speed, &mut recorder)?;
+        record.0.borrow_mut().journal = self.journal(layout, railway.now())?;
         let mut stage = Stage::new(railway, screen, speed, record, &TRAINS);
         self.greet(&mut stage)?;
         let mut dice = Dice::new(self.seed);
         let mut turnouts = TurnoutStates::unknown();
         for train in TRAINS {
-            turnouts = turn(&mut stage, &layout, train, turnouts, &mut dice)?;
+            turnouts = turn(&mut stage, &on, train, &turnouts, &mut dice)?;
         }
         stage.end()?;
         self.conclude(&mut stage)
@@ -148,19 +152,19 @@ impl Arguments {
 /// share rails, so the others are off them meanwhile.
 fn turn(
     stage: &mut Stage<'_, '_, '_>,
-    layout: &Layout,
+    on: &WrittenLayout,
     train: TrainId,
-    turnouts: TurnoutStates,
+    turnouts: &TurnoutStates,
     dice: &mut Dice,
 ) -> anyhow::Result<TurnoutStates> {
     if train != TRAINS[0] {
         stage.begin_run(train);
     }
     stage.railway.put_down(train)?;
-    let known = calibrating::calibrate(stage, layout, train, turnouts)?;
+    let known = calibrating::calibrate(stage, on, train, turnouts)?;
     if let Some(known) = &known {
-        stage.models.push(MotionFile::of(layout, known.fit.model(), Some(now())));
-        Tour::new(layout, train, known).run(stage, known, STOPS, dice)?;
+        stage.models.push(MotionFile::of(&on.layout, known.fit.model(), Some(now())));
+        Tour::new(stage, on, train, known)?.run(stage, known, STOPS, dice)?;
     }
     stage.railway.lift(train);
     stage.rests(train, "is done");

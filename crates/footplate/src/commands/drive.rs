@@ -42,7 +42,7 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
-use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
+use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::witness::Witnessed;
 
 /// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
@@ -169,8 +169,8 @@ impl Arguments {
         let store = Store::open_or_create(path)?;
         let mut journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
         let body = serde_json::to_string(beginning)?;
-        let program = env!("CARGO_PKG_VERSION");
-        journal.begin_machine(NewMachine { kind: DriveBeginning::KIND, program, body: &body }, now)?;
+        journal
+            .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
         // Only a simulated clock can wait for a disk.
         let when_full = match &self.link {
             Address::Simulated(_) => WhenFull::Wait,

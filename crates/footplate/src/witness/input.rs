@@ -1,6 +1,8 @@
 //! What a machine can be told, and the words for it in a recording.
 
 use footplate_core::Event;
+use footplate_core::control::Order;
+use serde::de::DeserializeOwned;
 
 /// Something that a machine is told. All that it decides follows from how it began and these, in their order and at
 /// their times.
@@ -14,6 +16,8 @@ pub(crate) enum Input {
     Line(String),
     /// No more lines will come.
     NoMoreLines,
+    /// A program gave an order.
+    Order(Order),
     /// Nothing more: whoever ran it had enough. Not told to the machine; a recording without it was cut off.
     End,
 }
@@ -23,8 +27,8 @@ pub(crate) enum Input {
 pub(crate) enum InputError {
     /// A kind that this program does not know.
     Unknown { kind: String },
-    /// An event that is none.
-    NoEvent { text: String, why: String },
+    /// An event or an order that is none.
+    Wrong { kind: String, text: String, why: String },
 }
 
 impl std::fmt::Display for InputError {
@@ -33,7 +37,9 @@ impl std::fmt::Display for InputError {
             Self::Unknown { kind } => {
                 write!(f, "an input of the kind `{kind}`, which this version of the program does not know")
             }
-            Self::NoEvent { text, why } => write!(f, "an event that is none, `{text}`: {why}"),
+            Self::Wrong { kind, text, why } => {
+                write!(f, "an input of the kind `{kind}` that is none, `{text}`: {why}")
+            }
         }
     }
 }
@@ -44,8 +50,9 @@ impl Input {
     /// The kind and the text of its row.
     pub(crate) fn written(&self) -> (&'static str, String) {
         match self {
-            // Numbers and names of variants have a form in JSON, so this cannot fail; an empty text is no event.
+            // Numbers and names of variants have a form in JSON, so this cannot fail; an empty text would be no input.
             Self::Event(event) => ("event", serde_json::to_string(event).unwrap_or_default()),
+            Self::Order(order) => ("order", serde_json::to_string(order).unwrap_or_default()),
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
@@ -59,15 +66,8 @@ impl Input {
     /// The row is of another version of the program, or damaged.
     pub(crate) fn read(kind: &str, text: &str) -> Result<Self, InputError> {
         Ok(match kind {
-            "event" => {
-                let event = serde_json::from_str(text);
-                Self::Event(
-                    event.map_err(|error| InputError::NoEvent {
-                        text: text.to_owned(),
-                        why: error.to_string(),
-                    })?,
-                )
-            }
+            "event" => Self::Event(of_json(kind, text)?),
+            "order" => Self::Order(of_json(kind, text)?),
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
             "no-more-lines" => Self::NoMoreLines,
@@ -77,10 +77,21 @@ impl Input {
     }
 }
 
+fn of_json<T: DeserializeOwned>(kind: &str, text: &str) -> Result<T, InputError> {
+    serde_json::from_str(text).map_err(|error| InputError::Wrong {
+        kind: kind.to_owned(),
+        text: text.to_owned(),
+        why: error.to_string(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use footplate_core::control::{Aim, StopOrder};
+    use footplate_core::track::Landmark;
     use footplate_core::{
-        EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+        EventKind, Length, NodeId, Ratio, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
+        TurnoutId,
     };
 
     use super::*;
@@ -104,6 +115,11 @@ mod tests {
             Input::Timeout,
             Input::Line("stop 24 at C13+120mm  # näher".to_owned()),
             Input::NoMoreLines,
+            Input::Order(Order::Stop(StopOrder {
+                aim: Aim::NotBeyond(Ratio::from_parts(0.001)),
+                ..StopOrder::at(train, Landmark { node: NodeId(7), offset: Length::from_m(0.1 + 0.2) })
+            })),
+            Input::Order(Order::Speed { train, step }),
             Input::End,
         ]);
         for input in inputs {
@@ -119,6 +135,6 @@ mod tests {
             unknown.contains("`telepathy`, which this version of the program does not know"),
             "{unknown}"
         );
-        assert!(matches!(Input::read("event", "{\"time\":1"), Err(InputError::NoEvent { .. })));
+        assert!(matches!(Input::read("event", "{\"time\":1"), Err(InputError::Wrong { .. })));
     }
 }

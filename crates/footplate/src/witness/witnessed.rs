@@ -37,6 +37,13 @@ impl<M: Listener> Witnessed<M> {
         self.tell(now, word);
     }
 
+    /// The same where there is an answer at once: `say` says it to the machine, as
+    /// [`handle_word`](Listener::handle_word) does.
+    pub(crate) fn ask<A>(&mut self, now: Timestamp, word: &Input, say: impl FnOnce(&mut M) -> A) -> A {
+        self.note(now, word);
+        say(&mut self.machine)
+    }
+
     fn tell(&mut self, now: Timestamp, input: &Input) {
         self.note(now, input);
         self.machine.handle_input(now, input);

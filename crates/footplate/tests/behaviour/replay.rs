@@ -7,6 +7,7 @@ use rusqlite::Connection;
 use serde_json::Value;
 
 use crate::program::{Run, footplate};
+use crate::station::Standing;
 
 /// Everything that can be said, on a layout where contacts and turnouts fail now and then.
 const SCRIPT: &str = "\
@@ -87,6 +88,39 @@ fn every_decision_of_a_driven_session_is_made_again_bit_for_bit() {
         assert_eq!(said.status, 0, "{}", said.errors);
         assert!(said.output.contains(&format!("{decisions} decisions, all the same")), "{}", said.output);
     }
+}
+
+/// A clock that runs by itself, a line with threads, a disk that is not waited for: none of it gets into a decision.
+#[test]
+fn a_session_over_a_line_in_real_time_is_made_again_bit_for_bit() {
+    let standing = Standing::at("tcp:127.0.0.1:0");
+    let folder = folder("real-time");
+    let (script, store) = (folder.join("script.txt"), folder.join("railway.db"));
+    let lines = "turnout 6 straight\nspeed 24 10\nwait 24 located\nstop 24\nwait 24 at rest\nmove 24 60mm\n";
+    std::fs::write(&script, lines).expect("a test file");
+    let [script, path] = [&script, &store].map(|path| path.to_str().expect("a plain name"));
+    let link = standing.address.as_str();
+    let run = footplate(&[
+        "drive", "--link", link, "--layout", "track-a", "--train", "24", "--script", script, "--store", path,
+    ]);
+    assert!(run.status < 2, "{}", run.errors);
+    let again = json(&store, &["--diff"]);
+    assert_eq!((&again["same"], &again["ending"]), (&Value::Bool(true), &Value::from("whole")), "{again}");
+    assert!(again["decisions"].as_u64().expect("a count") > 10, "{again}");
+}
+
+#[test]
+fn every_machine_of_a_demo_is_made_again_bit_for_bit() {
+    let store = folder("demo").join("railway.db");
+    let run = footplate(&["demo", "--json", "--seed", "3", "--store", store.to_str().expect("a plain name")]);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let again = replay(&store, &["--json", "--diff"]);
+    assert_eq!(again.status, 0, "{}", again.output);
+    let machines: Vec<Value> =
+        again.output.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let kinds: Vec<_> = machines.iter().map(|machine| machine["machine"].as_str().expect("a kind")).collect();
+    assert_eq!(kinds, ["calibrate", "tour", "calibrate", "tour"]);
+    assert!(machines.iter().all(|machine| machine["ending"] == "whole" && machine["same"] == true));
 }
 
 #[test]

@@ -6,13 +6,13 @@ use std::process::{Child, Command, Stdio};
 use crate::program::footplate;
 
 /// A station of the program's own, until it is dropped.
-struct Standing {
+pub(crate) struct Standing {
     child: Child,
-    address: String,
+    pub(crate) address: String,
 }
 
 impl Standing {
-    fn at(place: &str) -> Self {
+    pub(crate) fn at(place: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
             .args(["simulate", "layout", "--station", place, "--speed", "20", "--trains", "24"])
             .stdout(Stdio::piped())

@@ -27,6 +27,7 @@ const MOST_PENDING: usize = 6;
 
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Course {
     pub(super) segment: Segment,
     /// What the segment is an answer to.

@@ -32,6 +32,7 @@ pub(crate) struct Guess {
 
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Following {
     course: Course,
     p: [[f64; N]; N],

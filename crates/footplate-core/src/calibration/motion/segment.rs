@@ -31,6 +31,7 @@ impl Told {
 
 /// How fast a train runs, and how fast its decoder would have it run at the same moment (m/s).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pace {
     pub(super) speed: f64,
     pub(super) set: f64,
@@ -49,6 +50,7 @@ impl Pace {
 /// it by its lag, catches up with it. Letters as in [`RampedLag`]: with `u` the set speed and `v` the speed when the change
 /// took effect, the way is `u τ + (u′ − u) R(τ) + (v − u) θ (1 − e^(−τ/θ))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Segment {
     /// When it took effect (s, on the clock of the run).
     pub(super) begins: f64,
@@ -66,6 +68,7 @@ pub(crate) struct Segment {
 /// f θ (1 − e^(−x/θ))`, which is zero at `x = θ ln(1 + A/(f θ))`, and friction has taken `f θ² ln(1 + A/(f θ))` from the way
 /// but for what the lag had left of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Rolling {
     friction: f64,
     /// Since the stop took effect (s), ...

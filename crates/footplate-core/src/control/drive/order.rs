@@ -9,6 +9,7 @@ use crate::units::{Length, Ratio, Speed};
 
 /// Something to be done.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// Run at a step, from now on. Step 0 brings the train to rest wherever that is.
     Speed {
@@ -69,6 +70,7 @@ pub enum Order {
 
 /// How far one train keeps behind another.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gap {
     /// From a contact's being closed by the train ahead until the follower closes it.
     Time(TimeSpan),
@@ -78,6 +80,7 @@ pub enum Gap {
 
 /// Come to rest at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StopOrder {
     /// The train.
     pub train: TrainId,
@@ -101,6 +104,7 @@ impl StopOrder {
 
 /// Stops scatter; which of them shall meet the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Aim {
     /// As many short of it as beyond it.
     Median,

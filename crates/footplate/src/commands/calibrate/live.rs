@@ -18,7 +18,7 @@ use footplate_core::calibration::motion::{MotionFit, StepUse};
 use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
-use footplate_store::{MotionFile, MotionReplay, Store, layout_named};
+use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};
 use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::CalibrationBeginning;
@@ -208,9 +208,7 @@ impl Session<'_> {
             replay.runs, self.train
         );
         let mut fit = replay.fit;
-        let kept =
-            MotionFile::of_store(&store, self.train, now())?.filter(|kept| kept.layout == layout.name());
-        if let Some(model) = kept.map(|kept| kept.model(layout)).transpose()? {
+        if let KeptModel::Model(model) = KeptModel::of_store(layout, &store, self.train, now())? {
             // Which steps do not move it follows from what was tried, not from the events alone.
             let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
             for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {

@@ -2,7 +2,7 @@
 
 use footplate_core::calibration::motion::{MotionFit, StepUse};
 use footplate_core::control::calibrate::{
-    CalibrationNotice, Calibrator, CalibratorSettings, Ending, Mishap, Phase, Progress, StepAccuracy,
+    CalibrationNotice, CalibratorSettings, Ending, Mishap, Phase, Progress, StepAccuracy,
 };
 use footplate_core::estimation::Locator;
 use footplate_core::track::{Layout, TurnoutStates};
@@ -10,6 +10,9 @@ use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 
 use super::outcome::{Learnt, LearntStep, minutes};
 use super::stage::Stage;
+use crate::commands::calibrate::CalibrationBeginning;
+use crate::commands::written_layout::WrittenLayout;
+use crate::witness::Witnessed;
 
 /// The decoder of the trains of the real-time courses.
 const HIGHEST_STEP: u8 = 14;
@@ -26,18 +29,20 @@ pub(super) struct Calibrated {
 /// Calibrates a train. Nothing if it could not be found.
 pub(super) fn calibrate(
     stage: &mut Stage<'_, '_, '_>,
-    layout: &Layout,
+    on: &WrittenLayout,
     train: TrainId,
-    turnouts: TurnoutStates,
+    turnouts: &TurnoutStates,
 ) -> anyhow::Result<Option<Calibrated>> {
     let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or(SpeedStep::STAND);
     let settings = CalibratorSettings::default();
     let budget = settings.budget;
-    let mut calibrator = Calibrator::new(layout, settings, MotionFit::new(train, highest));
-    calibrator.set_turnouts(turnouts);
+    let beginning = CalibrationBeginning::new(on, settings, MotionFit::new(train, highest), turnouts);
+    let scribe = stage.begin_machine(CalibrationBeginning::KIND, &beginning)?;
+    let layout = &on.layout;
+    let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
     let began = stage.now();
     stage.works(train, "learns", "");
-    while calibrator.ending().is_none() {
+    while calibrator.machine().ending().is_none() {
         for notice in stage.go_on(&mut calibrator)? {
             tell(stage, layout, train, budget, &notice)?;
         }
@@ -45,6 +50,7 @@ pub(super) fn calibrate(
             return Ok(None);
         }
     }
+    let calibrator = calibrator.end(stage.now());
     if matches!(calibrator.ending(), Some(Ending::NotFound | Ending::WrongLayout { .. })) {
         stage.screen.mishap(train, "could not be calibrated: its contacts tell nothing that makes sense")?;
         return Ok(None);

@@ -8,10 +8,13 @@ use footplate_core::estimation::{DueContact, Ground, PassedContact};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
+use super::beginning::TourBeginning;
 use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::stage::Stage;
 use super::targets::{Dice, steps_to_stop_from, target_ahead};
+use crate::commands::written_layout::WrittenLayout;
+use crate::witness::{Input, Witnessed};
 
 /// Targets that may be refused before no more are tried.
 const TRIES: usize = 40;
@@ -25,7 +28,7 @@ pub(super) struct Tour<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     train: TrainId,
-    driver: Driver,
+    driver: Witnessed<Driver>,
     /// What was passed last, for the picture.
     passed: String,
     next: Option<DueContact>,
@@ -33,16 +36,23 @@ pub(super) struct Tour<'l> {
 }
 
 impl<'l> Tour<'l> {
-    pub(super) fn new(layout: &'l Layout, train: TrainId, known: &Calibrated) -> Self {
-        let mut driver = Driver::new(layout.clone(), known.turnouts.clone());
-        driver.add_located(known.fit.model().clone(), known.locator.clone());
+    pub(super) fn new(
+        stage: &mut Stage<'_, '_, '_>,
+        on: &'l WrittenLayout,
+        train: TrainId,
+        known: &Calibrated,
+    ) -> anyhow::Result<Self> {
+        let layout = &on.layout;
+        let beginning = TourBeginning::new(on, known);
+        let scribe = stage.begin_machine(TourBeginning::KIND, &beginning)?;
+        let driver = Witnessed::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
-        Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None }
+        Ok(Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None })
     }
 
     /// Makes so many stops.
     pub(super) fn run(
-        &mut self,
+        mut self,
         stage: &mut Stage<'_, '_, '_>,
         known: &Calibrated,
         stops: usize,
@@ -70,25 +80,33 @@ impl<'l> Tour<'l> {
                 None => stage.screen.mishap(self.train, &format!("did not stop at {name}"))?,
             }
         }
+        self.driver.end(stage.now());
         Ok(())
+    }
+
+    fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        self.driver.ask(now, &Input::Order(order), |driver| driver.order(now, order))
     }
 
     /// Orders a stop from a step, at a place that is far enough.
     fn ask(&mut self, now: Timestamp, step: SpeedStep, dice: &mut Dice) -> Option<(OrderId, Landmark)> {
-        let at = self.driver.locate(self.train, now)?.at;
-        let model = self.driver.model(self.train)?;
+        let at = self.driver.machine().locate(self.train, now)?.at;
+        let model = self.driver.machine().model(self.train)?;
         // To speed up takes about as long as to stop, and an even run before the stop makes it better.
         let mut least = at.way + model.stop(step, Approach::Below).distance * 2.5;
         for _ in 0..TRIES {
-            let ground =
-                Ground { layout: self.layout, sections: &self.sections, turnouts: self.driver.turnouts() };
+            let ground = Ground {
+                layout: self.layout,
+                sections: &self.sections,
+                turnouts: self.driver.machine().turnouts(),
+            };
             let target = target_ahead(dice, ground, at.node, least)?;
             let order = StopOrder { step: Some(step), ..StopOrder::at(self.train, target) };
-            match self.driver.order(now, Order::Stop(order)) {
+            match self.order(now, Order::Stop(order)) {
                 Ok(id) => return Some((id, target)),
                 Err(Refusal::TooNear { beyond, .. }) => {
                     let again = StopOrder { next_round: true, ..order };
-                    if let Ok(id) = self.driver.order(now, Order::Stop(again)) {
+                    if let Ok(id) = self.order(now, Order::Stop(again)) {
                         return Some((id, target));
                     }
                     least += beyond * 0.5;

@@ -7,13 +7,14 @@ use footplate_core::control::Machine;
 use footplate_core::{SpeedStep, Timestamp, TrainId};
 use footplate_sim::living::MishapKind;
 use footplate_store::{Journal, MotionFile, TrainAtStart};
+use serde::Serialize;
 
 use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
 use crate::clock::{Stopwatch, now};
 use crate::link::Speed;
-use crate::session_journal::SessionJournal;
+use crate::session_journal::{Scribe, SessionJournal};
 
 /// The railway, the clock, the journal and the screen.
 pub(super) struct Stage<'r, 'l, 'o> {
@@ -136,6 +137,17 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         if let Some(journal) = &mut self.record.0.borrow_mut().journal {
             journal.begin_run(&[TrainAtStart { train, step: SpeedStep::STAND }]);
         }
+    }
+
+    /// A machine begins to decide: what writes down of it, if the session is kept.
+    pub(super) fn begin_machine(
+        &mut self,
+        kind: &'static str,
+        beginning: &impl Serialize,
+    ) -> anyhow::Result<Option<Scribe>> {
+        let mut record = self.record.0.borrow_mut();
+        let Some(journal) = &mut record.journal else { return Ok(None) };
+        Ok(journal.begin_machine(kind, serde_json::to_string(beginning)?))
     }
 
     /// Ends the session: everything is written down.

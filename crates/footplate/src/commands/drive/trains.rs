@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId};
-use footplate_store::{MotionFile, MotionReplay, Store};
+use footplate_store::{KeptModel, MotionFile, MotionReplay, Store};
 
 use crate::clock::now;
 
@@ -92,12 +92,13 @@ impl KnownTrains {
         is_named: bool,
     ) -> anyhow::Result<()> {
         let at = now();
-        let kept = MotionFile::of_store(store, train, at)?.filter(|kept| kept.layout == layout.name());
-        let place = || format!("{}, motion model of train {train}", store.path().display());
-        if let Some(kept) = &kept {
-            self.add(layout, kept, &place())?;
-        } else if !is_named {
-            return Ok(());
+        match KeptModel::of_store(layout, store, train, at)? {
+            KeptModel::Model(model) => drop(self.models.insert(train, *model)),
+            KeptModel::OfOtherFormulas => eprintln!(
+                "what the store says of train {train} was learnt by other formulas; it is learnt anew from its events"
+            ),
+            KeptModel::Nothing if is_named => {}
+            KeptModel::Nothing => return Ok(()),
         }
         let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
         if replay.is_empty() {

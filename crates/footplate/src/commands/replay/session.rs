@@ -5,8 +5,10 @@ use footplate_store::{StoredMachine, Traced};
 use serde::de::DeserializeOwned;
 
 use crate::commands::calibrate::CalibrationBeginning;
+use crate::commands::demo::TourBeginning;
 use crate::commands::drive::DriveBeginning;
 use crate::commands::written_layout::WrittenLayout;
+use crate::session_journal::PROGRAM;
 use crate::witness::{Extent, Rehearing, rehear};
 
 /// Makes a machine as it began, and compares what it decides now with what it decided then.
@@ -34,11 +36,16 @@ pub(super) fn rehearse(
             let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
             Ok(rehear(&mut beginning.calibrator(&layout), trace, extent))
         }
+        TourBeginning::KIND => {
+            let beginning: TourBeginning = read(stored)?;
+            let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
+            Ok(rehear(&mut beginning.driver(&layout), trace, extent))
+        }
         other => bail!(
             "recording {} was decided by a machine of the kind `{other}`, which this version ({}) does not have; it \
              was recorded by version {}",
             stored.recording,
-            env!("CARGO_PKG_VERSION"),
+            PROGRAM,
             stored.program
         ),
     }
@@ -50,7 +57,7 @@ fn read<B: DeserializeOwned>(stored: &StoredMachine) -> anyhow::Result<B> {
             "the machine of recording {} began as version {} of the program knew it, and this one ({}) misses something",
             stored.recording,
             stored.program,
-            env!("CARGO_PKG_VERSION")
+            PROGRAM
         )
     })
 }

@@ -25,7 +25,7 @@ impl CalibrationBeginning {
     /// The name of such a machine in a store.
     pub(crate) const KIND: &'static str = "calibrate";
 
-    pub(super) fn new(
+    pub(crate) fn new(
         written: &WrittenLayout,
         settings: CalibratorSettings,
         fit: MotionFit,

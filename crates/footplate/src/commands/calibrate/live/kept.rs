@@ -9,7 +9,7 @@ use footplate_store::{Journal, NewMachine, Store};
 use super::beginning::CalibrationBeginning;
 use crate::clock::{local, now};
 use crate::link::Address;
-use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
+use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 
 /// Begins a session of a train in a store; the line's clock stands at `at`.
 ///
@@ -29,8 +29,8 @@ pub(super) fn begin(
     let store = Store::open_or_create(path)?;
     let mut journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
     let body = serde_json::to_string(beginning)?;
-    let program = env!("CARGO_PKG_VERSION");
-    journal.begin_machine(NewMachine { kind: CalibrationBeginning::KIND, program, body: &body }, now)?;
+    journal
+        .begin_machine(NewMachine { kind: CalibrationBeginning::KIND, program: PROGRAM, body: &body }, now)?;
     // A simulated clock stands still for a slow disk; trains on a real track do not.
     let when_full = match link {
         Address::Simulated(_) => WhenFull::Wait,
