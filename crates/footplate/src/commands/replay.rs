@@ -24,8 +24,8 @@ use session::rehearse;
 /// program decides the same, to the last bit.
 ///
 /// With --diff a program that decides otherwise shows all that differs. The railway is not there to follow: behind the
-/// first command that differs the inputs are still those of then, so later differences show what would be decided
-/// upon what really happened, not what would have come of it.
+/// first command that differs the inputs are still those of then (but for the clock, which wakes it when it asks), so
+/// later differences show what would be decided upon what really happened, not what would have come of it.
 ///
 /// Exit status: 0 all the same, 1 something differs, 2 it cannot be replayed.
 #[derive(Args)]

@@ -1,7 +1,8 @@
 //! The recorded inputs told to a machine once more, and what it decides now beside what was decided then.
 //!
 //! The railway is not there: whatever the machine decides now, it is told what was recorded. So behind a first
-//! difference the inputs are those that followed from the decisions of then.
+//! difference the inputs are those that followed from the decisions of then, but for the clock: from there on the machine
+//! is also woken when it asks for it.
 
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -16,6 +17,9 @@ use super::listener::Listener;
 /// The same command so much earlier or later is called the same; farther apart two commands have nothing to do with each
 /// other (chosen: a lap takes longer).
 const SAME_COMMAND_WITHIN: TimeSpan = TimeSpan::from_ms(10_000);
+
+/// A loop around a machine may wake it so late. If something was recorded within this time, that wakes it.
+const WOKEN_WITHIN: TimeSpan = TimeSpan::from_ms(5);
 
 /// How far to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -92,6 +96,9 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
         while let Some((row, place)) = rows.next_if(|(row, _)| row.side == Side::Input) {
             match told(&row, place, extent) {
                 Ok(input) => {
+                    if !lone.is_empty() {
+                        now.extend(decided_by_itself(machine, rehearing.at, row.time));
+                    }
                     after = format!("input {}: {} {}", row.number, row.kind, row.text).into();
                     machine.handle_input(row.time, &input);
                     now.extend(decided(machine, row.time, &after));
@@ -134,6 +141,19 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
     }
     rehearing.differences = differences(lone);
     rehearing
+}
+
+/// What a machine that has decided otherwise decides between two inputs of then: it asks for other times now.
+fn decided_by_itself<M: Listener>(machine: &mut M, from: Timestamp, until: Timestamp) -> Vec<Row> {
+    let after: Rc<str> = "the time that it asks for now".into();
+    let mut rows = Vec::new();
+    let mut last = from;
+    while let Some(due) = machine.next_timeout().filter(|due| *due > last && until - *due > WOKEN_WITHIN) {
+        machine.handle_timeout(due);
+        rows.extend(decided(machine, due, &after));
+        last = due;
+    }
+    rows
 }
 
 /// The input of a row, or why it ends there.
@@ -278,16 +298,16 @@ mod tests {
     #[derive(Default)]
     struct Obedient {
         adds: u8,
-        waits: bool,
-        pending: Option<u8>,
+        waits: TimeSpan,
+        pending: Option<(u8, Timestamp)>,
         outputs: VecDeque<Output<String>>,
     }
 
     impl Machine for Obedient {
         type Notice = String;
         fn handle_event(&mut self, _: Timestamp, _: &Event) {}
-        fn handle_timeout(&mut self, _: Timestamp) {
-            if let Some(step) = self.pending.take() {
+        fn handle_timeout(&mut self, now: Timestamp) {
+            if let Some((step, _)) = self.pending.take_if(|(_, due)| *due <= now) {
                 let step = SpeedStep::new(step + self.adds).unwrap();
                 self.outputs.push_back(Output::Command(Command::Speed { train: TrainId(24), step }));
             }
@@ -296,7 +316,7 @@ mod tests {
             self.outputs.pop_front()
         }
         fn next_timeout(&self) -> Option<Timestamp> {
-            None
+            self.pending.map(|(_, due)| due)
         }
     }
 
@@ -304,10 +324,8 @@ mod tests {
         fn handle_word(&mut self, now: Timestamp, word: &Input) {
             let Input::Line(line) = word else { return };
             self.outputs.push_back(Output::Notice(line.clone()));
-            self.pending = line.parse().ok();
-            if !self.waits {
-                self.handle_timeout(now);
-            }
+            self.pending = line.parse().ok().map(|step| (step, now + self.waits));
+            self.handle_timeout(now);
         }
     }
 
@@ -359,10 +377,14 @@ mod tests {
 
     #[test]
     fn the_same_command_at_another_time_is_one_difference_and_says_by_how_much() {
-        let mut slow = Obedient { waits: true, ..Obedient::default() };
-        let found = rehear(&mut slow, evening(), ALL);
-        let by: Vec<_> = found.differences.iter().map(|difference| difference.later_by).collect();
-        assert_eq!(by, [Some(TimeSpan::from_ms(490)), Some(TimeSpan::from_ms(100))]);
+        // It is woken when it asks for it, or when something was recorded soon after.
+        for (waits, later_by) in [(40, [40, 40]), (488, [490, 100])] {
+            let mut slow = Obedient { waits: TimeSpan::from_ms(waits), ..Obedient::default() };
+            let found = rehear(&mut slow, evening(), ALL);
+            let by: Vec<_> = found.differences.iter().filter_map(|difference| difference.later_by).collect();
+            assert_eq!(by, later_by.map(TimeSpan::from_ms)[..by.len()], "{waits} ms");
+            assert!(!by.is_empty());
+        }
     }
 
     #[test]
