@@ -3,6 +3,7 @@
 mod clock;
 mod commands;
 mod counted;
+mod dashboard;
 mod link;
 mod live_lines;
 mod progress;

@@ -23,7 +23,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
-use footplate_store::{Journal, NewMachine, Store};
+use footplate_store::{Journal, NewMachine, Store, parse_layout};
 use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::DriveBeginning;
@@ -40,6 +40,7 @@ use super::Outcome;
 use super::predict::turnout_state;
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
+use crate::dashboard::{Dashboard, ServedAt};
 use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
@@ -81,6 +82,10 @@ pub(crate) struct Arguments {
     /// Print a line of JSON for every finished order; all else goes to standard error.
     #[arg(long)]
     json: bool,
+    /// Show trains live in a browser, and take orders from there: at a port of this machine (8417 unless named, 0 for any
+    /// that is free), or at an address. Beyond this machine a token has to be set in the environment as FOOTPLATE_TOKEN.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
+    serve: Option<ServedAt>,
 }
 
 impl Arguments {
@@ -97,15 +102,17 @@ impl Arguments {
         drop(store);
         let beginning = self.beginning(&written, known)?;
         // A person at the prompt lives in real time; a script need not.
-        let pace = if self.script.is_some() { Speed::Unpaced } else { Speed::Times(1.0) };
+        let is_watched = self.script.is_none() || self.serve.is_some();
+        let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
+        let dashboard = self.dashboard(&written)?;
         match &self.link {
             Address::Simulated(simulated) => {
                 let link = open_simulated(simulated, layout, pace)?;
-                self.drive(layout, link, beginning, output)
+                self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
             Address::Serial(_) => {
                 let link = open(&self.link, layout, pace)?;
-                self.drive(layout, link, beginning, output)
+                self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
         }
     }
@@ -141,7 +148,7 @@ impl Arguments {
             known.models.iter().map(|(train, model)| (*train, model.highest())).collect();
         let (giver, steps) = match &self.script {
             Some(path) => (Giver::Script, read_script(path, Known { layout, trains: &highest })?),
-            None if std::io::stdin().is_terminal() => (Giver::Person, Vec::new()),
+            None if std::io::stdin().is_terminal() || self.is_headless() => (Giver::Person, Vec::new()),
             None => (Giver::Script, Vec::new()),
         };
         Ok(DriveBeginning {
@@ -153,6 +160,20 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
         })
+    }
+
+    /// Whether nobody sits here, and people are elsewhere.
+    fn is_headless(&self) -> bool {
+        self.serve.is_some() && !std::io::stdin().is_terminal()
+    }
+
+    fn dashboard(&self, written: &WrittenLayout) -> anyhow::Result<Option<Dashboard>> {
+        let Some(at) = &self.serve else { return Ok(None) };
+        let token = std::env::var("FOOTPLATE_TOKEN").ok();
+        let dashboard =
+            Dashboard::open(at, token, &parse_layout(written.layout.name(), written.text.as_bytes())?)?;
+        eprintln!("the dashboard is at {}", dashboard.url);
+        Ok(Some(dashboard))
     }
 
     /// What writes the session down; the line's clock stands at `at`.
@@ -184,12 +205,13 @@ impl Arguments {
         layout: &Layout,
         link: L,
         beginning: DriveBeginning,
+        dashboard: Option<&Dashboard>,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let settings = session_settings(&self.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
-        let lines = self.script.is_none().then(lines_of_stdin);
-        let mut stage = Stage::new(lines, self.json);
+        let lines = (self.script.is_none() && !self.is_headless()).then(lines_of_stdin);
+        let mut stage = Stage::new(lines, self.json, dashboard);
         let mut journal = self.journal(layout, link.now(), &beginning)?;
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let conductor = beginning.conductor()?;

@@ -5,10 +5,10 @@ mod outcomes;
 use std::collections::{BTreeMap, VecDeque};
 
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::control::{Driver, Machine, Order, OrderId, Output, Refusal};
+use footplate_core::control::{Driver, Machine, Order, OrderId, Output, Promise, Refusal};
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::Landmark;
-use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
 use super::instruction::{HELP, Instruction, Until};
@@ -17,6 +17,7 @@ use super::reader::Known;
 use super::script::{Step, step};
 use super::spoken::Spoken;
 use super::told::Tongue;
+use crate::dashboard::{Painter, Picture, TrainTask};
 use crate::witness::{Input, Listener};
 
 /// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
@@ -49,6 +50,8 @@ pub(crate) struct Conductor {
     trains: BTreeMap<TrainId, SpeedStep>,
     wait: Option<Wait>,
     pending: BTreeMap<OrderId, Step>,
+    /// What was promised last of orders that are under way.
+    promises: BTreeMap<OrderId, Promise>,
     outputs: VecDeque<Output<Spoken>>,
     began: Option<Timestamp>,
     /// When something was last looked at.
@@ -81,6 +84,7 @@ impl Conductor {
             trains,
             wait: None,
             pending: BTreeMap::new(),
+            promises: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
             looked: Timestamp::ZERO,
@@ -109,6 +113,7 @@ impl Conductor {
     fn hear(&mut self, now: Timestamp, line: &str) {
         let known = Known { layout: self.driver.layout(), trains: &self.trains };
         match step(line, known) {
+            Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
             Ok(heard) => {
                 // Who says something else has waited long enough.
                 if heard.is_some() && self.giver == Giver::Person {
@@ -227,6 +232,8 @@ impl Conductor {
                 }
             }
             Instruction::Place(train, at) => self.place(now, &step, train, at),
+            Instruction::Halt => self.halt(now),
+            Instruction::PowerOn => self.outputs.push_back(Output::Command(Command::PowerOn)),
             Instruction::Where(Some(train)) => {
                 let line = self.tongue().whereabouts(train, now);
                 self.say(line);
@@ -244,6 +251,46 @@ impl Conductor {
                 self.end();
             }
         }
+    }
+
+    /// Everything stands, whatever was said before and waits.
+    fn halt(&mut self, now: Timestamp) {
+        self.steps.clear();
+        self.wait = None;
+        for train in self.trains.keys().copied().collect::<Vec<_>>() {
+            // Step 0 is a step of every train, so that nothing refuses it.
+            let _ = self.driver.order(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+        self.hand_on(now);
+        self.outputs.push_back(Output::Command(Command::PowerOff));
+        self.say(
+            "halt: all trains are told to stand, and the power goes off; `power on` gives it back".to_owned(),
+        );
+        self.go_on(now);
+    }
+
+    /// What is wrong with a line, if something is.
+    pub(super) fn mistake(&self, line: &str) -> Option<String> {
+        let known = Known { layout: self.driver.layout(), trains: &self.trains };
+        step(line, known).err().map(|mistake| mistake.to_string())
+    }
+
+    /// What there is to see now.
+    pub(super) fn picture(&self, painter: &Painter, now: Timestamp) -> Picture {
+        let task = |train: TrainId| {
+            let order = self.driver.busy(train)?;
+            let step = self.pending.get(&order)?;
+            let target = match step.instruction {
+                Instruction::Order(Order::Stop(stop)) => Some(stop.target),
+                Instruction::Order(Order::Arrive { target, .. }) => Some(target),
+                _ => None,
+            };
+            let promise =
+                self.promises.get(&order).map(|promise| [promise.median, promise.low, promise.high]);
+            Some((train, TrainTask { text: step.text.clone(), target, promise }))
+        };
+        let tasks = self.trains.keys().copied().filter_map(task).collect();
+        painter.paint(&self.driver, &tasks, now, self.began.unwrap_or(now))
     }
 
     /// A person says where a train stands.

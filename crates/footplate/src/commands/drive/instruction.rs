@@ -13,6 +13,10 @@ pub(super) enum Instruction {
     Straighten,
     /// A person put a train there, or sees that it stands there.
     Place(TrainId, Landmark),
+    /// All trains stand, and the power goes off the track, at once.
+    Halt,
+    /// The power comes back.
+    PowerOn,
     /// Where is a train, or all of them?
     Where(Option<TrainId>),
     /// Go on with the next line later.
@@ -51,6 +55,8 @@ hold 24 250mm/s                   run at a mean speed, whatever steps that takes
 follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, contact by contact (or by 150mm)
 arrive 24 at D5+40mm in 12s       come to rest there, 12 s from now
 place 24 at C13+120mm             train 24 was put there by hand, or stands there as you see
+halt                              all trains stand and the power goes off, at once
+power on                          give power to the track again
 where [24]                        where the train is, how sure, and how fast
 wait 2s                           go on after 2 seconds (also 500ms)
 wait 24 at rest                   go on when train 24 has done what it was told and stands

@@ -7,9 +7,9 @@ use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 12] = [
-    "speed", "reverse", "turnout", "stop", "move", "hold", "follow", "arrive", "place", "where", "wait",
-    "help",
+const VERBS: [&str; 14] = [
+    "speed", "reverse", "turnout", "stop", "move", "hold", "follow", "arrive", "place", "halt", "power",
+    "where", "wait", "help",
 ];
 
 /// Reads one line; `None` where it says nothing.
@@ -65,6 +65,11 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             let train = words.train()?;
             words.expect("at")?;
             Instruction::Place(train, words.landmark()?)
+        }
+        "halt" => Instruction::Halt,
+        "power" => {
+            words.expect("on")?;
+            Instruction::PowerOn
         }
         "where" if words.rest.is_empty() => Instruction::Where(None),
         "where" => Instruction::Where(Some(words.train()?)),
@@ -201,6 +206,8 @@ mod tests {
             panic!("a place")
         };
         assert_eq!((placed, at.offset), (train, Length::from_mm(120.0)));
+        assert_eq!(read("halt"), Ok(Some(Instruction::Halt)));
+        assert_eq!(read("power on"), Ok(Some(Instruction::PowerOn)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
         assert_eq!(read("where"), Ok(Some(Instruction::Where(None))));
         assert_eq!(read("  # nothing but a remark"), Ok(None));
@@ -236,6 +243,7 @@ mod tests {
             ("follow 58 behind 58 by 1s", "column 18: `58` is the same train: name the one ahead of it"),
             ("follow 58 behind 24 by 1", "column 24: `1` should be a distance ahead, such as 37mm or 1.2m"),
             ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
+            ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),
         ] {

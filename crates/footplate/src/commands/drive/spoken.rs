@@ -2,7 +2,7 @@
 
 use footplate_core::control::Promise;
 use footplate_core::track::Landmark;
-use footplate_core::{Length, TimeSpan, TrainId};
+use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 
 /// Something to be said.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +14,8 @@ pub(crate) enum Spoken {
         /// Where trains are, shortly.
         status: String,
     },
+    /// A train passed a contact at a time; for whoever draws it.
+    Passed(SensorId, Timestamp),
     /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
     Begun(TrainId),
     /// An order has ended.

@@ -1,8 +1,10 @@
 //! Between the one who drives and the people in front of it: what they write goes in, what is said comes out.
 
 use std::io::{IsTerminal, Write};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
+use std::time::Duration;
 
 use footplate_core::control::Machine as _;
 use footplate_core::{Command, Timestamp};
@@ -10,8 +12,13 @@ use footplate_wire::{CommandError, LinkNotice};
 
 use super::conductor::Conductor;
 use super::spoken::{Ended, Spoken};
+use crate::clock::Stopwatch;
+use crate::dashboard::{Answer, Board, Dashboard, Painter};
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
+
+/// No screen shows more often than this that a train has moved: fifty pictures a second.
+const BETWEEN_PICTURES: Duration = Duration::from_millis(20);
 
 /// Lines that a person writes, as they come.
 pub(super) fn lines_of_stdin() -> Receiver<String> {
@@ -32,9 +39,35 @@ pub(super) fn lines_of_stdin() -> Receiver<String> {
 pub(super) struct Stage {
     lines: Option<Receiver<String>>,
     screen: Screen,
+    watched: Option<Watched>,
     /// What whoever knows the truth should look at before anything moves on.
     pub(super) for_referee: Vec<Spoken>,
     pub(super) is_over: bool,
+}
+
+/// Those who watch in a browser.
+struct Watched {
+    board: Arc<Board>,
+    painter: Painter,
+    stopwatch: Stopwatch,
+    painted: Duration,
+}
+
+impl Watched {
+    fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) {
+        while let Some(asked) = self.board.next_asked() {
+            let mistake = conductor.machine().mistake(&asked.line);
+            if mistake.is_none() {
+                conductor.handle_word(now, &Input::Line(asked.line.clone()));
+            }
+            asked.answer(mistake.map_or(Answer::Taken, Answer::Refused));
+        }
+        let elapsed = self.stopwatch.elapsed();
+        if elapsed >= self.painted + BETWEEN_PICTURES {
+            self.painted = elapsed;
+            self.board.show(&conductor.machine().picture(&self.painter, now));
+        }
+    }
 }
 
 /// Where lines for people go.
@@ -59,11 +92,17 @@ impl Screen {
 
 impl Stage {
     /// `lines`: what a person writes. `json`: the output is for results, and people look at standard error.
-    pub(super) fn new(lines: Option<Receiver<String>>, json: bool) -> Self {
+    pub(super) fn new(lines: Option<Receiver<String>>, json: bool, dashboard: Option<&Dashboard>) -> Self {
+        let watched = dashboard.map(|dashboard| Watched {
+            board: Arc::clone(&dashboard.board),
+            painter: Painter::new(),
+            stopwatch: Stopwatch::start(),
+            painted: Duration::ZERO,
+        });
         let prompts =
             lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
         let screen = Screen { to_errors: json, prompts };
-        Self { lines, screen, for_referee: Vec::new(), is_over: false }
+        Self { lines, screen, watched, for_referee: Vec::new(), is_over: false }
     }
 
     pub(super) fn say(&self, text: &str, status: &str) {
@@ -72,9 +111,19 @@ impl Stage {
 }
 
 impl Attendant<Witnessed<Conductor>> for Stage {
-    fn hear(&mut self, _: Timestamp, notice: Spoken) {
+    fn hear(&mut self, now: Timestamp, notice: Spoken) {
         match notice {
-            Spoken::Line { text, status } => self.screen.say(&text, &status),
+            Spoken::Line { text, status } => {
+                if let Some(watched) = &self.watched {
+                    watched.board.say((now - Timestamp::ZERO).as_s(), &text);
+                }
+                self.screen.say(&text, &status);
+            }
+            Spoken::Passed(sensor, at) => {
+                if let Some(watched) = &mut self.watched {
+                    watched.painter.passed(sensor, at);
+                }
+            }
             Spoken::Over => self.is_over = true,
             begun_or_ended => self.for_referee.push(begun_or_ended),
         }
@@ -101,6 +150,9 @@ impl Attendant<Witnessed<Conductor>> for Stage {
                     conductor.handle_timeout(now);
                 }
             }
+        }
+        if let Some(watched) = &mut self.watched {
+            watched.attend(now, conductor);
         }
         if self.is_over || !self.for_referee.is_empty() { Wish::Finish } else { Wish::GoOn }
     }

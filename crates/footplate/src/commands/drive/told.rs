@@ -25,6 +25,8 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Follow { .. }) => "follow",
         Instruction::Order(Order::Arrive { .. }) => "arrive",
         Instruction::Place(..) => "place",
+        Instruction::Halt => "halt",
+        Instruction::PowerOn => "power",
         Instruction::Where(_) => "where",
         Instruction::Wait(_) => "wait",
         Instruction::Help => "help",

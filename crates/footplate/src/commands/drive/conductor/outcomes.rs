@@ -49,7 +49,12 @@ impl Conductor {
             self.say(line);
         }
         match notice {
+            DriveNotice::Planned(plan) => {
+                self.promises.insert(plan.order, plan.promise);
+            }
             DriveNotice::Passed { train, passed, .. } => {
+                let at = passed.window.middle();
+                self.outputs.push_back(Output::Notice(Spoken::Passed(passed.sensor, at)));
                 self.learning.passed(*train, &self.driver, passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
@@ -69,11 +74,13 @@ impl Conductor {
                 }
             }
             DriveNotice::GivenUp { order, why, .. } => {
+                self.promises.remove(order);
                 if let Some(step) = self.pending.remove(order) {
                     self.refuse(now, &step, why);
                 }
             }
             DriveNotice::Replaced { order, .. } => {
+                self.promises.remove(order);
                 self.pending.remove(order);
             }
             _ => {}
@@ -81,6 +88,7 @@ impl Conductor {
     }
 
     fn done(&mut self, finished: &Finished) {
+        self.promises.remove(&finished.order);
         let Some(step) = self.pending.remove(&finished.order) else { return };
         let achieved = finished.achieved;
         self.fell_short |= finished.unseen.is_some();

@@ -1,0 +1,174 @@
+//! Between the control loop and those who watch it: the loop leaves things here and never waits.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde::Serialize;
+use tokio::sync::{oneshot, watch};
+
+/// Lines that are kept for watchers who were away: a quarter of an hour of a busy railway.
+const LINES_KEPT: usize = 4_000;
+/// Orders that can wait for the loop, which looks every few hundredths of a second: more come from no person.
+const MOST_WAITING: usize = 64;
+
+/// Something that was said, with its number.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Line {
+    /// One more than that of the line before.
+    pub(super) number: u64,
+    /// When, in seconds of the line's clock.
+    pub(super) t_s: f64,
+    pub(super) text: String,
+}
+
+/// How an order was taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// It is being carried out; what comes of it is said in lines.
+    Taken,
+    /// It cannot be understood or carried out, and why.
+    Refused(String),
+}
+
+/// An order that waits for the loop.
+#[derive(Debug)]
+pub(crate) struct Asked {
+    /// As the prompt understands it.
+    pub(crate) line: String,
+    answer: oneshot::Sender<Answer>,
+}
+
+impl Asked {
+    /// Tells whoever asked. They may have gone; nobody minds.
+    pub(crate) fn answer(self, answer: Answer) {
+        let _ = self.answer.send(answer);
+    }
+}
+
+/// Orders cannot be taken: more wait than the loop has looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TooMany;
+
+#[derive(Debug, Default)]
+struct Log {
+    lines: VecDeque<Line>,
+    /// The number of the next.
+    next: u64,
+}
+
+/// Pictures, lines and orders.
+///
+/// Pictures are views: one takes the place of the last, and who looks seldom sees few. Lines are kept, and whoever was
+/// away finds those that it missed, or is told how many are gone.
+#[derive(Debug)]
+pub(crate) struct Board {
+    picture: watch::Sender<Arc<str>>,
+    log: Mutex<Log>,
+    /// The number of the next line, to wake those that wait for it.
+    written: watch::Sender<u64>,
+    waiting: Mutex<VecDeque<Asked>>,
+}
+
+impl Board {
+    pub(crate) fn new() -> Arc<Self> {
+        Arc::new(Self {
+            picture: watch::Sender::new("null".into()),
+            log: Mutex::default(),
+            written: watch::Sender::new(0),
+            waiting: Mutex::default(),
+        })
+    }
+
+    /// Shows something else from now on.
+    pub(crate) fn show(&self, picture: &impl Serialize) {
+        // What cannot be written as JSON is a mistake of ours that a test finds; the railway runs on.
+        if let Ok(text) = serde_json::to_string(picture) {
+            self.picture.send_replace(text.into());
+        }
+    }
+
+    /// Says something to everybody.
+    pub(crate) fn say(&self, t_s: f64, text: &str) {
+        let mut log = lock(&self.log);
+        let number = log.next;
+        log.next += 1;
+        log.lines.push_back(Line { number, t_s, text: text.into() });
+        if log.lines.len() > LINES_KEPT {
+            log.lines.pop_front();
+        }
+        drop(log);
+        self.written.send_replace(number + 1);
+    }
+
+    /// The next thing that was asked for, until `None`.
+    pub(crate) fn next_asked(&self) -> Option<Asked> {
+        lock(&self.waiting).pop_front()
+    }
+
+    /// Asks for something. What is urgent goes before everything else and always finds room.
+    pub(super) fn ask(&self, line: String, is_urgent: bool) -> Result<oneshot::Receiver<Answer>, TooMany> {
+        let (answer, answered) = oneshot::channel();
+        let mut waiting = lock(&self.waiting);
+        if is_urgent {
+            waiting.push_front(Asked { line, answer });
+        } else if waiting.len() < MOST_WAITING {
+            waiting.push_back(Asked { line, answer });
+        } else {
+            return Err(TooMany);
+        }
+        Ok(answered)
+    }
+
+    pub(super) fn pictures(&self) -> watch::Receiver<Arc<str>> {
+        self.picture.subscribe()
+    }
+
+    pub(super) fn written(&self) -> watch::Receiver<u64> {
+        self.written.subscribe()
+    }
+
+    /// The lines from a number on, and how many of them are gone.
+    pub(super) fn lines_from(&self, number: u64) -> (Vec<Line>, u64) {
+        let log = lock(&self.log);
+        let first = log.lines.front().map_or(log.next, |line| line.number);
+        let lost = first.saturating_sub(number);
+        (log.lines.iter().filter(|line| line.number >= number).cloned().collect(), lost)
+    }
+}
+
+/// A thread that panicked while it held a lock left whole lines: they are moved in and out only.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_was_away_finds_what_was_said_and_how_much_is_gone() {
+        let board = Board::new();
+        for number in 0..LINES_KEPT + 10 {
+            board.say(number as f64, "a line");
+        }
+        let (lines, lost) = board.lines_from(4);
+        assert_eq!((lines.len(), lost), (LINES_KEPT, 6));
+        assert_eq!(lines[0].number, 10);
+        assert_eq!(board.lines_from(LINES_KEPT as u64 + 10).0.len(), 0);
+        assert_eq!(*board.written().borrow(), LINES_KEPT as u64 + 10);
+    }
+
+    #[test]
+    fn what_is_urgent_goes_first_however_many_wait() {
+        let board = Board::new();
+        for _ in 0..MOST_WAITING {
+            drop(board.ask("where".into(), false).expect("room"));
+        }
+        assert!(board.ask("where".into(), false).is_err());
+        let mut answered = board.ask("halt".into(), true).expect("always");
+        let first = board.next_asked().expect("one waits");
+        assert_eq!(first.line, "halt");
+        first.answer(Answer::Taken);
+        assert_eq!(answered.try_recv(), Ok(Answer::Taken));
+    }
+}

@@ -1,0 +1,206 @@
+//! HTTP on a thread of its own.
+//!
+//! ```text
+//! GET  /                     the pages
+//! GET  /api/layout           the layout, with where to draw it
+//! GET  /api/picture          what there is to see now
+//! GET  /api/events           server-sent events: `picture`, `line`, `gap`; `Last-Event-ID` goes on from a line
+//! POST /api/orders           {"line": "stop 24 at C13+120mm"}: what the prompt understands
+//! POST /api/emergency-stop   {}: all trains stop, power off
+//! ```
+
+use std::net::SocketAddr;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use axum::extract::{DefaultBodyLimit, Path, Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::sse::{KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use footplate_store::LayoutFile;
+use serde::Deserialize;
+use serde_json::json;
+use tokio::net::TcpListener;
+
+use super::assets::asset;
+use super::board::{Answer, Board};
+use super::guard::Guard;
+use super::picture::LayoutPicture;
+use super::stream::events;
+
+/// An order is a line; none that means anything is longer.
+const LONGEST_BODY: usize = 4 << 10;
+/// The control loop looks for orders every few hundredths of a second; who gets no answer by then is told so.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
+/// The port that is asked for unless another is named.
+const USUAL_PORT: u16 = 8417;
+
+/// What the prompt calls an emergency stop.
+const HALT: &str = "halt";
+
+/// Where to serve.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ServedAt(SocketAddr);
+
+impl FromStr for ServedAt {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> anyhow::Result<Self> {
+        let loopback = |port| SocketAddr::from(([127, 0, 0, 1], port));
+        let address = match text {
+            "" => loopback(USUAL_PORT),
+            _ => match text.parse::<u16>() {
+                Ok(port) => loopback(port),
+                Err(_) => text.parse().with_context(|| {
+                    format!(
+                        "`{text}` is no address to serve at: write a port such as 8417, or 127.0.0.1:8417"
+                    )
+                })?,
+            },
+        };
+        Ok(Self(address))
+    }
+}
+
+/// A server that runs until the program ends.
+#[derive(Debug)]
+pub(crate) struct Dashboard {
+    pub(crate) board: Arc<Board>,
+    /// What to open in a browser.
+    pub(crate) url: String,
+}
+
+#[derive(Clone)]
+struct Shared {
+    board: Arc<Board>,
+    layout: Arc<str>,
+    guard: Guard,
+}
+
+impl Dashboard {
+    /// Begins to serve.
+    ///
+    /// # Errors
+    /// The address is taken, or is open to others and no token was given.
+    pub(crate) fn open(at: &ServedAt, token: Option<String>, layout: &LayoutFile) -> anyhow::Result<Self> {
+        if !at.0.ip().is_loopback() && token.as_deref().unwrap_or_default().is_empty() {
+            bail!(
+                "{} can be reached from other machines: set a token in the environment as FOOTPLATE_TOKEN, or serve \
+                 at 127.0.0.1",
+                at.0
+            );
+        }
+        let listener = std::net::TcpListener::bind(at.0)
+            .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", at.0))?;
+        listener.set_nonblocking(true)?;
+        let bound = listener.local_addr()?;
+        let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
+        let board = Board::new();
+        let url = format!("http://{bound}/");
+        let shared = Shared { board: Arc::clone(&board), layout, guard: Guard::new(bound, token) };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+        thread::Builder::new().name("dashboard".to_owned()).spawn(move || {
+            runtime.block_on(async move {
+                match TcpListener::from_std(listener) {
+                    Ok(listener) => {
+                        let _ = axum::serve(listener, router(shared)).await;
+                    }
+                    Err(error) => eprintln!("the dashboard is not served: {error}"),
+                }
+            });
+        })?;
+        Ok(Self { board, url })
+    }
+}
+
+fn router(shared: Shared) -> Router {
+    Router::new()
+        .route("/api/layout", get(layout))
+        .route("/api/picture", get(picture))
+        .route("/api/events", get(watch))
+        .route("/api/orders", post(order))
+        .route("/api/emergency-stop", post(emergency_stop))
+        .route("/", get(|| page(Path(String::new()))))
+        .route("/{file}", get(page))
+        .layer(DefaultBodyLimit::max(LONGEST_BODY))
+        .layer(from_fn_with_state(shared.clone(), guarded))
+        .with_state(shared)
+}
+
+async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    // Streams of events cannot send headers of their own: they show the token in the address.
+    let query = request.uri().query().unwrap_or_default();
+    let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
+    match shared.guard.check(request.method(), request.headers(), token) {
+        Ok(()) => next.run(request).await,
+        Err(denied) => (denied.status(), Json(json!({ "error": denied.says() }))).into_response(),
+    }
+}
+
+async fn page(Path(file): Path<String>) -> Response {
+    match asset(&file) {
+        Some(asset) => asset.into_response(),
+        None => (StatusCode::NOT_FOUND, Json(json!({ "error": "there is no such page" }))).into_response(),
+    }
+}
+
+fn ready_json(text: &str) -> Response {
+    ([(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text.to_owned())
+        .into_response()
+}
+
+async fn layout(State(shared): State<Shared>) -> Response {
+    ready_json(&shared.layout)
+}
+
+async fn picture(State(shared): State<Shared>) -> Response {
+    let picture = Arc::clone(&shared.board.pictures().borrow());
+    ready_json(&picture)
+}
+
+async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    let last = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    let from = last.map_or(0, |last| last.saturating_add(1));
+    Sse::new(events(shared.board, from)).keep_alive(KeepAlive::default()).into_response()
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OrderLine {
+    line: String,
+}
+
+async fn order(
+    State(shared): State<Shared>,
+    body: Result<Json<OrderLine>, axum::extract::rejection::JsonRejection>,
+) -> Response {
+    match body {
+        Ok(Json(OrderLine { line })) => ask(&shared.board, line, false).await,
+        Err(wrong) => {
+            let says = format!("{}; write {{\"line\": \"stop 24 at C13\"}}", wrong.body_text());
+            (wrong.status(), Json(json!({ "error": says }))).into_response()
+        }
+    }
+}
+
+async fn emergency_stop(State(shared): State<Shared>) -> Response {
+    ask(&shared.board, HALT.to_owned(), true).await
+}
+
+async fn ask(board: &Board, line: String, is_urgent: bool) -> Response {
+    let answer = |status: StatusCode, error: &str| (status, Json(json!({ "error": error }))).into_response();
+    let Ok(answered) = board.ask(line, is_urgent) else {
+        return answer(StatusCode::TOO_MANY_REQUESTS, "too many orders wait: ask again in a moment");
+    };
+    match tokio::time::timeout(ANSWERED_WITHIN, answered).await {
+        Ok(Ok(Answer::Taken)) => (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response(),
+        Ok(Ok(Answer::Refused(why))) => answer(StatusCode::UNPROCESSABLE_ENTITY, &why),
+        _ => answer(StatusCode::GATEWAY_TIMEOUT, "the control loop did not answer: is the link in order?"),
+    }
+}

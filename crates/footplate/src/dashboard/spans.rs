@@ -1,0 +1,92 @@
+//! Which rails a stretch of way covers, for a body, a haze or a reservation to be drawn on them.
+
+use footplate_core::track::{Layout, Position, TurnoutStates};
+use footplate_core::{EdgeId, Length};
+use serde::Serialize;
+
+/// A part of an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Span {
+    edge: u16,
+    from_mm: f64,
+    to_mm: f64,
+}
+
+impl Span {
+    /// From one offset on an edge to another.
+    pub(crate) fn new(edge: EdgeId, from: Length, to: Length) -> Self {
+        let tenth = |length: Length| (length.as_mm() * 10.0).round() / 10.0;
+        Self { edge: edge.0, from_mm: tenth(from), to_mm: tenth(to) }
+    }
+}
+
+/// No drawing covers more edges: a lap of any layout in use.
+const MOST_EDGES: usize = 200;
+
+/// What is covered from so far behind a place to so far ahead of it, as the turnouts lie; as much as there is track.
+pub(super) fn spans(
+    layout: &Layout,
+    turnouts: &TurnoutStates,
+    at: Position,
+    behind: Length,
+    ahead: Length,
+) -> Vec<Span> {
+    let mut found = Vec::new();
+    // Backwards is forwards seen the other way.
+    if let Some(back) = layout.reversed(at) {
+        for (edge, [from, to]) in covered(layout, turnouts, back, behind) {
+            if let Some(whole) = layout.edge(edge) {
+                found.push(Span::new(edge.twin(), whole.length - to, whole.length - from));
+            }
+        }
+        found.reverse();
+    }
+    found.extend(
+        covered(layout, turnouts, at, ahead).into_iter().map(|(edge, [from, to])| Span::new(edge, from, to)),
+    );
+    found
+}
+
+fn covered(
+    layout: &Layout,
+    turnouts: &TurnoutStates,
+    at: Position,
+    way: Length,
+) -> Vec<(EdgeId, [Length; 2])> {
+    let (mut at, mut left) = (at, way);
+    let mut found = Vec::new();
+    while left > Length::ZERO && found.len() < MOST_EDGES {
+        let Some(edge) = layout.edge(at.edge) else { break };
+        let to = (at.offset + left).min(edge.length);
+        found.push((at.edge, [at.offset, to]));
+        left -= to - at.offset;
+        let end = Position { edge: at.edge, offset: edge.length };
+        match layout.advance(end, Length::ZERO, turnouts) {
+            Ok(next) if next.edge != at.edge => at = next,
+            _ => break,
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::track::Leg;
+    use footplate_store::layout_named;
+
+    use super::*;
+
+    #[test]
+    fn a_stretch_of_way_covers_as_much_rail_as_it_is_long() {
+        let layout = layout_named("track-a").expect("built in").layout;
+        let turnouts: TurnoutStates =
+            layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
+        let (id, edge) = layout.edges().find(|(_, edge)| edge.length.as_mm() > 200.0).expect("a long one");
+        let at = Position { edge: id, offset: edge.length / 2.0 };
+        let (behind, ahead) = (Length::from_mm(450.0), Length::from_mm(330.0));
+        let found = spans(&layout, &turnouts, at, behind, ahead);
+        let sum: f64 = found.iter().map(|span| span.to_mm - span.from_mm).sum();
+        assert!((sum - 780.0).abs() < 1.0, "{sum}");
+        assert!(found.iter().any(|span| span.edge == id.0));
+    }
+}
