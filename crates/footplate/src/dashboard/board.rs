@@ -62,6 +62,8 @@ struct Log {
 /// away finds those that it missed, or is told how many are gone.
 #[derive(Debug)]
 pub(crate) struct Board {
+    /// Tells lines of this session from those of another, which may have the same numbers.
+    session: i64,
     picture: watch::Sender<Arc<str>>,
     log: Mutex<Log>,
     /// The number of the next line, to wake those that wait for it.
@@ -70,8 +72,9 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    pub(crate) fn new() -> Arc<Self> {
+    pub(crate) fn new(session: i64) -> Arc<Self> {
         Arc::new(Self {
+            session,
             picture: watch::Sender::new("null".into()),
             log: Mutex::default(),
             written: watch::Sender::new(0),
@@ -127,6 +130,17 @@ impl Board {
         self.written.subscribe()
     }
 
+    /// What a line is called, so that a browser that was away can say up to where it has heard.
+    pub(super) fn name_of(&self, number: u64) -> String {
+        format!("{}-{number}", self.session)
+    }
+
+    /// The number after that of a name; `None` for a line of another session.
+    pub(super) fn number_after(&self, name: &str) -> Option<u64> {
+        let (session, number) = name.rsplit_once('-')?;
+        (session.parse() == Ok(self.session)).then_some(number.parse::<u64>().ok()?.saturating_add(1))
+    }
+
     /// The lines from a number on, and how many of them are gone.
     pub(super) fn lines_from(&self, number: u64) -> (Vec<Line>, u64) {
         let log = lock(&self.log);
@@ -147,7 +161,7 @@ mod tests {
 
     #[test]
     fn who_was_away_finds_what_was_said_and_how_much_is_gone() {
-        let board = Board::new();
+        let board = Board::new(7);
         for number in 0..LINES_KEPT + 10 {
             board.say(number as f64, "a line");
         }
@@ -155,12 +169,14 @@ mod tests {
         assert_eq!((lines.len(), lost), (LINES_KEPT, 6));
         assert_eq!(lines[0].number, 10);
         assert_eq!(board.lines_from(LINES_KEPT as u64 + 10).0.len(), 0);
+        assert_eq!(board.number_after(&board.name_of(12)), Some(13));
+        assert_eq!(board.number_after("8-12"), None, "of another session");
         assert_eq!(*board.written().borrow(), LINES_KEPT as u64 + 10);
     }
 
     #[test]
     fn what_is_urgent_goes_first_however_many_wait() {
-        let board = Board::new();
+        let board = Board::new(7);
         for _ in 0..MOST_WAITING {
             drop(board.ask("where".into(), false).expect("room"));
         }

@@ -33,6 +33,7 @@ use super::board::{Answer, Board};
 use super::guard::Guard;
 use super::picture::LayoutPicture;
 use super::stream::events;
+use crate::clock::now;
 
 /// An order is a line; none that means anything is longer.
 const LONGEST_BODY: usize = 4 << 10;
@@ -101,7 +102,8 @@ impl Dashboard {
         listener.set_nonblocking(true)?;
         let bound = listener.local_addr()?;
         let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
-        let board = Board::new();
+        // Nobody else has begun at the same moment at the same port.
+        let board = Board::new(now().as_ns());
         let url = format!("http://{bound}/");
         let shared = Shared { board: Arc::clone(&board), layout, guard: Guard::new(bound, token) };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
@@ -165,8 +167,8 @@ async fn picture(State(shared): State<Shared>) -> Response {
 }
 
 async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
-    let last = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    let from = last.map_or(0, |last| last.saturating_add(1));
+    let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
+    let from = last.and_then(|last| shared.board.number_after(last)).unwrap_or(0);
     Sse::new(events(shared.board, from)).keep_alive(KeepAlive::default()).into_response()
 }
 

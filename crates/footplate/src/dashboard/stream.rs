@@ -72,7 +72,8 @@ impl Watcher {
         for line in lines {
             self.next_line = line.number + 1;
             if let Ok(text) = serde_json::to_string(&line) {
-                self.ready.push_back(Event::default().event("line").id(line.number.to_string()).data(text));
+                self.ready
+                    .push_back(Event::default().event("line").id(self.board.name_of(line.number)).data(text));
             }
         }
     }

@@ -1,0 +1,138 @@
+// The dashboard in a real browser: a simulated train is found, driven by clicking and stopped where it should, an
+// emergency stop is one key, pages from elsewhere are turned away, and a server that comes back is found again.
+
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { mkdtempSync } from "node:fs";
+import { request } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { AT, launch } from "./browser.mjs";
+
+const LINK = "sim:track-a?seed=7&speed=4";
+/** A stop that ends further off than this has missed its place: more than a train's length of doubt. */
+const MISSED_MM = 60;
+/** The longest that anything takes in a test: a lap of the track, at four times real time. */
+const PATIENCE = 60_000;
+
+const store = join(mkdtempSync(join(tmpdir(), "footplate-dashboard-")), "railway.db");
+let browser;
+let running;
+
+/** Starts the program; resolves with the address that it prints. */
+function serve(port) {
+  const child = spawn(process.env.FOOTPLATE, ["drive", "--link", LINK, "--train", "24", "--store", store, "--serve", String(port)], { stdio: ["ignore", "ignore", "pipe"] });
+  return new Promise((resolve, reject) => {
+    let said = "";
+    child.stderr.on("data", (text) => {
+      said += text;
+      const found = /the dashboard is at (http:\S+)/.exec(said);
+      if (found) resolve({ child, url: found[1], port: Number(new URL(found[1]).port) });
+    });
+    child.on("exit", () => reject(new Error(said)));
+  });
+}
+
+function end({ child }) {
+  const gone = new Promise((resolve) => child.on("exit", resolve));
+  child.kill("SIGTERM");
+  return gone;
+}
+
+/** A request as no browser would send it; its status. */
+function ask(path, headers, body) {
+  return new Promise((resolve, reject) => {
+    const sent = request({ host: "127.0.0.1", port: running.port, path, method: body ? "POST" : "GET", headers }, (answer) => {
+      answer.resume();
+      resolve(answer.statusCode);
+    });
+    sent.on("error", reject);
+    sent.end(body);
+  });
+}
+
+const picture = async () => (await fetch(`${running.url}api/picture`)).json();
+
+before(async () => {
+  execFileSync(process.env.FOOTPLATE, ["calibrate", "--link", "sim:track-a?seed=7", "--layout", "track-a", "--train", "24", "--store", store], { stdio: "pipe" });
+  running = await serve(0);
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  if (running) await end(running);
+});
+
+test("a train is found, driven by clicking and stopped where it should, and stands at the space bar", async () => {
+  const page = await browser.newPage({ viewport: { width: 1300, height: 900 } });
+  const complaints = [];
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  await page.goto(running.url);
+  await page.waitForSelector(".train");
+  await page.fill("#line", "turnout all straight");
+  await page.click("#order button");
+  await page.waitForFunction(() => /turnout 156 told/.test(document.querySelector("#said").textContent), null, { timeout: PATIENCE });
+  await page.fill("#step-24", "8");
+  await page.locator(".train button", { hasText: "Set" }).first().click();
+  const card = page.locator(".train").first();
+  await page.waitForFunction(() => /±/.test(document.querySelector(".train dd").textContent), null, { timeout: PATIENCE });
+  await page.screenshot({ path: join(AT, "dashboard.png") });
+
+  // Once E7 is passed, C13 is a lap away. A press on it names it, and the card's button stops the train there.
+  await page.waitForFunction(() => /at E7,[^]*$/.test(document.querySelector("#said").lastElementChild.textContent), null, { timeout: PATIENCE });
+  const spot = await page.locator("#track text", { hasText: "C13 C14" }).boundingBox();
+  await page.mouse.click(spot.x + spot.width / 2, spot.y + spot.height + 6);
+  await page.waitForFunction(() => /Stop at [A-E]\d/.test(document.querySelector(".train").textContent), null, { timeout: PATIENCE });
+  const named = /Stop at (\S+)/.exec(await card.locator("button", { hasText: "Stop at" }).textContent())?.[1];
+  await card.locator("button", { hasText: "Stop at" }).click();
+  await page.waitForFunction(() => document.querySelectorAll(".train dd")[2].textContent !== "–", null, { timeout: PATIENCE });
+  await page.screenshot({ path: join(AT, "dashboard-stopping.png") });
+  await page.waitForFunction(() => /from the target/.test(document.querySelector("#said").textContent), null, { timeout: PATIENCE });
+  const off = /([+-][\d.]+) mm from the target/.exec(await page.locator("#said").textContent())[1];
+  assert.ok(Math.abs(Number(off)) < MISSED_MM, `stop at ${named}: ${off} mm`);
+
+  await page.fill("#step-24", "6");
+  await page.locator(".train button", { hasText: "Set" }).first().click();
+  await page.waitForFunction(() => /step 6/.test(document.querySelectorAll(".train dd")[1].textContent), null, { timeout: PATIENCE });
+  await page.locator("h1").click();
+  await page.keyboard.press("Space");
+  await page.waitForFunction(() => /told to stand/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
+  const { trains } = await picture();
+  assert.equal(trains[0].step, 0);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test("pages from elsewhere, other names and forms are turned away, and mistakes are named", async () => {
+  const own = { Host: `127.0.0.1:${running.port}`, "Content-Type": "application/json" };
+  const order = JSON.stringify({ line: "where" });
+  assert.equal(await ask("/api/orders", own, order), 202);
+  assert.equal(await ask("/api/orders", { ...own, Origin: "http://evil.example" }, order), 403);
+  assert.equal(await ask("/api/orders", { ...own, Host: `evil.example:${running.port}` }, order), 421);
+  assert.equal(await ask("/api/picture", { Host: "evil.example" }), 421);
+  assert.equal(await ask("/api/orders", { ...own, "Content-Type": "text/plain" }, order), 415);
+  assert.equal(await ask("/api/orders", own, JSON.stringify({ line: "sped 24 8" })), 422);
+  assert.equal(await ask("/api/orders", own, "{"), 400);
+  assert.equal(await ask("/api/orders", own, JSON.stringify({ line: "x".repeat(10_000) })), 413);
+  assert.equal(await ask("/nothing", own), 404);
+});
+
+test("it fits a phone, in the dark and in German, and finds a server that comes back", async () => {
+  const page = await browser.newPage({ viewport: { width: 390, height: 800 }, colorScheme: "dark", locale: "de-DE", hasTouch: true });
+  await page.goto(running.url);
+  await page.waitForSelector(".train");
+  assert.equal(await page.locator("#halt").textContent(), "Nothalt");
+  const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, innerWidth));
+  assert.equal(wide, 390);
+  await page.screenshot({ path: join(AT, "dashboard-phone.png") });
+  const { port } = running;
+  await end(running);
+  await page.waitForSelector("#connection.red", { timeout: PATIENCE });
+  running = await serve(port);
+  await page.waitForSelector("#connection.green", { timeout: PATIENCE });
+  await page.close();
+});
