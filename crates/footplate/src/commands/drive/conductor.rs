@@ -159,7 +159,7 @@ impl Conductor {
                 self.hand_on(now);
             }
         }
-        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.is_empty();
+        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.values().all(runs_on);
         if self.complete && idle && !self.is_over {
             self.end();
         }
@@ -170,11 +170,17 @@ impl Conductor {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
         match step.instruction {
             Instruction::Order(order) => {
-                let is_busy = order.train().is_some_and(|train| self.driver.busy(train).is_some());
+                let is_busy = order.train().is_some_and(|train| self.must_end(train));
                 is_busy || !is_turnout(step) && self.pending.values().any(is_turnout)
             }
             _ => false,
         }
+    }
+
+    /// Whether a train is busy with something that ends by itself.
+    fn must_end(&self, train: TrainId) -> bool {
+        let order = self.driver.busy(train);
+        order.is_some_and(|order| !self.pending.get(&order).is_some_and(runs_on))
     }
 
     fn end(&mut self) {
@@ -317,6 +323,11 @@ impl Conductor {
             }
         }
     }
+}
+
+/// Whether what a line asks for goes on until something else is asked for.
+fn runs_on(step: &Step) -> bool {
+    matches!(step.instruction, Instruction::Order(Order::Hold { .. } | Order::Follow { .. }))
 }
 
 impl Machine for Conductor {

@@ -7,25 +7,42 @@ use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::Driver;
 use footplate_core::estimation::PassedContact;
 use footplate_core::track::Layout;
-use footplate_core::{Event, EventKind, Report, TrainId};
+use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
 
 /// Fits that go on from what was known at the beginning.
 #[derive(Debug)]
 pub(super) struct Learning {
     fits: BTreeMap<TrainId, MotionFit>,
     sections: SectionIndex,
+    /// Steps told to a train since it stood last.
+    changes: BTreeMap<TrainId, usize>,
 }
+
+/// A run with more changes of step than this teaches nothing that others do not: a train that is held at a speed between two
+/// steps changes every second, and a fit weighs every change of a run against every contact.
+const MOST_CHANGES: usize = 16;
 
 impl Learning {
     pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
         let fits = fits.into_iter().map(|fit| (fit.model().train(), fit)).collect();
-        Self { fits, sections: SectionIndex::of(layout) }
+        Self { fits, sections: SectionIndex::of(layout), changes: BTreeMap::new() }
     }
 
     /// A command to a train has left.
     pub(super) fn take(&mut self, driver: &Driver, event: &Event) {
-        if let EventKind::Speed { train, .. } | EventKind::Reverse { train } = event.kind {
-            self.learn(train, driver, event);
+        match event.kind {
+            EventKind::Speed { train, step } => {
+                let changes = self.changes.entry(train).or_default();
+                let was_restless = *changes > MOST_CHANGES;
+                *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
+                if *changes > MOST_CHANGES || was_restless {
+                    self.interrupt(train);
+                } else {
+                    self.learn(train, driver, event);
+                }
+            }
+            EventKind::Reverse { train } => self.learn(train, driver, event),
+            _ => {}
         }
     }
 
@@ -33,6 +50,9 @@ impl Learning {
     pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedContact) {
         if passed.late.is_none() {
             self.interrupt(train);
+        }
+        if self.changes.get(&train).is_some_and(|changes| *changes > MOST_CHANGES) {
+            return;
         }
         let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
         let event = Event { time: passed.window.until, kind: EventKind::Sensor(report) };
