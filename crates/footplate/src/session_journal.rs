@@ -6,19 +6,19 @@
 //! costs nothing; what no longer fits into the queue is lost, counted, and the run broken there.
 
 mod scribe;
+mod writer;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
 
 use anyhow::bail;
 use footplate_core::{Event, Timestamp};
-use footplate_store::{Journal, JournalEntry, NewMachine, StoreError, TrainAtStart};
+use footplate_store::{Journal, JournalEntry, TrainAtStart};
 
 pub(crate) use self::scribe::Scribe;
-use crate::clock::now;
+use self::writer::Writer;
 use crate::runtime::Recorder;
 
 /// The version of the program that decides.
@@ -26,10 +26,6 @@ pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// Entries that can wait: more than five minutes of the 50 events a second that a busy line brings, with what follows from
 /// each of them, in some 10 MB.
 const QUEUE: usize = 60_000;
-/// The most that goes to the disk together: so many are written in a few milliseconds, and then acknowledged.
-const MOST_TOGETHER: usize = 2_000;
-/// How long after a failure the disk is tried again, chosen: soon for a person, seldom for a disk.
-const RETRY: Duration = Duration::from_millis(500);
 
 /// What may be done when the queue is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -262,99 +258,17 @@ impl Drop for SessionJournal {
     }
 }
 
-/// The thread.
-struct Writer {
-    journal: Journal,
-    shared: Arc<Shared>,
-}
-
-impl Writer {
-    fn run(mut self, entries: &Receiver<Entry>) -> Journal {
-        // Taken and not on the disk yet, in order.
-        let mut pending: Vec<Entry> = Vec::new();
-        loop {
-            // Asked before taking what is there: what comes between the two is seen next time.
-            let ended = self.shared.ended.load(Ordering::Acquire);
-            let ended = gather(entries, &mut pending, ended) || ended && pending.len() >= QUEUE;
-            let written = self.write(&mut pending);
-            self.say(written.err().map(|error| error.to_string()));
-            if ended {
-                let left = pending.drain(..).chain(entries.try_iter());
-                let lost = left.filter(|entry| !matches!(entry, Entry::Run(_) | Entry::End)).count();
-                self.shared.lost.fetch_add(lost as u64, Ordering::Relaxed);
-                return self.journal;
-            }
-            if !pending.is_empty() {
-                thread::sleep(RETRY);
-            }
-        }
-    }
-
-    /// Writes down what it can, and leaves the rest.
-    fn write(&mut self, pending: &mut Vec<Entry>) -> Result<(), StoreError> {
-        while let Some(first) = pending.first() {
-            match first {
-                Entry::Of(_) => {
-                    let entries = pending.iter().map_while(Entry::of_journal).take(MOST_TOGETHER);
-                    let entries: Vec<JournalEntry> = entries.cloned().collect();
-                    let acknowledged = self.journal.append_all(&entries, now())?;
-                    self.shared.acknowledged.store(acknowledged, Ordering::Release);
-                    pending.drain(..entries.len());
-                    continue;
-                }
-                Entry::Run(beginning) => self.journal.begin_run(beginning.began_at, &beginning.trains)?,
-                Entry::Machine(kind, body) => {
-                    self.journal.begin_machine(NewMachine { kind, program: PROGRAM, body }, now())?;
-                }
-                Entry::End => {}
-            }
-            pending.remove(0);
-        }
-        Ok(())
-    }
-
-    fn say(&self, trouble: Option<String>) {
-        *self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
-    }
-}
-
-impl Entry {
-    const fn of_journal(&self) -> Option<&JournalEntry> {
-        match self {
-            Self::Of(entry) => Some(entry),
-            Self::Run(_) | Self::Machine(..) | Self::End => None,
-        }
-    }
-}
-
-/// Waits for an entry, unless some are pending or the end was told, and takes all that are there. Says whether none
-/// will come any more.
-fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>, ended: bool) -> bool {
-    if pending.is_empty() && !ended {
-        match entries.recv() {
-            Ok(entry) => pending.push(entry),
-            Err(_) => return true,
-        }
-    }
-    while pending.len() < QUEUE {
-        match entries.try_recv() {
-            Ok(entry) => pending.push(entry),
-            Err(TryRecvError::Empty) => return ended,
-            Err(TryRecvError::Disconnected) => return true,
-        }
-    }
-    false
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::time::Duration;
 
     use footplate_core::{EventKind, TrainId};
     use footplate_store::Store;
     use rusqlite::Connection;
 
     use super::*;
+    use crate::clock::now;
 
     fn event(number: u64) -> Event {
         let time = Timestamp::from_ns(1_000_000 * number as i64);

@@ -23,6 +23,10 @@ wait 500ms
 stop 24 at E7+200mm at step 9 not-beyond 5%
 reverse 24
 stop 24 at C14+100mm
+hold 24 250mm/s
+wait 5s
+stop 24
+hold 24 200mm/s
 ";
 
 fn folder(name: &str) -> PathBuf {

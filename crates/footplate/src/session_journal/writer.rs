@@ -1,0 +1,101 @@
+//! The thread that writes a session down: together whatever has gathered, and again what could not be written.
+
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::{Arc, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use footplate_store::{Journal, JournalEntry, NewMachine, StoreError};
+
+use super::{Entry, PROGRAM, QUEUE, Shared};
+use crate::clock::now;
+
+/// The most that goes to the disk together: so many are written in a few milliseconds, and then acknowledged.
+const MOST_TOGETHER: usize = 2_000;
+/// How long after a failure the disk is tried again, chosen: soon for a person, seldom for a disk.
+const RETRY: Duration = Duration::from_millis(500);
+
+/// Writes down what is handed over, on a thread of its own.
+pub(super) struct Writer {
+    pub(super) journal: Journal,
+    pub(super) shared: Arc<Shared>,
+}
+
+impl Writer {
+    pub(super) fn run(mut self, entries: &Receiver<Entry>) -> Journal {
+        // Taken and not on the disk yet, in order.
+        let mut pending: Vec<Entry> = Vec::new();
+        loop {
+            // Asked before taking what is there: what comes between the two is seen next time.
+            let ended = self.shared.ended.load(Ordering::Acquire);
+            let ended = gather(entries, &mut pending, ended) || ended && pending.len() >= QUEUE;
+            let written = self.write(&mut pending);
+            self.say(written.err().map(|error| error.to_string()));
+            if ended {
+                let left = pending.drain(..).chain(entries.try_iter());
+                let lost = left.filter(|entry| !matches!(entry, Entry::Run(_) | Entry::End)).count();
+                self.shared.lost.fetch_add(lost as u64, Ordering::Relaxed);
+                return self.journal;
+            }
+            if !pending.is_empty() {
+                thread::sleep(RETRY);
+            }
+        }
+    }
+
+    /// Writes down what it can, and leaves the rest.
+    fn write(&mut self, pending: &mut Vec<Entry>) -> Result<(), StoreError> {
+        while let Some(first) = pending.first() {
+            match first {
+                Entry::Of(_) => {
+                    let entries = pending.iter().map_while(Entry::of_journal).take(MOST_TOGETHER);
+                    let entries: Vec<JournalEntry> = entries.cloned().collect();
+                    let acknowledged = self.journal.append_all(&entries, now())?;
+                    self.shared.acknowledged.store(acknowledged, Ordering::Release);
+                    pending.drain(..entries.len());
+                    continue;
+                }
+                Entry::Run(beginning) => self.journal.begin_run(beginning.began_at, &beginning.trains)?,
+                Entry::Machine(kind, body) => {
+                    self.journal.begin_machine(NewMachine { kind, program: PROGRAM, body }, now())?;
+                }
+                Entry::End => {}
+            }
+            pending.remove(0);
+        }
+        Ok(())
+    }
+
+    fn say(&self, trouble: Option<String>) {
+        *self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
+    }
+}
+
+impl Entry {
+    const fn of_journal(&self) -> Option<&JournalEntry> {
+        match self {
+            Self::Of(entry) => Some(entry),
+            Self::Run(_) | Self::Machine(..) | Self::End => None,
+        }
+    }
+}
+
+/// Waits for an entry, unless some are pending or the end was told, and takes all that are there. Says whether none
+/// will come any more.
+fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>, ended: bool) -> bool {
+    if pending.is_empty() && !ended {
+        match entries.recv() {
+            Ok(entry) => pending.push(entry),
+            Err(_) => return true,
+        }
+    }
+    while pending.len() < QUEUE {
+        match entries.try_recv() {
+            Ok(entry) => pending.push(entry),
+            Err(TryRecvError::Empty) => return ended,
+            Err(TryRecvError::Disconnected) => return true,
+        }
+    }
+    false
+}
