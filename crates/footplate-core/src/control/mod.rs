@@ -4,12 +4,15 @@
 //!   asked again. None of them knows a clock or a cable.
 //! - [`Calibrator`] finds a train, plans experiments with it and learns how it moves.
 //! - [`Driver`] drives trains where they are ordered, and stops them there.
+//! - [`Dispatcher`] sends trains where they are asked to go, and keeps them apart.
 
 pub mod calibrate;
+mod dispatch;
 mod drive;
 mod machine;
 
 pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
+pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Footprint, Journey, Span, TrainLengths};
 pub use drive::{
     Achieved, Aim, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine, PlannedStop, Promise,
     Refusal, StopOrder,

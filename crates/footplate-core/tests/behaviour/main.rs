@@ -2,6 +2,7 @@
 
 mod attribution;
 mod counted_run;
+mod dispatching;
 mod draw;
 mod driving;
 mod driving_any_orders;

@@ -125,6 +125,14 @@ impl Body {
         self.lead - self.shoe - self.behind
     }
 
+    /// The edges under the train, each with the part of it that is.
+    pub(crate) fn under(&self) -> impl Iterator<Item = (EdgeId, [f64; 2])> {
+        self.way.iter().filter_map(|under| {
+            let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
+            (from < to).then_some((under.edge, [from - under.begins, to - under.begins]))
+        })
+    }
+
     /// The edge under the leading end of the shoe, and how far along it that is.
     pub(crate) fn place(&self) -> Option<(EdgeId, f64)> {
         let under = self.way.get(self.under)?;

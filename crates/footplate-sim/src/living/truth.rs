@@ -100,6 +100,13 @@ impl<'w, 'l> Truth<'w, 'l> {
         })
     }
 
+    /// What is under a train from its rear end to its front end: edges as it runs, each with the part of it that is under
+    /// the train, counted from the start of the edge in true lengths. Nothing while it is lifted.
+    pub fn under(&self, train: TrainId) -> impl Iterator<Item = (EdgeId, [Length; 2])> + use<'w> {
+        let body = self.found(train).and_then(|found| found.body.as_ref());
+        body.into_iter().flat_map(Body::under).map(|(edge, part)| (edge, part.map(Length::from_mm)))
+    }
+
     /// A train as it was drawn.
     #[must_use]
     pub fn engine(&self, train: TrainId) -> Option<&'w Train> {

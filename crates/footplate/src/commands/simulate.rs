@@ -8,6 +8,7 @@ mod recording;
 mod rehearsal;
 mod seeds;
 mod station;
+mod traffic;
 mod truth;
 
 use std::io::Write;
@@ -36,6 +37,7 @@ enum World {
     Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
+    Traffic(traffic::Arguments),
 }
 
 impl Arguments {
@@ -44,6 +46,7 @@ impl Arguments {
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
+            Some(World::Traffic(arguments)) => arguments.run(output),
             None => {
                 if self.list {
                     layout::list(output)?;

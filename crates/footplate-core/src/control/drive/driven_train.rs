@@ -47,8 +47,8 @@ pub(super) struct DrivenTrain {
     pub(super) expected: Expectation,
     /// What it shall not pass.
     pub(super) limit: Option<WayPoint>,
-    /// From its pickup to the end that is further from it.
-    pub(super) reach: Length,
+    /// How far it reaches ahead of and behind the leading end of its pickup.
+    pub(super) reach: [Length; 2],
     /// What it is paced for, while that is its goal.
     pub(super) pacing: Option<Pacing>,
 }
@@ -63,7 +63,7 @@ impl DrivenTrain {
             unsent: None,
             expected: Expectation::default(),
             limit: None,
-            reach: TRAIN_REACH,
+            reach: [TRAIN_REACH; 2],
             pacing: None,
         }
     }

@@ -46,7 +46,7 @@ pub struct Driver {
     /// Turnouts that were asked for and have not been told yet, by which order.
     throwing: Vec<(TurnoutId, OrderId)>,
     attribution: Attribution,
-    orders: u32,
+    pub(super) orders: u32,
     /// When the contact to be watched changes.
     pub(super) watch_changes: Option<Timestamp>,
 }

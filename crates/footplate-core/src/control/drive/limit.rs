@@ -1,7 +1,7 @@
 //! What a train shall not pass, whatever it was ordered, and places as whoever sets limits needs them.
 
 use crate::estimation::{Ground, WayPoint, place_of, way_to};
-use crate::ids::{NodeId, TrainId};
+use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::Position;
 use crate::units::Length;
@@ -9,6 +9,8 @@ use crate::units::Length;
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::felt_way::counted_from;
+use super::order::OrderId;
+use super::turnout_guard::train_on;
 
 impl Driver {
     /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is told to stop in time, by
@@ -23,12 +25,39 @@ impl Driver {
         self.wish(now);
     }
 
-    /// How far a train reaches from its pickup, to the end that is further from it. Unless it is said, that of a long
-    /// locomotive (250 mm).
-    pub fn set_reach(&mut self, train: TrainId, reach: Length) {
+    /// What a train shall not pass.
+    #[must_use]
+    pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
+        self.trains.get(&train)?.limit
+    }
+
+    /// A number for something that is made of several orders: no order will have it.
+    pub(in crate::control) const fn number(&mut self) -> OrderId {
+        let id = OrderId(self.orders);
+        self.orders = self.orders.wrapping_add(1);
+        id
+    }
+
+    /// Where a train comes to rest, most likely, if the command to stop leaves at a time that is not before the last
+    /// entry.
+    #[must_use]
+    pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<WayPoint> {
+        let train = self.trains.get(&train)?;
+        Some(train.locator.rest_if_stopped(self.track.ground(), &train.model, at)?.at)
+    }
+
+    /// How far a train reaches ahead of and behind the leading end of its pickup, whichever way it runs. Unless it is said,
+    /// as far as a long locomotive might (250 mm).
+    pub fn set_reach(&mut self, train: TrainId, ahead: Length, behind: Length) {
         if let Some(train) = self.trains.get_mut(&train) {
-            train.reach = reach.max(Length::ZERO);
+            train.reach = [ahead, behind].map(|reach| reach.max(Length::ZERO));
         }
+    }
+
+    /// The train for which a turnout cannot be thrown now, because it is on it or will be.
+    #[must_use]
+    pub fn is_on(&self, turnout: TurnoutId, now: Timestamp) -> Option<TrainId> {
+        train_on(&self.trains, self.track.ground(), now, turnout)
     }
 
     /// The place of a train on the layout; `None` if nobody knows it.

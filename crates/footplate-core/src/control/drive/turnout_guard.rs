@@ -35,16 +35,16 @@ pub(super) fn train_on(
 
 fn is_near(ground: Ground<'_>, train: &DrivenTrain, located: &Located, nodes: [NodeId; 2]) -> bool {
     let Some(place) = place_of(ground, &train.model, located.at) else { return false };
-    let reach = train.reach + located.uncertainty * CERTAIN;
-    let ahead = reach + located.speed * THROWING;
+    let [ahead, behind] = train.reach.map(|reach| reach + located.uncertainty * CERTAIN);
+    let ahead = ahead + located.speed * THROWING;
     let within = |from: Position, to: Position, limit: Length| {
         ground.layout.distance_ahead(from, to, ground.turnouts).is_some_and(|way| way <= limit)
     };
     // Either way along the rails: the train may be seen from the toe or from a leg.
     let positions = || nodes.into_iter().flat_map(|node| starts_at(ground, node));
     let back = ground.layout.reversed(place);
-    positions().any(|node| within(place, node, ahead) || within(node, place, reach))
-        || back.is_some_and(|back| positions().any(|node| within(back, node, reach)))
+    positions().any(|node| within(place, node, ahead) || within(node, place, behind))
+        || back.is_some_and(|back| positions().any(|node| within(back, node, behind)))
 }
 
 /// A node as positions, one for each edge that leaves it.

@@ -1,6 +1,6 @@
 //! `footplate simulate driving`: random trains calibrated and driven in the simulator, and scored by its truth.
 
-mod choice;
+pub(super) mod choice;
 mod course_project;
 mod figures;
 mod known_train;

@@ -4,11 +4,9 @@
 //! [`Rehearsal`] several trains on one layout, each of which was calibrated while the others were lifted.
 
 mod calibrated;
-#[cfg_attr(not(test), expect(dead_code, reason = "the scorers of several trains come next"))]
 mod stage;
 mod virtual_line;
 
 pub(super) use self::calibrated::{Calibrated, calibrate};
-#[expect(unused_imports, reason = "the scorers of several trains come next")]
 pub(super) use self::stage::Rehearsal;
 pub(super) use self::virtual_line::VirtualLine;

@@ -1,10 +1,10 @@
 //! What a scorer asks of a train: random, and the same for the same seed.
 
 /// A small generator of the scorer's own, so that what is asked depends on no draw of the world (Steele, 2014).
-pub(super) struct Choice(u64);
+pub(crate) struct Choice(u64);
 
 impl Choice {
-    pub(super) const fn new(seed: u64) -> Self {
+    pub(crate) const fn new(seed: u64) -> Self {
         Self(seed ^ 0x9e37_79b9_7f4a_7c15)
     }
 
@@ -17,12 +17,12 @@ impl Choice {
     }
 
     /// Between two numbers.
-    pub(super) fn between(&mut self, from: f64, to: f64) -> f64 {
+    pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
     /// One of several.
-    pub(super) fn of<'a, T>(&mut self, all: &'a [T]) -> Option<&'a T> {
+    pub(crate) fn of<'a, T>(&mut self, all: &'a [T]) -> Option<&'a T> {
         all.get((self.bits() % all.len().max(1) as u64) as usize)
     }
 }

@@ -1,0 +1,68 @@
+//! Trains that somebody drives by plain orders: they hold the track ahead of them as far as it is free.
+
+use crate::control::drive::Refusal;
+use crate::ids::TrainId;
+use crate::time::Timestamp;
+use crate::units::Length;
+
+use super::dispatched_train::State;
+use super::dispatcher::Dispatcher;
+use super::way::Way;
+
+/// How far ahead a train that is driven by hand takes the track: more than any train needs to stop from its highest
+/// step (1.2 m) and the next contact.
+const AHEAD: Length = Length::from_mm(2_500.0);
+/// Steps in which it is tried whether less of it is free.
+const EVERY: Length = Length::from_mm(50.0);
+
+impl Dispatcher {
+    /// Somebody gives a train plain orders: its journey ends, and it takes what is ahead of it.
+    pub(super) fn take_over(&mut self, now: Timestamp, id: TrainId) -> Result<(), Refusal> {
+        let train = self.trains.get_mut(&id).ok_or(Refusal::UnknownTrain { train: id })?;
+        train.asked = None;
+        train.course.clear();
+        if !matches!(train.state, State::ByHand | State::Lost) {
+            train.kept = train.held.clone();
+            train.state = State::ByHand;
+        }
+        self.drive_by_hand(now, id);
+        Ok(())
+    }
+
+    /// Takes more of the track ahead, and lets go of what is behind.
+    pub(super) fn drive_by_hand(&mut self, now: Timestamp, id: TrainId) {
+        let Some(train) = self.trains.get(&id) else { return };
+        let (Some(place), Some(located)) = (self.driver.position(id, now), self.driver.locate(id, now))
+        else {
+            return;
+        };
+        let layout = self.driver.layout();
+        let room = self.room(now, train);
+        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, AHEAD + room.ahead);
+        let is_free = |end: Length| {
+            let taken = way.footprint(layout, at - room.behind, end + room.ahead);
+            self.trains.values().all(|other| other.id == id || !other.held.meets(&taken))
+        };
+        let mut end = (way.length() - room.ahead).min(at + AHEAD);
+        while end > at && !is_free(end) {
+            end -= EVERY;
+        }
+        let end = end.max(at);
+        if !is_free(end) {
+            // Not even where it stands: it keeps what it held, and stays.
+            self.driver.set_limit(now, id, Some(located.at));
+            return;
+        }
+        let mut held = way.footprint(layout, at - room.behind, end + room.ahead);
+        self.take_anchors(now, id, place, &mut held);
+        let limit = way.place(end).and_then(|place| self.driver.way_point(id, located.at.node, place));
+        let limit = limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at);
+        self.driver.set_limit(now, id, Some(limit));
+        if let Some(train) = self.trains.get_mut(&id)
+            && train.held != held
+        {
+            train.held = held;
+            self.is_stirred = true;
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The runs that a train has been granted, with the track that they take.
+
+use alloc::vec::Vec;
+
+use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
+use crate::units::Length;
+
+use super::footprint::Footprint;
+use super::itinerary::{Itinerary, Run};
+use super::journey::TrainLengths;
+use super::way::Way;
+
+/// How much more of the track is taken than a train is believed to need: contacts are off their places by 5 mm, edges
+/// by 10 mm, and trains were measured to a centimetre or two.
+pub(super) const SLACK: Length = Length::from_mm(20.0);
+
+/// What a train needs around the leading end of its pickup.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Room {
+    /// With what is not known of its place now.
+    pub(super) ahead: Length,
+    pub(super) behind: Length,
+    /// Of its own.
+    pub(super) front: Length,
+    pub(super) rear: Length,
+    /// By how much it may come to rest off the place where it should.
+    pub(super) overrun: Length,
+}
+
+impl Room {
+    /// A train with these lengths, of which one standard deviation of the place is this.
+    pub(super) fn of(lengths: TrainLengths, uncertainty: Length, overrun: Length) -> Self {
+        let (front, rear) = (lengths.ahead() + SLACK, lengths.behind() + SLACK);
+        let doubt = uncertainty * CERTAIN;
+        Self { ahead: front + doubt, behind: rear + doubt, front, rear, overrun }
+    }
+}
+
+/// A train is no further than so many standard deviations behind, or beyond, where it is believed to be, but for one
+/// time in 2000 each.
+const CERTAIN: f64 = 3.3;
+
+/// One run of a course.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GrantedRun {
+    pub(super) turns: bool,
+    /// From behind the train's rear end to beyond its front end when it has come to rest.
+    pub(super) way: Way,
+    /// Where its pickup is on that way, and where it shall be.
+    pub(super) start: Length,
+    pub(super) stop: Length,
+    /// Where its rear end may be in the beginning.
+    pub(super) begin: Length,
+    /// Its pickup shall not pass this, and nothing of the train what is taken.
+    pub(super) limit: Length,
+    pub(super) end: Length,
+    pub(super) needs: Vec<TurnoutNeed>,
+    pub(super) taken: Footprint,
+}
+
+impl GrantedRun {
+    /// What it takes from a point on, where its rear end is.
+    pub(super) fn taken_from(&self, layout: &Layout, from: Length) -> Footprint {
+        self.way.footprint(layout, from, self.end)
+    }
+}
+
+/// The runs of an itinerary on the track; `None` where the track ends too soon for one of them.
+pub(super) fn granted(
+    layout: &Layout,
+    turnouts: &TurnoutStates,
+    itinerary: &Itinerary,
+    room: Room,
+) -> Option<Vec<GrantedRun>> {
+    let mut runs: Vec<GrantedRun> = Vec::new();
+    for run in &itinerary.runs {
+        let before = runs.last();
+        let (way, start) = way_of(layout, turnouts, run, before, room)?;
+        let stop = stop_on(layout, run, start)?;
+        let limit = stop + room.overrun;
+        let end = limit + room.front;
+        if way.length() < end {
+            return None;
+        }
+        let begin = start - room.behind;
+        let needs = way.needs(layout, begin, end);
+        let taken = way.footprint(layout, begin, end);
+        let mut granted = GrantedRun { turns: run.turns, way, start, stop, begin, limit, end, needs, taken };
+        // Its place is counted from the node behind it once it has turned around.
+        if run.turns {
+            let edge = run.start.edge;
+            let own = layout.needs_of(edge).find(|need| need.facing);
+            if let Some(need) = own {
+                granted.taken.take_turnout(layout, need.turnout);
+                if !granted.needs.iter().any(|known| known.turnout == need.turnout) {
+                    granted.needs.push(need);
+                }
+            }
+        }
+        runs.push(granted);
+    }
+    Some(runs)
+}
+
+/// The whole way of a run and where on it the run begins. What is behind the train is what was ahead of it before it
+/// turned around.
+fn way_of(
+    layout: &Layout,
+    turnouts: &TurnoutStates,
+    run: &Run,
+    before: Option<&GrantedRun>,
+    room: Room,
+) -> Option<(Way, Length)> {
+    let (mut way, start) = match before {
+        None => Way::around(layout, turnouts, run.start, room.behind + run.start.offset, Length::ZERO),
+        Some(before) => {
+            let mut way = Way::default();
+            let stops_on = run.start.edge.twin();
+            let beyond: Vec<_> = before.way.edges().rev().take_while(|edge| *edge != stops_on).collect();
+            beyond.iter().for_each(|edge| way.push(layout, edge.twin()));
+            let start = way.length() + run.start.offset;
+            way.push(layout, run.start.edge);
+            (way, start)
+        }
+    };
+    let way = {
+        way.cut_after(run.start.edge);
+        run.edges.iter().skip(1).for_each(|edge| way.push(layout, *edge));
+        let stop = stop_on(layout, run, start)?;
+        way.reach(layout, turnouts, stop + room.overrun + room.front);
+        way
+    };
+    Some((way, start))
+}
+
+/// Where a run ends on the way on which it begins at a point.
+fn stop_on(layout: &Layout, run: &Run, start: Length) -> Option<Length> {
+    let (last, before) = run.edges.split_last()?;
+    debug_assert_eq!(*last, run.stop.edge, "a run ends on its last edge");
+    let before: Length = before.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum();
+    Some(start - run.start.offset + before + run.stop.offset)
+}
+
+/// What a train at rest takes.
+pub(super) fn standing(layout: &Layout, turnouts: &TurnoutStates, place: Position, room: Room) -> Footprint {
+    let (way, at) = Way::around(layout, turnouts, place, room.behind, room.ahead);
+    way.footprint(layout, at - room.behind, at + room.ahead)
+}

@@ -1,0 +1,118 @@
+//! One train as its dispatcher sees it: what it shall do, what it has been granted and what it holds.
+
+use alloc::collections::{BTreeSet, VecDeque};
+use alloc::vec::Vec;
+
+use crate::control::drive::OrderId;
+use crate::ids::{TrainId, TurnoutId};
+use crate::time::Timestamp;
+use crate::track::Position;
+use crate::units::Length;
+
+use super::course::GrantedRun;
+use super::footprint::Footprint;
+use super::journey::{Journey, TrainLengths};
+
+/// A journey that was asked for and has not ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Asked {
+    pub(super) order: OrderId,
+    pub(super) journey: Journey,
+    pub(super) place: Position,
+    pub(super) since: Timestamp,
+}
+
+/// Why a train runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Journey,
+    /// To make room.
+    Aside,
+}
+
+/// How far a train is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum State {
+    /// It stands, and nothing has been granted to it.
+    Resting,
+    /// Turnouts are being thrown for its next run; when they will have moved, once all have been told.
+    Setting { ready: Option<Timestamp>, since: Timestamp },
+    /// It turns around.
+    Turning { order: OrderId },
+    /// It runs. Its rear end has certainly come as far as this on the way, and whether a contact has said so.
+    Running { order: OrderId, rear: Length, confirmed: bool },
+    /// It was told to stop, and nothing is known of where it will go then; whether a contact said where it is.
+    Halting { confirmed: bool },
+    /// Somebody drives it by hand.
+    ByHand,
+    /// Nobody knows where it is.
+    Lost,
+}
+
+/// A train that is dispatched.
+#[derive(Debug, Clone)]
+pub(super) struct DispatchedTrain {
+    pub(super) id: TrainId,
+    pub(super) lengths: TrainLengths,
+    pub(super) asked: Option<Asked>,
+    pub(super) purpose: Purpose,
+    /// The journey that its runs were granted for; another may have been asked for since.
+    pub(super) granted_for: Option<OrderId>,
+    /// The runs granted, the present one first.
+    pub(super) course: VecDeque<GrantedRun>,
+    pub(super) state: State,
+    /// All that it holds.
+    pub(super) held: Footprint,
+    /// What it held before and still might be on.
+    pub(super) kept: Footprint,
+    /// Turnouts that cannot be thrown for its present run because it stands on them.
+    pub(super) skipped: BTreeSet<TurnoutId>,
+    /// Where it can stand, and whether clear of all turnouts.
+    pub(super) parking: Vec<(Position, bool)>,
+    /// Nobody is sent out of its way before this: it was tried in vain.
+    pub(super) no_room_until: Timestamp,
+    /// How long it would take from where it stands if nobody were in its way, in seconds; `None` until it was looked for.
+    pub(super) unobstructed_s: Option<f64>,
+    /// How many times as much it is given to come to rest in as usual: it was stopped for its limit.
+    pub(super) caution: f64,
+    /// When it was last looked at while it waited.
+    pub(super) looked_at: Timestamp,
+    /// Nothing is granted to it before this.
+    pub(super) not_before: Timestamp,
+    /// Whether it was said that it waits.
+    pub(super) waits_said: bool,
+}
+
+impl DispatchedTrain {
+    pub(super) fn new(id: TrainId, lengths: TrainLengths) -> Self {
+        Self {
+            id,
+            lengths,
+            asked: None,
+            purpose: Purpose::Journey,
+            granted_for: None,
+            course: VecDeque::new(),
+            state: State::Resting,
+            held: Footprint::empty(),
+            kept: Footprint::empty(),
+            skipped: BTreeSet::new(),
+            parking: Vec::new(),
+            no_room_until: Timestamp::ZERO,
+            unobstructed_s: None,
+            caution: 1.0,
+            looked_at: Timestamp::ZERO,
+            not_before: Timestamp::ZERO,
+            waits_said: false,
+        }
+    }
+
+    /// Whether it stands and can be given something to do.
+    pub(super) fn rests(&self) -> bool {
+        self.state == State::Resting
+    }
+
+    /// Whether that can be now.
+    pub(super) fn is_ready(&self, now: Timestamp) -> bool {
+        self.rests() && self.not_before <= now
+    }
+}

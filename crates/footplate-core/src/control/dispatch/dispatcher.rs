@@ -1,0 +1,270 @@
+//! Sends trains to where they are asked to go, and grants each the track that it needs before it goes there.
+
+use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
+use alloc::vec::Vec;
+
+use crate::control::drive::{Driver, Order, OrderId, Refusal};
+use crate::control::{Machine, Output};
+use crate::estimation::WayPoint;
+use crate::event::Event;
+use crate::ids::{SpeedStep, TrainId, TurnoutId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Position;
+use crate::units::Length;
+
+use super::course::{Room, standing};
+use super::dispatched_train::{Asked, DispatchedTrain, State};
+use super::footprint::Footprint;
+use super::journey::{Journey, TrainLengths};
+use super::notice::DispatchNotice;
+use super::parking::{PARKED, parking_places};
+use super::setting::Told;
+
+/// How often it looks what can be done while something waits to be.
+const LOOK: TimeSpan = TimeSpan::from_ms(200);
+
+/// Trains at rest that wait are looked at again after this long even if nothing has changed.
+const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
+
+/// Keeps trains apart, and sends them on their ways.
+#[derive(Debug, Clone)]
+pub struct Dispatcher {
+    pub(super) driver: Driver,
+    pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
+    /// How turnouts were told to lie, and how often and when last since anything said that they lay otherwise.
+    pub(super) told: BTreeMap<TurnoutId, Told>,
+    /// Turnouts that were asked for and not told yet.
+    pub(super) throwing: BTreeSet<TurnoutId>,
+    pub(super) outputs: VecDeque<Output<DispatchNotice>>,
+    /// Whether anything has changed since trains at rest were last looked at.
+    pub(super) is_stirred: bool,
+    looks_at: Option<Timestamp>,
+    /// When it last looked at trains at rest.
+    arranged: Option<Timestamp>,
+}
+
+impl Dispatcher {
+    /// Dispatches the trains of a driver. Turnouts that it knows lie as it says.
+    #[must_use]
+    pub fn new(now: Timestamp, driver: Driver) -> Self {
+        let layout = driver.layout();
+        let lies = |turnout| Some((turnout, Told::sure(now, driver.turnouts().get(turnout)?)));
+        let told = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
+        let ids: Vec<TrainId> = driver.trains().collect();
+        let mut dispatcher = Self {
+            driver,
+            trains: BTreeMap::new(),
+            told,
+            throwing: BTreeSet::new(),
+            outputs: VecDeque::new(),
+            is_stirred: true,
+            looks_at: None,
+            arranged: None,
+        };
+        for id in ids {
+            dispatcher.set_lengths(now, id, TrainLengths::LONG_LOCOMOTIVE);
+        }
+        dispatcher
+    }
+
+    /// Says how long a train is. Until then it is taken for a long locomotive.
+    pub fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
+        self.driver.set_reach(train, lengths.ahead(), lengths.behind());
+        let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
+        known.lengths = lengths;
+        let room = Room::of(lengths, PARKED, Length::ZERO);
+        let places = parking_places(self.driver.layout(), room);
+        if let Some(known) = self.trains.get_mut(&train) {
+            known.parking = places;
+        }
+        if self.trains.get(&train).is_some_and(DispatchedTrain::rests) {
+            self.stand(now, train);
+        }
+    }
+
+    /// What drives the trains.
+    #[must_use]
+    pub const fn driver(&self) -> &Driver {
+        &self.driver
+    }
+
+    /// What a train holds: nobody else is let onto it.
+    #[must_use]
+    pub fn holds(&self, train: TrainId) -> Option<&Footprint> {
+        self.trains.get(&train).map(|train| &train.held)
+    }
+
+    /// The destination of a train, as long as it has not come there.
+    #[must_use]
+    pub fn journey(&self, train: TrainId) -> Option<(OrderId, Journey)> {
+        self.trains.get(&train)?.asked.map(|asked| (asked.order, asked.journey))
+    }
+
+    /// A person put a train there, or read off where it stands.
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+        self.driver.place(now, train, at, uncertainty);
+        if let Some(known) = self.trains.get_mut(&train) {
+            known.state = State::Resting;
+            known.course.clear();
+            known.unobstructed_s = None;
+            known.held = Footprint::empty();
+        }
+        self.stand(now, train);
+    }
+
+    /// Sends a train somewhere, as soon as there is a way. What it was asked for before ends.
+    ///
+    /// # Errors
+    /// Why it can never go there.
+    pub fn go(&mut self, now: Timestamp, train: TrainId, journey: Journey) -> Result<OrderId, Refusal> {
+        let layout = self.driver.layout();
+        let place = layout.locate(journey.target, self.driver.turnouts()).map_err(Refusal::Place)?;
+        if !self.trains.contains_key(&train) {
+            return Err(Refusal::UnknownTrain { train });
+        }
+        let order = self.driver.number();
+        if let Some(known) = self.trains.get_mut(&train) {
+            known.asked = Some(Asked { order, journey, place, since: now });
+            known.waits_said = false;
+            known.unobstructed_s = None;
+        }
+        self.is_stirred = true;
+        self.settle(now);
+        Ok(order)
+    }
+
+    /// Passes an order on to the driver. A turnout that a train holds is thrown for nobody else, and no train is driven
+    /// beyond what it holds: what lies ahead of it is taken as far as it is free, as the turnouts lie.
+    ///
+    /// # Errors
+    /// As [`Driver::order`], and if the turnout is held.
+    pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        if let Order::Turnout { turnout, .. } = order
+            && let Some(holder) = self.trains.values().find(|train| train.held.takes(turnout))
+        {
+            return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
+        }
+        if let Some(train) = order.train() {
+            self.take_over(now, train)?;
+        }
+        let taken = self.driver.order(now, order);
+        self.settle(now);
+        taken
+    }
+
+    /// The room that a train needs, with what is not known of its place now.
+    pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> Room {
+        let located = self.driver.locate(train.id, now);
+        let uncertainty = located.map_or(Length::ZERO, |located| located.uncertainty);
+        Room::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
+    }
+
+    /// What a train takes that has just come to rest at a known place: itself, and turnouts that decide where it is.
+    pub(super) fn stand(&mut self, now: Timestamp, id: TrainId) {
+        let Some(train) = self.trains.get(&id) else { return };
+        let Some(place) = self.driver.position(id, now) else { return };
+        let room = self.room(now, train);
+        let layout = self.driver.layout();
+        let mut held = standing(layout, self.driver.turnouts(), place, room);
+        self.take_anchors(now, id, place, &mut held);
+        // What is another's is not taken for a doubt that has grown: the train is within what it held.
+        let is_free = self.trains.values().all(|other| other.id == id || !other.held.meets(&held));
+        if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.held.is_empty()) {
+            train.held = held;
+            train.kept = Footprint::empty();
+        }
+        self.is_stirred = true;
+    }
+
+    /// A train is counted from a contact behind it: turnouts in between decide where it is, as far as is known, and are
+    /// not thrown.
+    pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Footprint) {
+        let layout = self.driver.layout();
+        let Some(mut node) = self.driver.locate(id, now).map(|located| located.at.node) else { return };
+        for _ in 0..layout.edges().len() {
+            let ahead = super::way::edge_from(layout, self.driver.turnouts(), node);
+            let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { return };
+            for need in layout.needs_of(edge).filter(|need| need.facing) {
+                held.take_turnout(layout, need.turnout);
+            }
+            if edge == place.edge {
+                return;
+            }
+            node = known.to;
+        }
+    }
+
+    pub(super) fn say(&mut self, notice: DispatchNotice) {
+        self.outputs.push_back(Output::Notice(notice));
+    }
+
+    /// Hears what the driver has to say, and does what follows, until there is nothing more.
+    pub(super) fn settle(&mut self, now: Timestamp) {
+        if self.arranged.is_none_or(|last| now - last >= AGAIN) {
+            self.is_stirred |= self.trains.values().any(|train| train.rests() && train.asked.is_some());
+        }
+        loop {
+            while let Some(output) = self.driver.poll_output() {
+                match output {
+                    Output::Command(command) => self.outputs.push_back(Output::Command(command)),
+                    Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
+                    Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
+                    Output::Notice(notice) => {
+                        self.hear(now, &notice);
+                        self.say(DispatchNotice::Drive(notice));
+                    }
+                }
+            }
+            self.go_on(now);
+            if core::mem::take(&mut self.is_stirred) {
+                self.arranged = Some(now);
+                self.arrange(now);
+                continue;
+            }
+            break;
+        }
+        let waits = self
+            .trains
+            .values()
+            .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.asked.is_some());
+        self.looks_at = waits.then_some(now + LOOK);
+    }
+
+    /// Tells a train to stop at once.
+    pub(super) fn halt(&mut self, now: Timestamp, id: TrainId) {
+        let _ = self.driver.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
+        self.gives_up(id);
+    }
+
+    /// A train has been told to stop: what it holds it keeps until it stands.
+    pub(super) fn gives_up(&mut self, id: TrainId) {
+        if let Some(train) = self.trains.get_mut(&id) {
+            let confirmed = matches!(train.state, State::Running { confirmed: true, .. });
+            train.course.clear();
+            train.kept = train.held.clone();
+            train.state = State::Halting { confirmed };
+        }
+    }
+}
+
+impl Machine for Dispatcher {
+    type Notice = DispatchNotice;
+
+    fn handle_event(&mut self, now: Timestamp, event: &Event) {
+        self.driver.handle_event(now, event);
+        self.settle(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.driver.handle_timeout(now);
+        self.settle(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Output<DispatchNotice>> {
+        self.outputs.pop_front()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        [self.driver.next_timeout(), self.looks_at].into_iter().flatten().min()
+    }
+}

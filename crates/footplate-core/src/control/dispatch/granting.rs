@@ -1,0 +1,294 @@
+//! Granting trains the track to their destinations: all of it at once, so that nobody who has set out has to wait.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+
+use crate::calibration::motion::{MotionModel, StepUse};
+use crate::control::drive::Refusal;
+use crate::event::Approach;
+use crate::ids::{SpeedStep, TrainId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Landmark, Position, TurnoutNeed};
+use crate::units::{Length, Speed};
+
+use super::course::{GrantedRun, Room, granted};
+use super::dispatched_train::{Purpose, State};
+use super::dispatcher::Dispatcher;
+use super::footprint::Footprint;
+use super::itinerary::{Itinerary, Pace, Search};
+use super::notice::DispatchNotice;
+use super::obstacles::Obstacles;
+
+/// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
+/// away, and the other will be gone soon.
+const RESTING_S: f64 = 20.0;
+const RUNNING_S: f64 = 8.0;
+/// A way round others is taken if it takes no longer than this many times the way through them, and this much more.
+const LONGER: f64 = 1.5;
+const LONGER_BY_S: f64 = 10.0;
+/// Who has waited so long is next: nobody else is granted what is on its way.
+const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
+/// Who waits is looked at again after this long, whatever happens: much does that is nothing to it.
+const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
+/// From the end of a run until its train is taken to stand, and turning around: commands and margins of time.
+const TURN_S: f64 = 1.5;
+/// Stops from faster than this scatter too much to be worth it (20 mm at 600 mm/s).
+const FASTEST: Speed = Speed::from_mm_per_s(450.0);
+/// No model train is taken to run slower than this on the way.
+const SLOWEST: Speed = Speed::from_mm_per_s(60.0);
+/// How often a stop may end beyond what is held, as standard deviations: one in a thousand, and a little room so that
+/// the guard, which looks at the same, seldom cuts a stop short.
+const OVERRUN: f64 = 3.09 + 0.5;
+/// What is not known of the place at which a stop begins: contacts, survey and speed, one standard deviation.
+const PLACE: Length = Length::from_mm(10.0);
+/// An overrun is not taken for less, nor more: nothing is known so well, and no train should need more.
+const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(160.0)];
+
+/// A way to somewhere with the track that it takes.
+#[derive(Debug, Clone)]
+pub(super) struct Proposal {
+    pub(super) itinerary: Itinerary,
+    pub(super) runs: Vec<GrantedRun>,
+}
+
+impl Proposal {
+    pub(super) fn meets(&self, held: &Footprint) -> bool {
+        self.runs.iter().any(|run| run.taken.meets(held))
+    }
+}
+
+/// Where a train begins to look for a way, and what it needs.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    pub(super) place: Position,
+    pub(super) room: Room,
+    pub(super) pace: Pace,
+    pub(super) pickup: Length,
+    /// Turnouts that it is too near to for them to be thrown, as they lie.
+    pub(super) frozen: Vec<TurnoutNeed>,
+}
+
+impl Dispatcher {
+    /// Looks at all trains at rest that want to go somewhere, those that have waited longest first.
+    pub(super) fn arrange(&mut self, now: Timestamp) {
+        let mut waiting: Vec<(Timestamp, TrainId)> = self
+            .trains
+            .values()
+            .filter(|train| train.is_ready(now))
+            .filter_map(|train| Some((train.asked?.since, train.id)))
+            .collect();
+        waiting.sort_unstable();
+        let mut kept_free: Option<(TrainId, Proposal)> = None;
+        for (since, id) in waiting {
+            if self
+                .trains
+                .get(&id)
+                .is_some_and(|train| train.waits_said && now - train.looked_at < LOOK_AGAIN)
+            {
+                continue;
+            }
+            let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
+            let unobstructed = self.unobstructed(now, id, &start, &targets);
+            let Some(unobstructed) = unobstructed else {
+                self.cannot_go(now, id, self.no_way(id));
+                continue;
+            };
+            let free = self.free_way(id, &start, &targets).filter(|free| {
+                let allowed = unobstructed * LONGER + LONGER_BY_S + (now - since).as_s();
+                let spares = kept_free
+                    .as_ref()
+                    .is_none_or(|(_, wish)| !free.runs.iter().any(|run| wish.meets(&run.taken)));
+                free.itinerary.seconds <= allowed && spares
+            });
+            if let Some(free) = free {
+                self.grant(now, id, Purpose::Journey, free);
+                continue;
+            }
+            let Some(wish) = self.wish(id, &start, &targets) else { continue };
+            self.waits(id, &wish);
+            if kept_free.is_none() {
+                self.make_room(now, id, &targets, &wish);
+                if now - since >= PATIENCE {
+                    kept_free = Some((id, wish));
+                }
+            }
+        }
+    }
+
+    /// How long a train would take if it were alone, in seconds; `None` if it could never come there.
+    fn unobstructed(
+        &mut self,
+        now: Timestamp,
+        id: TrainId,
+        start: &Start,
+        targets: &[Position],
+    ) -> Option<f64> {
+        let known = self.trains.get(&id)?.unobstructed_s;
+        let seconds =
+            known.or_else(|| Some(self.propose(start, targets, &Obstacles::default())?.itinerary.seconds));
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.unobstructed_s = seconds;
+            train.looked_at = now;
+        }
+        seconds
+    }
+
+    /// The places at which a train would have arrived.
+    fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
+        let asked = self.trains.get(&id)?.asked?;
+        let other = self.driver.layout().reversed(asked.place).filter(|_| !asked.journey.faces);
+        Some([Some(asked.place), other].into_iter().flatten().collect())
+    }
+
+    /// Where a train at rest begins.
+    pub(super) fn start(&self, now: Timestamp, id: TrainId) -> Option<Start> {
+        let train = self.trains.get(&id)?;
+        let place = self.driver.position(id, now)?;
+        let room = self.room(now, train);
+        let layout = self.driver.layout();
+        let near = layout.turnouts().filter(|(turnout, _)| self.driver.is_on(*turnout, now) == Some(id));
+        let as_it_lies = |turnout| {
+            let leg = self.driver.turnouts().get(turnout)?;
+            Some(TurnoutNeed { turnout, leg, facing: true })
+        };
+        let frozen = near.filter_map(|(turnout, _)| as_it_lies(turnout)).collect();
+        Some(Start { place, room, pace: self.pace(id), pickup: train.lengths.pickup, frozen })
+    }
+
+    /// The soonest way past obstacles, with what it takes.
+    pub(super) fn propose(
+        &self,
+        start: &Start,
+        targets: &[Position],
+        obstacles: &Obstacles,
+    ) -> Option<Proposal> {
+        let reached = self.search(start, obstacles).from(start.place, self.turned(start));
+        let itinerary = reached.to(targets.iter().copied())?;
+        self.proposal(start, itinerary)
+    }
+
+    pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {
+        let runs = granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start.room)?;
+        Some(Proposal { itinerary, runs })
+    }
+
+    pub(super) fn search<'a>(&'a self, start: &'a Start, obstacles: &'a Obstacles) -> Search<'a> {
+        let clears = start.room.rear + start.room.overrun;
+        Search { layout: self.driver.layout(), pace: start.pace, clears, obstacles, frozen: &start.frozen }
+    }
+
+    /// Where the leading end of the pickup would be if the train turned around.
+    pub(super) fn turned(&self, start: &Start) -> Option<Position> {
+        let layout = self.driver.layout();
+        let back = layout.reversed(start.place)?;
+        layout.advance(back, start.pickup, self.driver.turnouts()).ok()
+    }
+
+    /// The way that a train would take if others made room for it in time; those that nobody can find do not.
+    fn wish(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
+        let mut obstacles = Obstacles::default();
+        for other in self.trains.values().filter(|other| other.id != id) {
+            let seconds = match other.state {
+                State::Resting => RESTING_S,
+                State::Lost => f64::INFINITY,
+                _ => RUNNING_S,
+            };
+            obstacles.add(&other.held, seconds);
+        }
+        let wish = self.propose(start, targets, &obstacles);
+        // What is closed for good now may not be for ever.
+        wish.or_else(|| self.propose(start, targets, &Obstacles::default()))
+    }
+
+    /// A way on which nobody is.
+    fn free_way(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
+        let mut obstacles = Obstacles::default();
+        let others = || self.trains.values().filter(|other| other.id != id);
+        others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
+        let found = self.propose(start, targets, &obstacles)?;
+        others().all(|other| !found.meets(&other.held)).then_some(found)
+    }
+
+    /// Sends a train on its way.
+    pub(super) fn grant(&mut self, now: Timestamp, id: TrainId, purpose: Purpose, proposal: Proposal) {
+        let turns = proposal.runs.iter().filter(|run| run.turns).count();
+        let takes = TimeSpan::from_s(proposal.itinerary.seconds);
+        let Some(train) = self.trains.get_mut(&id) else { return };
+        train.kept = core::mem::take(&mut train.held);
+        train.course = VecDeque::from(proposal.runs);
+        train.purpose = purpose;
+        train.granted_for = train.asked.filter(|_| purpose == Purpose::Journey).map(|asked| asked.order);
+        train.waits_said = false;
+        train.unobstructed_s = None;
+        train.state = State::Setting { ready: None, since: now };
+        train.skipped.clear();
+        self.hold(now, id);
+        self.say(DispatchNotice::RouteSet { train: id, takes, turns });
+    }
+
+    fn waits(&mut self, id: TrainId, wish: &Proposal) {
+        let others = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
+        let on: Vec<TrainId> = others.map(|other| other.id).collect();
+        if let Some(train) = self.trains.get_mut(&id)
+            && !core::mem::replace(&mut train.waits_said, true)
+        {
+            self.say(DispatchNotice::Waits { train: id, on });
+        }
+    }
+
+    fn no_way(&self, id: TrainId) -> Refusal {
+        let layout = self.driver.layout();
+        let display = |landmark: Landmark| alloc::format!("{}", layout.display(landmark));
+        let target = self.journey(id).map_or_else(Default::default, |(_, journey)| display(journey.target));
+        Refusal::NoWay { target, from: alloc::format!("train {id}"), unknown: None }
+    }
+
+    /// How far a train may come to rest beyond where it should, but for one time in a thousand.
+    /// The place is no surer then than now if no contact comes on the way.
+    pub(super) fn overrun(&self, id: TrainId, uncertainty: Length) -> Length {
+        let spread = |model: &MotionModel, step| {
+            let stop = model.stop(step, Approach::Below);
+            let parts = [stop.doubt, stop.scatter, PLACE.max(uncertainty)].map(Length::as_m);
+            Length::from_m(libm::sqrt(parts.iter().map(|part| part * part).sum()))
+        };
+        let model = self.driver.model(id);
+        let widest = model.and_then(|model| steps(model).map(|step| spread(model, step)).reduce(Length::max));
+        let usual = widest.map_or(OVERRUNS[1], |widest| (widest * OVERRUN).max(OVERRUNS[0]).min(OVERRUNS[1]));
+        usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
+    }
+
+    /// The fastest step that a train can have settled at, and still stop from, within a run.
+    pub(super) fn brisk_step(&self, id: TrainId, way: Length) -> Option<SpeedStep> {
+        let model = self.driver.model(id)?;
+        let fits = |step: &SpeedStep| {
+            let speed = model.speed(*step, Approach::Below).value;
+            let stop = model.stop(*step, Approach::Below).distance;
+            let starts = speed * model.settles_within(SpeedStep::STAND, *step);
+            let is_sure = speed <= FASTEST;
+            is_sure && starts + stop + PLACE <= way
+        };
+        steps(model).filter(fits).last()
+    }
+
+    /// How long a train takes for what.
+    fn pace(&self, id: TrainId) -> Pace {
+        let Some(model) = self.driver.model(id) else {
+            return Pace { cruise: SLOWEST, start_s: 1.0, stop_s: 1.0, turn_s: TURN_S };
+        };
+        // Stops are surest from the middle of the steps.
+        let usable: Vec<SpeedStep> = steps(model).collect();
+        let step = usable.get(usable.len() * 2 / 3).copied().unwrap_or(model.highest());
+        let cruise = model.speed(step, Approach::Below).value;
+        let cruise = if cruise > SLOWEST { cruise } else { SLOWEST };
+        let stop = model.stop(step, Approach::Below);
+        let start_s = 0.5 * model.settles_within(SpeedStep::STAND, step).as_s();
+        let stop_s = (stop.time.as_s() - (stop.distance / cruise).as_s()).max(0.0);
+        Pace { cruise, start_s, stop_s, turn_s: TURN_S }
+    }
+}
+
+/// The steps that move a train, from below.
+fn steps(model: &MotionModel) -> impl Iterator<Item = SpeedStep> {
+    let all = (1..=model.highest().get()).filter_map(SpeedStep::new);
+    all.filter(|step| model.uses(*step) == StepUse::Moves)
+}

@@ -1,0 +1,136 @@
+//! What follows from what the driver says.
+
+use alloc::vec::Vec;
+
+use crate::control::drive::{DriveNotice, Refusal};
+use crate::ids::TrainId;
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::Length;
+
+use super::dispatched_train::State;
+use super::dispatcher::Dispatcher;
+use super::notice::DispatchNotice;
+use super::way::Way;
+
+/// A train that was stopped no further than this from its destination has arrived: to come nearer it would have to go
+/// away first.
+const NEAR_ENOUGH: Length = Length::from_mm(80.0);
+/// A train that was stopped for its limit is given so many times as much room the next time, up to this many times.
+const MORE_CAUTION: f64 = 1.5;
+const MOST_CAUTION: f64 = 4.0;
+/// What a train on the wrong track is given to come to rest, beyond what is foreseen.
+const MORE: Length = Length::from_mm(60.0);
+
+impl Dispatcher {
+    /// Takes note of what the driver says.
+    pub(super) fn hear(&mut self, now: Timestamp, notice: &DriveNotice) {
+        match notice {
+            DriveNotice::Thrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
+            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+                self.turnout_shown(now, *turnout, *curved);
+                self.diverged(now, *train);
+            }
+            DriveNotice::Passed { train, passed, .. } => {
+                let node = self.driver.layout().sensor_node(passed.sensor);
+                let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));
+                if !is_on_its_way {
+                    self.diverged(now, *train);
+                }
+            }
+            DriveNotice::Done(finished) => {
+                let Some(train) = self.trains.get(&finished.train) else { return };
+                match train.state {
+                    State::Running { order, .. } if order == finished.order => {
+                        let error = finished.achieved.and_then(|achieved| achieved.error);
+                        self.run_ended(now, finished.train, finished.unseen.is_some(), error);
+                    }
+                    State::Turning { order } if order == finished.order => self.run(now, finished.train),
+                    _ => {}
+                }
+            }
+            DriveNotice::GivenUp { order, train, why } => {
+                let Some(known) = self.trains.get(train) else { return };
+                match known.state {
+                    State::Running { order: running, .. } if running == *order => {
+                        self.stopped_on_the_way(now, *train, why);
+                    }
+                    State::Turning { order: turning } if turning == *order => self.gives_up(*train),
+                    _ => {}
+                }
+            }
+            DriveNotice::Lost { train } => {
+                self.gives_up(*train);
+                self.set_state(*train, State::Lost);
+                self.say(DispatchNotice::HeldAsUnknown { train: *train });
+            }
+            _ => {}
+        }
+    }
+
+    /// The driver gave up a run. Near the destination that is as good as having arrived.
+    fn stopped_on_the_way(&mut self, now: Timestamp, id: TrainId, why: &Refusal) {
+        let is_last = self.trains.get(&id).is_some_and(|train| train.course.len() == 1);
+        if is_last && matches!(why, Refusal::AtLimit { .. }) {
+            self.forgive(now, id);
+        }
+        if let Some(train) = self.trains.get_mut(&id).filter(|_| matches!(why, Refusal::AtLimit { .. })) {
+            train.caution = (train.caution * MORE_CAUTION).min(MOST_CAUTION);
+        }
+        self.gives_up(id);
+    }
+
+    /// A train that comes to rest near its destination has arrived.
+    fn forgive(&mut self, now: Timestamp, id: TrainId) {
+        let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
+        let rest = self.driver.rest_if_stopped(id, now).and_then(|at| self.driver.position_at(id, at));
+        let error = rest.and_then(|rest| Some(run.way.find(rest, run.start)? - run.stop));
+        if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
+            self.arrived(now, id, Some(error));
+        }
+    }
+
+    /// A train will never come to its destination.
+    pub(super) fn cannot_go(&mut self, now: Timestamp, id: TrainId, why: Refusal) {
+        let Some(train) = self.trains.get_mut(&id) else { return };
+        if let Some(asked) = train.asked.take() {
+            self.say(DispatchNotice::Drive(DriveNotice::GivenUp {
+                order: asked.order,
+                train: id,
+                why: why.clone(),
+            }));
+        }
+        self.withdraw(now, id, Some(why));
+    }
+
+    /// A train is not on the track that it was granted: it is stopped, and so is everybody whom it could meet until it
+    /// stands.
+    fn diverged(&mut self, now: Timestamp, id: TrainId) {
+        self.halt(now, id);
+        let Some(train) = self.trains.get(&id) else { return };
+        let Some(place) = self.driver.position(id, now) else { return };
+        let room = self.room(now, train);
+        let layout = self.driver.layout();
+        let rest = self.driver.rest_if_stopped(id, now + TimeSpan::from_ms(100));
+        let located = self.driver.locate(id, now);
+        let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
+        let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
+        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, ahead);
+        let taken = way.footprint(layout, at - room.behind, at + ahead);
+        let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
+        let meets: Vec<TrainId> = others.map(|other| other.id).collect();
+        let mut held = taken;
+        self.take_anchors(now, id, place, &mut held);
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.held = held.clone();
+            train.kept = held;
+            train.state = State::Halting { confirmed: true };
+        }
+        let runs = |train: &&TrainId| {
+            let state = self.trains.get(train).map(|train| train.state);
+            matches!(state, Some(State::Running { .. } | State::ByHand))
+        };
+        let stopped: Vec<TrainId> = meets.iter().filter(runs).copied().collect();
+        stopped.iter().for_each(|other| self.halt(now, *other));
+        self.say(DispatchNotice::Diverged { train: id, stopped });
+    }
+}

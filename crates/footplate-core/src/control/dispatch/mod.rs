@@ -1,0 +1,27 @@
+//! Dispatching: many trains on one layout, each with the track that it needs and nobody else on it.
+//!
+//! A [`Dispatcher`] owns a [`Driver`](super::Driver). It finds the soonest way for a train to its destination, grants it
+//! all the track of that way at once, throws the turnouts, runs it from one reversal to the next, and frees what is
+//! behind it. No train is let beyond what it holds; trains at rest in the way of others step aside.
+
+mod by_hand;
+mod course;
+mod dispatched_train;
+mod dispatcher;
+mod footprint;
+mod granting;
+mod hearing;
+mod itinerary;
+mod journey;
+mod notice;
+mod obstacles;
+mod parking;
+mod running;
+mod setting;
+mod untangling;
+mod way;
+
+pub use dispatcher::Dispatcher;
+pub use footprint::{CLEARANCE, Footprint, Span};
+pub use journey::{Journey, TrainLengths};
+pub use notice::DispatchNotice;

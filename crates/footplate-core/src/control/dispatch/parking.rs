@@ -1,0 +1,35 @@
+//! Places where a train can stand, and whether it stands in nobody's way there: clear of all turnouts.
+
+use alloc::vec::Vec;
+
+use crate::track::{Layout, Position, TurnoutStates};
+use crate::units::Length;
+
+use super::course::{Room, standing};
+
+/// From one place looked at to the next: less than what two trains differ by.
+const EVERY: Length = Length::from_mm(100.0);
+/// What is not known of the place of a train that will have stopped somewhere, one standard deviation.
+pub(super) const PARKED: Length = Length::from_mm(15.0);
+/// What a train is likely to stop off its place by.
+const OFF: Length = Length::from_mm(40.0);
+
+/// All places on a layout where there is room for a train, each once, and whether it is clear of all turnouts there.
+pub(super) fn parking_places(layout: &Layout, room: Room) -> Vec<(Position, bool)> {
+    let turnouts = TurnoutStates::unknown();
+    let room = Room { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
+    let mut places = Vec::new();
+    for (id, edge) in layout.edges().filter(|(id, _)| *id < id.twin()) {
+        let mut offset = EVERY / 2.0;
+        while offset < edge.length {
+            let place = Position { edge: id, offset };
+            let taken = standing(layout, &turnouts, place, room);
+            let length: Length = taken.spans().map(|(_, span)| span.to - span.from).sum();
+            if length >= room.ahead + room.behind - Length::from_mm(1.0) {
+                places.push((place, taken.turnouts().next().is_none()));
+            }
+            offset += EVERY;
+        }
+    }
+    places
+}

@@ -1,0 +1,229 @@
+//! Running a course, run by run: turnouts, turning around, the run itself, and rest.
+
+use crate::control::drive::{Aim, Order, Refusal, StopOrder};
+use crate::ids::TrainId;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Landmark;
+use crate::units::Length;
+
+use super::course::{GrantedRun, SLACK};
+use super::dispatched_train::{Purpose, State};
+use super::dispatcher::Dispatcher;
+use super::footprint::Footprint;
+use super::notice::DispatchNotice;
+
+/// What could not be done is not tried again for so long.
+const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
+
+/// A train that was stopped on the way goes on after this.
+const AFTER_HALT: TimeSpan = TimeSpan::from_s(1.0);
+
+impl Dispatcher {
+    /// Does what is due for every train.
+    pub(super) fn go_on(&mut self, now: Timestamp) {
+        let ids: alloc::vec::Vec<TrainId> = self.trains.keys().copied().collect();
+        for id in ids {
+            let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
+            match state {
+                State::Setting { .. } if self.set(now, id) => self.depart(now, id),
+                State::Halting { confirmed } if self.driver.stands(id, now) => {
+                    self.halted(now, id, confirmed);
+                }
+                State::Lost if self.driver.stands(id, now) && self.driver.position(id, now).is_some() => {
+                    self.halted(now, id, true);
+                }
+                State::ByHand => self.drive_by_hand(now, id),
+                _ => {}
+            }
+        }
+    }
+
+    /// The turnouts lie for the next run.
+    fn depart(&mut self, now: Timestamp, id: TrainId) {
+        let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
+        if run.turns {
+            let turn = Order::Reverse { train: id, then: crate::ids::SpeedStep::STAND };
+            match self.driver.order(now, turn) {
+                Ok(order) => self.set_state(id, State::Turning { order }),
+                Err(why) => self.withdraw(now, id, Some(why)),
+            }
+        } else {
+            self.run(now, id);
+        }
+    }
+
+    /// Begins the run itself.
+    pub(super) fn run(&mut self, now: Timestamp, id: TrainId) {
+        let Some(train) = self.trains.get(&id) else { return };
+        let Some(run) = train.course.front() else { return };
+        let room = self.room(now, train);
+        let located = self.driver.locate(id, now);
+        let place = self.driver.position(id, now);
+        let from = run.start - room.behind;
+        let found = located.zip(place).and_then(|(located, place)| {
+            let at = run.way.find(place, from)?;
+            let limit = run.way.place(run.limit)?;
+            let limit = self.driver.way_point(id, located.at.node, limit)?;
+            let stop = run.way.place(run.stop)?;
+            (limit.way > located.at.way).then_some((at, limit, stop))
+        });
+        let run_begin = run.begin;
+        let Some((at, limit, stop)) = found else { return self.withdraw(now, id, None) };
+        let layout = self.driver.layout();
+        let Some(edge) = layout.edge(stop.edge) else { return self.withdraw(now, id, None) };
+        let target = Landmark { node: edge.from, offset: stop.offset };
+        let is_last = train.course.len() == 1 && train.purpose == Purpose::Journey;
+        let aim = train.asked.filter(|_| is_last).map_or(Aim::Median, |asked| asked.journey.aim);
+        // Where a train only turns around or waits, time counts more than millimetres.
+        let step = if is_last { None } else { self.brisk_step(id, run.stop - at) };
+        let stop = StopOrder { train: id, target, aim, step, next_round: false };
+        self.driver.set_limit(now, id, Some(limit));
+        let taken = self.driver.order(now, Order::Stop(stop));
+        let retried = |_| self.driver.order(now, Order::Stop(StopOrder { step: None, ..stop }));
+        match if step.is_some() { taken.or_else(retried) } else { taken } {
+            Ok(order) => {
+                // It has not moved since, whatever turning around makes of what is known of its place.
+                let rear = (at - room.behind).max(run_begin);
+                self.set_state(id, State::Running { order, rear, confirmed: false });
+                self.hold(now, id);
+            }
+            Err(why) => self.withdraw(now, id, Some(why)),
+        }
+    }
+
+    /// A run has ended where it should.
+    pub(super) fn run_ended(&mut self, now: Timestamp, id: TrainId, unseen: bool, error: Option<Length>) {
+        let Some(train) = self.trains.get_mut(&id) else { return };
+        let State::Running { rear, confirmed, .. } = train.state else { return };
+        let confirmed = confirmed && !unseen;
+        let ended = train.course.pop_front();
+        train.caution = 1.0;
+        if train.course.is_empty() {
+            train.state = State::Resting;
+            self.driver.set_limit(now, id, None);
+            self.rest(now, id, rear, confirmed.then_some(ended).flatten());
+            self.arrived(now, id, error);
+        } else {
+            train.state = State::Setting { ready: None, since: now };
+            train.skipped.clear();
+            // What it came over it might still be on, if no contact said otherwise.
+            if let (false, Some(run)) = (confirmed, ended) {
+                let layout = self.driver.layout();
+                train.kept.add(layout, &run.taken);
+            }
+            self.hold(now, id);
+        }
+        self.is_stirred = true;
+    }
+
+    /// A train that was told to stop stands.
+    pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
+        let is_sure = self.driver.position(id, now).is_some();
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.course.clear();
+            train.state = if is_sure { State::Resting } else { State::Lost };
+            train.waits_said = false;
+            train.purpose = Purpose::Journey;
+            train.not_before = now + AFTER_HALT;
+            train.unobstructed_s = None;
+        }
+        self.driver.set_limit(now, id, None);
+        if is_sure && confirmed {
+            self.stand(now, id);
+        }
+        self.is_stirred = true;
+    }
+
+    /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
+    /// contact has confirmed it keeps what it had, all of it.
+    fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<GrantedRun>) {
+        let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
+        let Some(place) = self.driver.position(id, now) else { return };
+        let room = self.room(now, train);
+        let Some(at) = run.way.find(place, run.start) else { return };
+        let layout = self.driver.layout();
+        // What was let go is somebody else's by now.
+        let from = (at - room.behind).max(rear);
+        let mut held = run.way.footprint(layout, from, (at + room.ahead).min(run.end));
+        self.take_anchors(now, id, place, &mut held);
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.held = held;
+            train.kept = Footprint::empty();
+        }
+    }
+
+    /// Takes back what was granted to a train at rest.
+    pub(super) fn withdraw(&mut self, now: Timestamp, id: TrainId, why: Option<Refusal>) {
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.course.clear();
+            train.state = State::Resting;
+            train.purpose = Purpose::Journey;
+            train.not_before = now + PAUSE;
+        }
+        self.driver.set_limit(now, id, None);
+        self.hold_again(now, id);
+        self.say(DispatchNotice::Withdrawn { train: id, why });
+    }
+
+    /// A train at rest that does not go holds what it held before, and what it stands on now that it may have turned
+    /// around.
+    fn hold_again(&mut self, now: Timestamp, id: TrainId) {
+        let kept = self.trains.get_mut(&id).map(|train| core::mem::take(&mut train.kept));
+        self.stand(now, id);
+        let layout = self.driver.layout();
+        if let (Some(train), Some(kept)) = (self.trains.get_mut(&id), kept) {
+            train.held.add(layout, &kept);
+        }
+    }
+
+    /// Says that a train has come to where it was sent.
+    pub(super) fn arrived(&mut self, now: Timestamp, id: TrainId, error: Option<Length>) {
+        let Some(train) = self.trains.get_mut(&id) else { return };
+        train.purpose = Purpose::Journey;
+        let granted_for = train.granted_for.take();
+        if let Some(asked) = train.asked.take_if(|asked| Some(asked.order) == granted_for) {
+            let took = now - asked.since;
+            self.say(DispatchNotice::Arrived { order: asked.order, train: id, error, took });
+        }
+    }
+
+    /// Holds what the runs of a train take from where its rear end certainly is, and nothing else.
+    pub(super) fn hold(&mut self, now: Timestamp, id: TrainId) {
+        let Some(train) = self.trains.get(&id) else { return };
+        let layout = self.driver.layout();
+        let mut held = train.kept.clone();
+        for (nth, run) in train.course.iter().enumerate() {
+            match train.state {
+                State::Running { rear, .. } if nth == 0 => {
+                    held.add(layout, &run.taken_from(layout, rear));
+                }
+                _ => held.add(layout, &run.taken),
+            }
+        }
+        if let Some(place) = self.driver.position(id, now) {
+            self.take_anchors(now, id, place, &mut held);
+        }
+        if let Some(train) = self.trains.get_mut(&id)
+            && train.held != held
+        {
+            train.held = held;
+            self.is_stirred = true;
+        }
+    }
+
+    /// A contact has reported a train that runs: what is behind it is free.
+    pub(super) fn confirmed_at(&mut self, now: Timestamp, id: TrainId, contact: crate::ids::NodeId) -> bool {
+        let Some(train) = self.trains.get(&id) else { return true };
+        let State::Running { order, rear, .. } = train.state else { return true };
+        let Some(run) = train.course.front() else { return true };
+        let layout = self.driver.layout();
+        let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
+        let rear = rear.max(at - train.lengths.behind() - SLACK);
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.state = State::Running { order, rear, confirmed: true };
+            train.kept = Footprint::empty();
+        }
+        self.hold(now, id);
+        true
+    }
+}

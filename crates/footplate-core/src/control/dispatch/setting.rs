@@ -1,0 +1,116 @@
+//! Setting turnouts for a run, so surely that one that fails now and then does not matter.
+
+use alloc::vec::Vec;
+
+use crate::control::drive::Order;
+use crate::ids::{TrainId, TurnoutId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Leg, TurnoutNeed};
+
+use super::dispatched_train::State;
+use super::dispatcher::Dispatcher;
+
+/// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
+/// hang together; those that do show when a train takes the other leg.
+pub(super) const SURE: u8 = 2;
+/// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
+const MOVES: TimeSpan = TimeSpan::from_ms(350);
+/// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
+const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
+
+/// How a turnout was told to lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Told {
+    leg: Leg,
+    /// How many times in a row.
+    times: u8,
+    last: Timestamp,
+}
+
+impl Told {
+    /// A turnout of which somebody knows how it lies.
+    pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: SURE, last: now }
+    }
+}
+
+impl Dispatcher {
+    /// Throws what the present run of a train needs; whether all of it lies right by now.
+    pub(super) fn set(&mut self, now: Timestamp, id: TrainId) -> bool {
+        let Some(train) = self.trains.get(&id) else { return false };
+        let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
+            return false;
+        };
+        let wanted: Vec<TurnoutNeed> = self.with_partners(&run.needs);
+        let skipped = train.skipped.clone();
+        let missing: Vec<TurnoutNeed> = wanted
+            .into_iter()
+            .filter(|need| !self.is_sure(*need) && (need.facing || !skipped.contains(&need.turnout)))
+            .collect();
+        if missing.is_empty() {
+            let ready = ready.unwrap_or(if now == since { now } else { now + MOVES });
+            if ready > now {
+                self.set_state(id, State::Setting { ready: Some(ready), since });
+            }
+            return ready <= now;
+        }
+        for need in missing {
+            // Points that are still moving might be left half way by a second word that fails.
+            let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
+            if self.throwing.contains(&need.turnout) || self.told.get(&need.turnout).is_some_and(moves) {
+                continue;
+            }
+            let order = Order::Turnout { turnout: need.turnout, curved: need.leg.is_curved() };
+            match self.driver.order(now, order) {
+                Ok(_) => {
+                    self.throwing.insert(need.turnout);
+                }
+                // It stands on the points, and they give way to it.
+                Err(_) if !need.facing => {
+                    if let Some(train) = self.trains.get_mut(&id) {
+                        train.skipped.insert(need.turnout);
+                    }
+                }
+                Err(why) if now - since > PATIENCE => {
+                    self.withdraw(now, id, Some(why));
+                    return false;
+                }
+                Err(_) => {}
+            }
+        }
+        false
+    }
+
+    /// The needs of a run, each turnout after the one in the same place that has to lie straight for it.
+    fn with_partners(&self, needs: &[TurnoutNeed]) -> Vec<TurnoutNeed> {
+        let layout = self.driver.layout();
+        let partner = |need: &TurnoutNeed| {
+            let turnout = layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved())?;
+            Some(TurnoutNeed { turnout, leg: Leg::Straight, facing: true })
+        };
+        needs.iter().flat_map(|need| partner(need).into_iter().chain([*need])).collect()
+    }
+
+    fn is_sure(&self, need: TurnoutNeed) -> bool {
+        self.told.get(&need.turnout).is_some_and(|told| told.leg == need.leg && told.times >= SURE)
+    }
+
+    /// A turnout has been told how to lie.
+    pub(super) fn turnout_told(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
+        self.throwing.remove(&turnout);
+        let leg = Leg::from_curved(curved);
+        let times = self.told.get(&turnout).filter(|told| told.leg == leg).map_or(0, |told| told.times);
+        self.told.insert(turnout, Told { leg, times: times.saturating_add(1), last: now });
+    }
+
+    /// A train has shown how a turnout lies.
+    pub(super) fn turnout_shown(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
+        self.told.insert(turnout, Told::sure(now, Leg::from_curved(curved)));
+    }
+
+    pub(super) fn set_state(&mut self, id: TrainId, state: State) {
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.state = state;
+        }
+    }
+}

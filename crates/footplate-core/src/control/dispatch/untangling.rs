@@ -1,0 +1,235 @@
+//! Trains at rest in each other's way: who steps aside, and where to.
+//!
+//! Everybody who runs has all the track to its destination and will come to rest. So trains can only wait for ever for
+//! trains at rest, and those can be sent somewhere else. Looked for is a short sequence of such moves, each possible
+//! after the ones before it, after which the train that waits has a free way; breadth first, the quickest of the
+//! shortest.
+
+use alloc::vec::Vec;
+
+use crate::ids::TrainId;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Landmark, Position};
+
+use super::course::{Room, standing};
+use super::dispatched_train::Purpose;
+use super::dispatcher::Dispatcher;
+use super::footprint::Footprint;
+use super::granting::{Proposal, Start};
+use super::notice::DispatchNotice;
+use super::obstacles::Obstacles;
+use super::parking::PARKED;
+
+/// How many ways one search may try before it gives up until something else has changed.
+const MOST_TRIED: usize = 150;
+/// Moves that one sequence may take.
+const MOST_MOVES: usize = 2;
+/// Of all places for a train to step aside to, so many are tried, the soonest reached.
+const PLACES_TRIED: usize = 6;
+/// Of all scenes after a move that does not help by itself, so many are looked at further.
+const SCENES_KEPT: usize = 4;
+/// What was tried in vain is not tried again for so long.
+const IN_VAIN: TimeSpan = TimeSpan::from_s(6.0);
+
+/// A train at rest, here or there.
+#[derive(Debug, Clone)]
+struct Stander {
+    id: TrainId,
+    place: Position,
+    held: Footprint,
+}
+
+/// What it counts in seconds that a train stands on a turnout.
+const ON_TURNOUT_S: f64 = 30.0;
+
+/// Trains at rest somewhere, and the moves that brought them there.
+#[derive(Debug, Clone)]
+struct Scene {
+    standers: Vec<Stander>,
+    moves: Vec<(TrainId, Position)>,
+    seconds: f64,
+}
+
+impl Dispatcher {
+    /// Sends trains at rest out of the way of one, if only such are in its way.
+    pub(super) fn make_room(&mut self, now: Timestamp, id: TrainId, targets: &[Position], wish: &Proposal) {
+        let mut in_the_way = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
+        let all_rest = in_the_way.all(|other| other.is_ready(now));
+        let somebody_makes_room =
+            self.trains.values().any(|train| train.purpose == Purpose::Aside && !train.course.is_empty());
+        if !all_rest || somebody_makes_room {
+            return;
+        }
+        if self.trains.get(&id).is_none_or(|train| now < train.no_room_until) {
+            return;
+        }
+        let found = self.untangled(now, id, targets, wish);
+        if let Some(train) = self.trains.get_mut(&id).filter(|_| found.is_none()) {
+            train.no_room_until = now + IN_VAIN;
+        }
+        let Some(moves) = found else { return };
+        let Some((first, place)) = moves.first().copied() else { return };
+        let order = moves.iter().map(|(train, _)| *train).collect();
+        self.say(DispatchNotice::Deadlock { train: id, moves: order });
+        let Some(start) = self.start(now, first) else { return };
+        let obstacles = self.obstacles_of_others(first);
+        if let Some(proposal) = self.propose(&start, &self.both_ways(place), &obstacles)
+            && self.is_free(first, &proposal)
+        {
+            let to = Landmark { node: self.node_before(place), offset: place.offset };
+            self.say(DispatchNotice::StepsAside { train: first, makes_room_for: id, to });
+            self.grant(now, first, Purpose::Aside, proposal);
+        }
+    }
+
+    fn obstacles_of_others(&self, id: TrainId) -> Obstacles {
+        let mut obstacles = Obstacles::default();
+        let others = self.trains.values().filter(|other| other.id != id);
+        others.for_each(|other| obstacles.add(&other.held, f64::INFINITY));
+        obstacles
+    }
+
+    fn is_free(&self, id: TrainId, proposal: &Proposal) -> bool {
+        self.trains.values().all(|other| other.id == id || !proposal.meets(&other.held))
+    }
+
+    fn both_ways(&self, place: Position) -> Vec<Position> {
+        [Some(place), self.driver.layout().reversed(place)].into_iter().flatten().collect()
+    }
+
+    fn node_before(&self, place: Position) -> crate::ids::NodeId {
+        self.driver.layout().edge(place.edge).map_or(crate::ids::NodeId(0), |edge| edge.from)
+    }
+
+    /// Moves after which a train has a free way.
+    fn untangled(
+        &self,
+        now: Timestamp,
+        id: TrainId,
+        targets: &[Position],
+        wish: &Proposal,
+    ) -> Option<Vec<(TrainId, Position)>> {
+        let resting = self.trains.values().filter(|train| train.rests());
+        let standers = resting.filter_map(|train| {
+            let place = self.driver.position(train.id, now)?;
+            Some(Stander { id: train.id, place, held: train.held.clone() })
+        });
+        let mut fixed = Obstacles::default();
+        let moving = || self.trains.values().filter(|train| !train.rests());
+        moving().for_each(|train| fixed.add(&train.held, f64::INFINITY));
+        let is_fixed_free = |taken: &Footprint| moving().all(|train| !train.held.meets(taken));
+        let mut tried = 0;
+        let mut scenes = alloc::vec![Scene { standers: standers.collect(), moves: Vec::new(), seconds: 0.0 }];
+        for _ in 0..MOST_MOVES {
+            let mut next: Vec<Scene> = Vec::new();
+            let mut best: Option<Scene> = None;
+            for scene in &scenes {
+                for (nth, mover) in scene.standers.iter().enumerate() {
+                    let is_in_the_way = mover.id == id || wish.meets(&mover.held) || !scene.moves.is_empty();
+                    if !is_in_the_way && scenes.len() == 1 && best.is_some() {
+                        continue;
+                    }
+                    for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish) {
+                        if !is_fixed_free(&held) {
+                            continue;
+                        }
+                        tried += 1;
+                        if tried > MOST_TRIED {
+                            return best.map(|best| best.moves);
+                        }
+                        let mut after = scene.clone();
+                        after.moves.push((mover.id, place));
+                        after.seconds += seconds;
+                        if let Some(moved) = after.standers.get_mut(nth) {
+                            moved.place = place;
+                            moved.held = held;
+                        }
+                        if let Some(seconds) = self.goes(now, id, targets, &after, &fixed) {
+                            after.seconds += seconds;
+                            if best.as_ref().is_none_or(|best| after.seconds < best.seconds) {
+                                best = Some(after);
+                            }
+                        } else {
+                            next.push(after);
+                        }
+                    }
+                }
+            }
+            if let Some(best) = best {
+                return Some(best.moves);
+            }
+            next.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
+            next.truncate(SCENES_KEPT);
+            scenes = next;
+        }
+        None
+    }
+
+    /// Places that one of the trains in a scene can go to: out of the way of the wish first, the soonest first.
+    fn asides(
+        &self,
+        now: Timestamp,
+        scene: &Scene,
+        nth: usize,
+        fixed: &Obstacles,
+        wish: &Proposal,
+    ) -> Vec<(Position, Footprint, f64)> {
+        let Some(mover) = scene.standers.get(nth) else { return Vec::new() };
+        let Some(start) = self.hypothetical(now, mover) else { return Vec::new() };
+        let mut obstacles = fixed.clone();
+        let others = || scene.standers.iter().filter(|other| other.id != mover.id);
+        others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
+        let reached = self.search(&start, &obstacles).from(start.place, self.turned(&start));
+        let layout = self.driver.layout();
+        let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
+        let room = Room::of(train.lengths, PARKED, start.room.overrun);
+        // Out of the way first, then off the turnouts, then the soonest.
+        let mut places: Vec<(bool, Position, Footprint, f64)> = Vec::new();
+        for (place, is_clear) in train.parking.iter().copied() {
+            let ways = self.both_ways(place);
+            let soonest = ways.iter().filter_map(|place| reached.seconds_to(*place)).reduce(f64::min);
+            let Some(seconds) = soonest else { continue };
+            let held = standing(layout, self.driver.turnouts(), place, room);
+            if !held.meets(&mover.held) {
+                let seconds = if is_clear { seconds } else { seconds + ON_TURNOUT_S };
+                places.push((wish.meets(&held), place, held, seconds));
+            }
+        }
+        places.sort_by(|one, other| one.0.cmp(&other.0).then(one.3.total_cmp(&other.3)));
+        let can_go = |(_, place, ..): &(bool, Position, Footprint, f64)| {
+            let itinerary = reached.to(self.both_ways(*place).into_iter());
+            let proposal = itinerary.and_then(|itinerary| self.proposal(&start, itinerary));
+            proposal.is_some_and(|proposal| others().all(|other| !proposal.meets(&other.held)))
+        };
+        let found = places.into_iter().filter(can_go).take(PLACES_TRIED);
+        found.map(|(_, place, held, seconds)| (place, held, seconds)).collect()
+    }
+
+    /// How long a train takes to its destination in a scene; `None` if it cannot go there.
+    fn goes(
+        &self,
+        now: Timestamp,
+        id: TrainId,
+        targets: &[Position],
+        scene: &Scene,
+        fixed: &Obstacles,
+    ) -> Option<f64> {
+        let stander = scene.standers.iter().find(|stander| stander.id == id)?;
+        let start = self.hypothetical(now, stander)?;
+        let mut obstacles = fixed.clone();
+        let others = || scene.standers.iter().filter(|other| other.id != id);
+        others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
+        let found = self.propose(&start, targets, &obstacles)?;
+        others().all(|other| !found.meets(&other.held)).then_some(found.itinerary.seconds)
+    }
+
+    fn hypothetical(&self, now: Timestamp, stander: &Stander) -> Option<Start> {
+        let start = self.start(now, stander.id)?;
+        if start.place == stander.place {
+            return Some(start);
+        }
+        let lengths = self.trains.get(&stander.id)?.lengths;
+        let room = Room::of(lengths, PARKED, start.room.overrun);
+        Some(Start { place: stander.place, room, frozen: Vec::new(), ..start })
+    }
+}

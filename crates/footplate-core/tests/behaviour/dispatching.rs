@@ -1,0 +1,196 @@
+//! Dispatched trains come where they are sent, are never where they hold no track, and no turnout moves under them.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
+use std::sync::OnceLock;
+
+use footplate_core::calibration::motion::MotionModel;
+use footplate_core::control::{
+    DispatchNotice, Dispatcher, Driver, Footprint, Journey, Machine, Order, Output, Refusal, TrainLengths,
+};
+use footplate_core::estimation::WayPoint;
+use footplate_core::track::{Layout, Position, TurnoutStates};
+use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, TrainId, TurnoutId};
+use proptest::collection::vec;
+use proptest::prelude::{ProptestConfig, prop_assert, proptest};
+
+use crate::toy_railway::{ToyRailway, known_model, step, straight};
+
+const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
+/// Both of these are on the circuit.
+const STARTS: [(&str, f64); 2] = [("D1", 500.0), ("B1", 150.0)];
+const LENGTHS: TrainLengths = TrainLengths { overhang: Length::from_mm(50.0), pickup: Length::from_mm(30.0) };
+/// Destinations: contacts of the circuit, in both directions.
+const PLACES: [&str; 8] = ["A1", "A2", "B1", "B2", "C1", "C2", "D1", "D2"];
+/// Places are sums of lengths.
+const ROUNDING: Length = Length::from_mm(0.5);
+
+fn model(train: TrainId) -> MotionModel {
+    static MODELS: OnceLock<[MotionModel; 2]> = OnceLock::new();
+    let models = MODELS.get_or_init(|| TRAINS.map(|train| known_model(train.0)));
+    models.iter().find(|model| model.train() == train).expect("one of two").clone()
+}
+
+/// Two trains on the toy railway's circuit.
+struct Traffic {
+    world: ToyRailway,
+    dispatcher: Dispatcher,
+    notices: Vec<DispatchNotice>,
+    /// What went wrong, if anything did.
+    wrongs: Vec<String>,
+}
+
+impl Traffic {
+    fn new() -> Self {
+        let [(node, mm), _] = STARTS;
+        let mut world = ToyRailway::new(TRAINS[0].0, node, mm);
+        let mut driver = Driver::new(world.layout.clone(), straight());
+        for (train, (name, mm)) in TRAINS.into_iter().zip(STARTS) {
+            let node = world.layout.node_named(name).expect("a node");
+            driver.add_train(model(train));
+            driver.place(world.now, train, WayPoint { node, way: Length::from_mm(mm) }, Length::from_mm(2.0));
+            world.put(train.0, name, mm);
+        }
+        let mut dispatcher = Dispatcher::new(world.now, driver);
+        for train in TRAINS {
+            dispatcher.set_lengths(world.now, train, LENGTHS);
+        }
+        Self { world, dispatcher, notices: Vec::new(), wrongs: Vec::new() }
+    }
+
+    fn go(&mut self, train: TrainId, place: &str) {
+        let target = self.world.layout.landmark(place).expect("a place");
+        self.dispatcher.go(self.world.now, train, Journey::to(target)).expect("on the layout");
+    }
+
+    fn listen(&mut self) {
+        while let Some(output) = self.dispatcher.poll_output() {
+            match output {
+                Output::Command(command) => {
+                    self.check_turnout(command);
+                    self.world.command(command);
+                }
+                Output::Notice(notice) => self.notices.push(notice),
+                Output::HoldLine(_) | Output::Watch(_) => {}
+            }
+        }
+    }
+
+    /// Whoever wants a turnout thrown holds it, and nobody else does.
+    fn check_turnout(&mut self, command: Command) {
+        let Command::Turnout { turnout, .. } = command else { return };
+        let holds = |train: &&TrainId| self.dispatcher.holds(**train).is_some_and(|held| held.takes(turnout));
+        if TRAINS.iter().filter(holds).count() != 1 {
+            self.wrongs.push(format!("turnout {turnout} was thrown for nobody who alone holds it"));
+        }
+    }
+
+    fn run(&mut self, seconds: f64) {
+        let end = self.world.now + TimeSpan::from_s(seconds);
+        let mut looks_at = self.world.now;
+        self.listen();
+        while self.world.now < end && self.wrongs.is_empty() {
+            for event in self.world.tick() {
+                self.dispatcher.handle_event(self.world.now.max(event.time), &event);
+                self.listen();
+            }
+            if self.dispatcher.next_timeout().is_some_and(|at| at <= self.world.now) {
+                self.dispatcher.handle_timeout(self.world.now);
+                self.listen();
+            }
+            if looks_at <= self.world.now {
+                looks_at += TimeSpan::from_ms(20);
+                self.look();
+            }
+        }
+    }
+
+    /// Everything that a train really is on it holds, and nobody holds what another does.
+    fn look(&mut self) {
+        let [one, two] = TRAINS.map(|train| self.dispatcher.holds(train).expect("dispatched"));
+        let mut wrongs = Vec::new();
+        if one.meets(two) {
+            wrongs.push("two trains hold the same track".to_owned());
+        }
+        for (train, held) in TRAINS.into_iter().zip([one, two]) {
+            let at = self.world.trains.iter().find(|found| found.id == train).expect("on the rails").at;
+            if !is_within(&self.world.layout, &self.world.turnouts, at, held) {
+                wrongs.push(format!("train {train} is on track that it does not hold: {at:?} of {held:?}"));
+            }
+        }
+        self.wrongs.extend(wrongs);
+    }
+
+    fn arrivals(&self, train: TrainId) -> usize {
+        let here = |notice: &&DispatchNotice| matches!(notice, DispatchNotice::Arrived { train: arrived, .. } if *arrived == train);
+        self.notices.iter().filter(here).count()
+    }
+}
+
+/// Whether points all along a train are held.
+fn is_within(layout: &Layout, turnouts: &TurnoutStates, at: Position, held: &Footprint) -> bool {
+    let back = layout.reversed(at).expect("on the layout");
+    (0..=8).map(|nth| f64::from(nth) / 8.0).all(|part| {
+        let ahead = layout.advance(at, LENGTHS.ahead() * part, turnouts);
+        let behind = layout.advance(back, LENGTHS.behind() * part, turnouts);
+        [ahead, behind].into_iter().flatten().all(|point| is_held(layout, point, held))
+    })
+}
+
+fn is_held(layout: &Layout, point: Position, held: &Footprint) -> bool {
+    let length = layout.edge(point.edge).map_or(Length::ZERO, |edge| edge.length);
+    let first = EdgeId(2 * point.edge.stretch().0);
+    let offset = if point.edge == first { point.offset } else { length - point.offset };
+    held.spans().any(|(stretch, span)| {
+        stretch == point.edge.stretch() && span.from <= offset + ROUNDING && offset - ROUNDING <= span.to
+    })
+}
+
+#[test]
+fn a_train_goes_where_it_is_sent_and_another_makes_room() {
+    let mut traffic = Traffic::new();
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(90.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    // The other one stands there.
+    traffic.go(TRAINS[0], "B1+150mm");
+    traffic.run(120.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
+    let aside = |notice: &DispatchNotice| matches!(notice, DispatchNotice::StepsAside { .. });
+    assert!(traffic.notices.iter().any(aside), "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_train_driven_by_hand_stops_before_the_track_of_another() {
+    let mut traffic = Traffic::new();
+    let speed = Order::Speed { train: TRAINS[0], step: step(10) };
+    traffic.dispatcher.order(traffic.world.now, speed).expect("a step");
+    traffic.run(30.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert!(traffic.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
+    let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };
+    let taken = traffic.dispatcher.order(traffic.world.now, throw);
+    assert!(matches!(taken, Err(Refusal::TurnoutOccupied { turnout: TurnoutId(1), .. })), "{taken:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn nobody_is_ever_where_it_holds_no_track(
+        sent in vec((0_usize..2, 0_usize..8, 0.0..180.0_f64, 2.0..25.0_f64), 4..10),
+        deaf in vec(0_u16..8, 0..2),
+    ) {
+        let mut traffic = Traffic::new();
+        traffic.world.dead.extend(deaf.into_iter().map(SensorId));
+        for (train, place, mm, seconds) in sent {
+            let place = PLACES.get(place).expect("one of eight");
+            traffic.go(TRAINS[train], &format!("{place}{mm:+.0}mm"));
+            traffic.run(seconds);
+            prop_assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+        }
+        traffic.run(60.0);
+        prop_assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    }
+}

@@ -1,0 +1,99 @@
+//! `footplate simulate traffic`: several trains sent to random places for hours, and scored by the simulator's truth.
+
+mod page;
+mod session;
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use footplate_core::TimeSpan;
+use footplate_store::layout_named;
+
+use self::page::Page;
+use self::session::{Asked, Session};
+use super::super::Outcome;
+use super::seeds::Seeds;
+use crate::progress::with_progress;
+use crate::spread::{all_cores, spread};
+
+/// Send several calibrated trains to random places, one after the other, and count what comes of it by the truth.
+#[derive(Args)]
+#[command(after_help = "Example: footplate simulate traffic --trains 4 --hours 0.5 --seeds 1..4 --markdown")]
+pub(super) struct Arguments {
+    /// The layout: the name of a built-in one or a layout file.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// How many trains.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=6))]
+    trains: u8,
+    /// Track time, in hours.
+    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    hours: f64,
+    /// The seed of trains, rails, faults and destinations, or many: 1..30.
+    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
+    seeds: Seeds,
+    /// Track time that the calibration of each train may take, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
+    budget: u16,
+    /// Tell everything that happens while it happens.
+    #[arg(long)]
+    talk: bool,
+    /// Write the scores as a page of the documentation.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: bool,
+    /// How many seeds at once; without it, as many as there are cores. The result is the same.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let seeds: Vec<u64> = self.seeds.iter().collect();
+        let asked = Asked {
+            trains: usize::from(self.trains),
+            time: TimeSpan::from_s(self.hours * 3600.0),
+            budget: TimeSpan::from_s(f64::from(self.budget)),
+        };
+        let threads = self.threads.unwrap_or_else(all_cores);
+        let tallies = with_progress("traffic", seeds.len(), |done| {
+            spread(seeds.len(), threads, |at| {
+                let tally = Session::new(&layout, seeds[at], asked, self.talk)?.run(asked.time);
+                done.fetch_add(1, Ordering::Relaxed);
+                anyhow::Ok(tally)
+            })
+        })?;
+        let page = Page { tallies: &tallies, asked: self.asked() };
+        if self.json {
+            page.write_json(output)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        let is_sound = tallies.iter().all(|tally| tally.mishaps.is_empty());
+        Ok(if is_sound { Outcome::Done } else { Outcome::FallsShort })
+    }
+
+    /// What was asked for, as on the command line.
+    fn asked(&self) -> String {
+        let mut asked = format!(
+            "--trains {} --hours {} --seeds {} --markdown",
+            self.trains,
+            self.hours,
+            self.seeds.written()
+        );
+        if self.layout != "track-a" {
+            asked = format!("--layout {} {asked}", self.layout);
+        }
+        if self.budget != 300 {
+            asked = format!("--budget {} {asked}", self.budget);
+        }
+        asked
+    }
+}

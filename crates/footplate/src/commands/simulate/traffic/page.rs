@@ -1,0 +1,121 @@
+//! The table of how trains fare in traffic: for people, for the documentation, and for machines.
+
+use std::io::{self, Write};
+
+use footplate_sim::MishapKind;
+use serde_json::{Value, json};
+
+use super::session::Tally;
+
+const HEAD: &str = "\
+# How several trains fare on one layout
+
+Random simulated trains, each calibrated from nothing while the others were lifted, then sent to one random place after the
+other: a contact and an offset past it, from whichever side. Contacts are missed, stick and close by themselves, turnouts
+fail, at the rates of a well-kept laboratory. The simulator's truth is used for these figures alone.
+";
+
+const LEGEND: &str = "\
+*Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted.
+*Waited* is from the order until the way was set, *took* until arrival (mean). *Nowhere* is the longest time that a train
+came to no destination. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
+near to the end of a track, for which another was drawn.
+";
+
+/// All that was scored.
+pub(super) struct Page<'r> {
+    pub(super) tallies: &'r [Tally],
+    pub(super) asked: String,
+}
+
+impl Page<'_> {
+    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(output, "{HEAD}\nMade by `footplate simulate traffic {}`.\n\n{LEGEND}", self.asked)?;
+        self.write_text(output)
+    }
+
+    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
+             collisions | derailments | overruns | intrusions | wrong legs | lost | hands | no way |\n\
+             | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
+             ---: | ---: | ---: |"
+        )?;
+        for tally in self.tallies {
+            row(output, &tally.seed.to_string(), &[tally])?;
+        }
+        if self.tallies.len() > 1 {
+            row(output, "all", &self.tallies.iter().collect::<Vec<_>>())?;
+        }
+        for tally in self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()) {
+            writeln!(
+                output,
+                "\nSeed {} ended early: {:?}. Again, with all that is said:",
+                tally.seed, tally.mishaps
+            )?;
+            writeln!(output, "`footplate simulate traffic {} --talk`", self.again(tally.seed))?;
+        }
+        Ok(())
+    }
+
+    /// The same seed alone.
+    fn again(&self, seed: u64) -> String {
+        let words: Vec<&str> = self.asked.split(' ').collect();
+        let at = words.iter().position(|word| *word == "--seeds").map_or(words.len(), |at| at + 1);
+        let seed = seed.to_string();
+        let said = words.iter().enumerate().map(|(nth, word)| if nth == at { seed.as_str() } else { word });
+        said.filter(|word| *word != "--markdown").collect::<Vec<_>>().join(" ")
+    }
+
+    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+        let seeds = self.tallies.iter().map(|tally| {
+            json!({
+                "seed": tally.seed, "hours": tally.hours, "trains": tally.trains, "arrivals": tally.arrivals,
+                "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
+                "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
+                "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost,
+                "hands": tally.hands, "refused": tally.refused, "withdrawn": tally.withdrawn,
+                "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
+                    .collect::<Vec<Value>>(),
+                "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
+            })
+        });
+        writeln!(output, "{}", json!({ "seeds": seeds.collect::<Vec<Value>>() }))
+    }
+}
+
+fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()> {
+    let sum = |of: fn(&Tally) -> usize| tallies.iter().map(|tally| of(tally)).sum::<usize>();
+    let train_hours: f64 = tallies.iter().map(|tally| tally.hours * tally.trains as f64).sum();
+    let arrivals = sum(|tally| tally.arrivals as usize);
+    let longest = tallies.iter().map(|tally| tally.starved).fold(0.0, f64::max);
+    let mean = |of: fn(&Tally) -> &Vec<f64>| {
+        let all = || tallies.iter().flat_map(|tally| of(tally));
+        all().sum::<f64>() / all().count().max(1) as f64
+    };
+    writeln!(
+        output,
+        "| {name} | {:.1} | {arrivals} | {:.1} | {:.1} | {:.1} | {longest:.0} | {} | {} | {} | {} | {} | {} | {} | \
+         {} | {} | {} |",
+        tallies.iter().map(|tally| tally.hours).sum::<f64>(),
+        arrivals as f64 / train_hours.max(1e-9),
+        mean(|tally| &tally.waits),
+        mean(|tally| &tally.took),
+        sum(|tally| tally.routes as usize + tally.turns),
+        sum(|tally| tally.aside as usize),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Collision { .. })) / 2),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Derailment { .. }))),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Overrun))),
+        sum(|tally| tally.intrusions.len()),
+        sum(|tally| tally.diverged as usize),
+        sum(|tally| tally.lost as usize),
+        sum(|tally| tally.hands as usize),
+        sum(|tally| tally.refused.values().sum::<u32>() as usize),
+    )
+}
+
+/// How many mishaps are of a kind; every collision has two entries.
+fn mishaps(tally: &Tally, is: fn(MishapKind) -> bool) -> usize {
+    tally.mishaps.iter().filter(|mishap| is(mishap.kind)).count()
+}

@@ -1,0 +1,288 @@
+//! Some hours of traffic on one simulated layout, watched by its truth.
+
+use std::collections::BTreeMap;
+
+use anyhow::bail;
+use footplate_core::control::{DispatchNotice, Dispatcher, DriveNotice, Journey, Span, TrainLengths};
+use footplate_core::estimation::WayPoint;
+use footplate_core::track::{Landmark, Layout};
+use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
+use footplate_sim::{LivingSwitches, Mishap};
+
+use super::super::driving::choice::Choice;
+use super::super::rehearsal::Rehearsal;
+
+/// How often the truth is compared with what trains hold.
+const LOOK: TimeSpan = TimeSpan::from_ms(50);
+/// Rounding of places that are told in true lengths and in surveyed ones.
+const ROUNDING: Length = Length::from_mm(1.0);
+/// What a person measured of the engines: the longer overhang and the pickup, rounded up to a centimetre.
+const LENGTHS: TrainLengths =
+    TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
+/// How well a person reads off where a train stands.
+const HAND: Length = Length::from_mm(12.0);
+/// A person comes to the help of a lost train after this long.
+const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
+/// Where trains stand past a contact in the beginning.
+const PAST: Length = Length::from_mm(150.0);
+/// Places tried for a train in the beginning.
+const TRIES: usize = 1_000;
+
+/// What is asked of a session.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    pub(super) trains: usize,
+    pub(super) time: TimeSpan,
+    pub(super) budget: TimeSpan,
+}
+
+/// What came of one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    pub(super) seed: u64,
+    pub(super) hours: f64,
+    pub(super) trains: usize,
+    /// Destinations reached.
+    pub(super) arrivals: u32,
+    /// Destinations to which there is no way, and orders that were given up.
+    pub(super) refused: BTreeMap<String, u32>,
+    /// Grants that the driver could not run and that were taken back.
+    pub(super) withdrawn: BTreeMap<String, u32>,
+    /// Routes that were set, and reversals on them.
+    pub(super) routes: u32,
+    pub(super) turns: usize,
+    pub(super) aside: u32,
+    pub(super) deadlocks: u32,
+    pub(super) diverged: u32,
+    pub(super) lost: u32,
+    pub(super) hands: u32,
+    pub(super) mishaps: Vec<Mishap>,
+    /// Times that a train came to be on track that it did not hold.
+    pub(super) intrusions: Vec<(Timestamp, TrainId)>,
+    /// How long trains waited for their routes, in s.
+    pub(super) waits: Vec<f64>,
+    /// How long journeys took, in s.
+    pub(super) took: Vec<f64>,
+    /// The longest time that a train came nowhere, in s.
+    pub(super) starved: f64,
+    /// Errors of arrivals as believed, in mm.
+    pub(super) errors: Vec<f64>,
+}
+
+pub(super) struct Session<'l> {
+    layout: &'l Layout,
+    rehearsal: Rehearsal<'l>,
+    dispatcher: Dispatcher,
+    choice: Choice,
+    tally: Tally,
+    trains: Vec<TrainId>,
+    is_inside: BTreeMap<TrainId, bool>,
+    /// Since when each train has been on its way to nowhere.
+    since: BTreeMap<TrainId, Timestamp>,
+    waits: BTreeMap<TrainId, Timestamp>,
+    lost: BTreeMap<TrainId, Timestamp>,
+    talk: bool,
+}
+
+impl<'l> Session<'l> {
+    pub(super) fn new(layout: &'l Layout, seed: u64, asked: Asked, talk: bool) -> anyhow::Result<Self> {
+        let trains: Vec<TrainId> =
+            [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
+        let switches = LivingSwitches::well_kept();
+        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut choice = Choice::new(seed);
+        let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+        for nth in 0..trains.len() {
+            let mut is_put = false;
+            for _ in 0..TRIES {
+                let Some(node) = choice.of(&sensors) else { break };
+                if rehearsal.put(trains[nth], *node, PAST).is_err() {
+                    continue;
+                }
+                let dispatcher = dispatcher(&rehearsal);
+                let holds = |train: &TrainId| dispatcher.holds(*train);
+                let is_apart = trains[..nth].iter().all(|other| {
+                    holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
+                });
+                if is_apart {
+                    is_put = true;
+                    break;
+                }
+            }
+            if !is_put {
+                bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
+            }
+        }
+        let dispatcher = dispatcher(&rehearsal);
+        let began = rehearsal.line.now();
+        let tally =
+            Tally { seed, trains: trains.len(), hours: asked.time.as_s() / 3600.0, ..Tally::default() };
+        Ok(Self {
+            layout,
+            rehearsal,
+            dispatcher,
+            choice,
+            tally,
+            is_inside: trains.iter().map(|train| (*train, true)).collect(),
+            since: trains.iter().map(|train| (*train, began)).collect(),
+            trains,
+            waits: BTreeMap::new(),
+            lost: BTreeMap::new(),
+            talk,
+        })
+    }
+
+    pub(super) fn run(mut self, time: TimeSpan) -> Tally {
+        let began = self.rehearsal.line.now();
+        let end = began + time;
+        for train in self.trains.clone() {
+            self.send(train);
+        }
+        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().is_empty() {
+            let until = end.min(self.rehearsal.line.now() + LOOK);
+            let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
+            match notice {
+                Some(notice) => self.hear(&notice),
+                None => self.look(),
+            }
+        }
+        let now = self.rehearsal.line.now();
+        self.tally.hours = (now - began).as_s() / 3600.0;
+        for train in self.trains.clone() {
+            self.came_somewhere(train, now);
+        }
+        self.tally.mishaps = self.rehearsal.world().mishaps().to_vec();
+        self.tally
+    }
+
+    fn hear(&mut self, notice: &DispatchNotice) {
+        let now = self.rehearsal.line.now();
+        if self.talk
+            && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_) | DriveNotice::Thrown { .. }))
+        {
+            eprintln!("{:9.2} {notice:?}", now.as_s());
+        }
+        match notice {
+            DispatchNotice::Arrived { train, error, took, .. } => {
+                self.tally.arrivals += 1;
+                self.tally.took.push(took.as_s());
+                self.tally.errors.extend(error.map(Length::as_mm));
+                self.came_somewhere(*train, now);
+                self.send(*train);
+            }
+            DispatchNotice::Drive(DriveNotice::GivenUp { train, why, .. })
+                if self.dispatcher.journey(*train).is_none() =>
+            {
+                *self.tally.refused.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
+                self.send(*train);
+            }
+            DispatchNotice::RouteSet { train, turns, .. } => {
+                self.tally.routes += 1;
+                self.tally.turns += turns;
+                if let Some(since) = self.waits.remove(train) {
+                    self.tally.waits.push((now - since).as_s());
+                }
+            }
+            DispatchNotice::Withdrawn { why, .. } => {
+                *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
+            }
+            DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
+            DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
+            DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
+            DispatchNotice::HeldAsUnknown { train } => {
+                self.tally.lost += 1;
+                self.lost.insert(*train, now);
+            }
+            _ => {}
+        }
+    }
+
+    fn came_somewhere(&mut self, train: TrainId, now: Timestamp) {
+        if let Some(since) = self.since.insert(train, now) {
+            self.tally.starved = self.tally.starved.max((now - since).as_s());
+        }
+    }
+
+    /// Sends a train to a random place.
+    fn send(&mut self, train: TrainId) {
+        let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
+        for _ in 0..TRIES {
+            let Some(node) = self.choice.of(&sensors).copied() else { return };
+            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let offset =
+                Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
+            let journey = Journey::to(Landmark { node, offset });
+            let now = self.rehearsal.line.now();
+            if self.dispatcher.go(now, train, journey).is_ok() {
+                self.waits.insert(train, now);
+                return;
+            }
+        }
+    }
+
+    /// Compares what trains are on with what they hold, and helps those that are lost.
+    fn look(&mut self) {
+        let now = self.rehearsal.line.now();
+        for train in self.trains.clone() {
+            let is_inside = self.is_inside(train);
+            if let Some(was) = self.is_inside.insert(train, is_inside)
+                && was
+                && !is_inside
+            {
+                self.tally.intrusions.push((now, train));
+                if self.talk {
+                    eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
+                }
+            }
+            if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
+                self.help(train, now);
+            }
+        }
+    }
+
+    fn is_inside(&self, train: TrainId) -> bool {
+        let truth = self.rehearsal.world().truth();
+        let Some(held) = self.dispatcher.holds(train) else { return false };
+        truth.under(train).all(|(id, part)| {
+            let Some(edge) = self.layout.edge(id) else { return false };
+            let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);
+            let [from, to] = part.map(|at| at * scale);
+            let span = if id < id.twin() {
+                Span { from, to }
+            } else {
+                Span { from: edge.length - to, to: edge.length - from }
+            };
+            held.covers(id.stretch(), span, ROUNDING)
+        })
+    }
+
+    /// A person reads off where a train stands.
+    fn help(&mut self, train: TrainId, now: Timestamp) {
+        self.lost.remove(&train);
+        if self.dispatcher.driver().position(train, now).is_some() {
+            return;
+        }
+        let truth = self.rehearsal.world().truth();
+        let Some(position) = truth.train(train).and_then(|truth| truth.position) else { return };
+        let Some(edge) = self.layout.edge(position.edge) else { return };
+        let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
+        self.tally.hands += 1;
+        let at = WayPoint { node: edge.from, way: position.offset * scale };
+        self.dispatcher.place(now, train, at, HAND);
+    }
+}
+
+fn dispatcher(rehearsal: &Rehearsal<'_>) -> Dispatcher {
+    let now = rehearsal.line.now();
+    let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    let trains: Vec<TrainId> = dispatcher.driver().trains().collect();
+    for train in trains {
+        dispatcher.set_lengths(now, train, LENGTHS);
+    }
+    dispatcher
+}
+
+/// The name of what was refused, without its numbers.
+fn kind_of(refusal: &str) -> String {
+    refusal.trim_start_matches("Some(").split([' ', '(', '{']).next().unwrap_or_default().to_owned()
+}
