@@ -5,11 +5,13 @@
 //! - [`Calibrator`] finds a train, plans experiments with it and learns how it moves.
 //! - [`Driver`] drives trains where they are ordered, and stops them there.
 //! - [`Dispatcher`] sends trains where they are asked to go, and keeps them apart.
+//! - [`Watchdog`] watches over that, and begins from the beginning when the future is no longer like the past.
 
 pub mod calibrate;
 mod dispatch;
 mod drive;
 mod machine;
+mod watch;
 
 pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Footprint, Journey, Span, TrainLengths};
@@ -18,3 +20,4 @@ pub use drive::{
     Refusal, StopOrder,
 };
 pub use machine::{Machine, Output};
+pub use watch::{Alarm, LinkNews, Outcome, Watchdog, WatchdogNotice};

@@ -19,5 +19,6 @@ mod stopping;
 mod toy_railway;
 mod trains_fitted;
 mod two_sensors;
+mod watching;
 mod ways_on_tracks;
 mod wheel_diameters;

@@ -101,6 +101,8 @@ pub(crate) struct ToyTrain {
     target_mm_per_s: f64,
     obeys: VecDeque<(Timestamp, f64)>,
     pub(crate) travelled_mm: f64,
+    /// How far it gets over how far it would with clean wheels.
+    pub(crate) wheels: f64,
     pub(crate) is_off_the_track: bool,
 }
 
@@ -113,7 +115,7 @@ impl ToyTrain {
         let change = MM_PER_S2 * TICK.as_s();
         let missing = self.target_mm_per_s - self.speed_mm_per_s;
         self.speed_mm_per_s += missing.clamp(-change, change);
-        let way = self.speed_mm_per_s * TICK.as_s();
+        let way = self.speed_mm_per_s * TICK.as_s() * self.wheels;
         let edge = layout.edge(self.at.edge).expect("on the layout");
         match layout.advance(self.at, Length::from_mm(way), turnouts) {
             Ok(at) => {
@@ -141,6 +143,8 @@ pub(crate) struct ToyRailway {
     pub(crate) events: Vec<Event>,
     pub(crate) notices: Vec<DriveNotice>,
     pub(crate) commands: Vec<(Timestamp, Command)>,
+    /// Nothing that is told leaves the line.
+    pub(crate) is_silent: bool,
     /// Contacts that do not report.
     pub(crate) dead: BTreeSet<SensorId>,
     /// Turnouts that do not move.
@@ -173,6 +177,7 @@ impl ToyRailway {
             target_mm_per_s: 0.0,
             obeys: VecDeque::new(),
             travelled_mm: 0.0,
+            wheels: 1.0,
             is_off_the_track: false,
         });
     }
@@ -193,6 +198,7 @@ impl ToyRailway {
             events: Vec::new(),
             notices: Vec::new(),
             commands: Vec::new(),
+            is_silent: false,
             dead: BTreeSet::new(),
             stuck: BTreeSet::new(),
             passes: Vec::new(),
@@ -246,6 +252,7 @@ impl ToyRailway {
         }
         self.closed.extend(passed.into_iter().filter(|sensor| !self.dead.contains(sensor)));
         if self.line_free <= self.now
+            && !self.is_silent
             && let Some(command) = self.queue.pop_front()
         {
             // The effect counts from when the last bit has left.

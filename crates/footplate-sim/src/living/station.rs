@@ -95,6 +95,8 @@ pub struct VirtualStation<'l> {
     /// When the last byte of the answer under way has gone.
     answers_until: Timestamp,
     forgets: bool,
+    /// Until when it is switched off.
+    dark_until: Option<Timestamp>,
     coil: Option<Coil>,
     alarms: Vec<CoilAlarm>,
 }
@@ -107,6 +109,7 @@ enum Next {
     Reply,
     Cts,
     Coil,
+    Light,
 }
 
 impl<'l> VirtualStation<'l> {
@@ -127,6 +130,7 @@ impl<'l> VirtualStation<'l> {
             reply: VecDeque::new(),
             answers_until: now,
             forgets: false,
+            dark_until: None,
             coil: None,
             alarms: Vec::new(),
         }
@@ -174,6 +178,20 @@ impl<'l> VirtualStation<'l> {
         &self.alarms
     }
 
+    /// Somebody pulls the plug and puts it in again some time later. In between nothing is heard and nothing answered, and
+    /// the rails are dead; afterwards the station knows nothing of what it told trains, remembers every contact until it is
+    /// told not to, and gives power.
+    pub fn restart(&mut self, dark_for: TimeSpan) {
+        let now = self.now;
+        self.let_go(now);
+        self.world.power(false, now);
+        self.world.forget_all_told();
+        (self.begun, self.asked, self.forgets) = (None, None, false);
+        self.reply.clear();
+        self.answers_until = now;
+        self.dark_until = Some(now + dark_for.max(TimeSpan::ZERO));
+    }
+
     /// The host puts a byte on the line, behind those that are still on their way; its last bit arrives 4.583 ms
     /// after it began.
     pub fn write(&mut self, byte: u8) {
@@ -206,6 +224,11 @@ impl<'l> VirtualStation<'l> {
                     self.watch_coil();
                     None
                 }
+                Next::Light => {
+                    self.dark_until = None;
+                    self.world.power(true, at);
+                    None
+                }
             };
             let is_lost = matches!(heard, Some(FromStation::Byte(_))) && self.loses_one();
             if heard.is_some() && !is_lost {
@@ -232,6 +255,7 @@ impl<'l> VirtualStation<'l> {
             self.coil.map(|coil| coil.since + if coil.is_alarming { BURNS } else { SOLENOID_HOLD_LONGEST }),
             Next::Coil,
         );
+        or(self.dark_until, Next::Light);
         next
     }
 
@@ -242,6 +266,9 @@ impl<'l> VirtualStation<'l> {
 
     /// The last bit of a byte from the host has arrived.
     fn receive(&mut self, at: Timestamp, byte: u8, is_heard: bool) {
+        if self.dark_until.is_some() {
+            return;
+        }
         let answers = self.asked.is_some() || at < self.answers_until;
         if (answers || !is_heard) && self.switches.strict {
             self.reply.pop_front();

@@ -155,6 +155,11 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
+    /// The station forgets what it told trains.
+    pub(crate) fn forget_all_told(&mut self) {
+        self.told.fill(SpeedStep::STAND);
+    }
+
     /// The station gives power to the rails, or takes it.
     pub(crate) fn power(&mut self, on: bool, now: Timestamp) {
         if on == self.is_powered {

@@ -1,6 +1,7 @@
 //! `footplate simulate`: worlds whose truth is known.
 
 mod again;
+mod disasters;
 mod driving;
 mod layout;
 mod line;
@@ -34,6 +35,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum World {
+    Disasters(disasters::Arguments),
     Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
@@ -43,6 +45,7 @@ enum World {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         match self.world {
+            Some(World::Disasters(arguments)) => arguments.run(output),
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),

@@ -7,11 +7,16 @@
 use super::course::{B, Course, E, H, N, Told, Z};
 use super::model::MotionModel;
 use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
+use super::segment::Segment;
 
 /// Over this time (s) a run's speed wanders by [`WANDER`].
 const WANDERS_IN: f64 = 4.0;
 /// Looks at one contact from ever better points: speed and place bend the way while little is known.
 const LOOKS: usize = 3;
+/// A steady run is counted anew after this long (s): before, the law of its start and its speed are still told apart.
+const LONG_RUN: f64 = 20.0;
+/// Share of a change from which on the run is steady: what is left is less than a millimetre.
+const STEADY: f64 = 0.995;
 /// A change that begins while another is under way goes another way than the sum of both, by the speed that was still
 /// missing over this time (s): an eased decoder begins again at no rate at all, a counter goes on at its own.
 pub(crate) const INTERRUPTED: f64 = 0.2;
@@ -240,7 +245,26 @@ impl Following {
             }
             (seen, slope) = self.course.way_and_slope(time);
         }
+        self.count_from(time);
         short
+    }
+
+    /// Begins the way of a steady run anew: what its speed does from here on says nothing of the way so far. Counted from
+    /// where the run began, wander of some tenths of a per cent would put a train in doubt by that part of all its way.
+    fn count_from(&mut self, time: f64) {
+        let segment = self.course.segment;
+        let is_steady = segment.share(time) >= STEADY && time - segment.begins > LONG_RUN;
+        if self.course.step == 0 || !is_steady {
+            return;
+        }
+        let (way, slope) = self.course.way_and_slope(time);
+        self.transform(slope);
+        self.course.x[B] = way;
+        self.course.segment = Segment::steady(time, segment.to);
+        for letter in [H, Z] {
+            self.forget(letter);
+            self.course.x[letter] = 0.0;
+        }
     }
 
     /// Where it is nobody knows any more.

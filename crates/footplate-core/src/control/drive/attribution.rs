@@ -94,6 +94,11 @@ impl Attribution {
         self.conduct.next_reformed(now)
     }
 
+    /// Somebody knows better where a train is, or that nobody does: what may have been does not matter any more.
+    pub(super) fn forget(&mut self, train: TrainId) {
+        self.doubt.take_if(|doubt| doubt.otherwise.iter().any(|branch| branch.train == train));
+    }
+
     /// A command to a train has left: those that it may be hear it, too.
     pub(super) fn command_left(
         &mut self,

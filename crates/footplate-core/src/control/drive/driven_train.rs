@@ -208,7 +208,10 @@ impl DrivenTrain {
             (Phase::Telling { .. }, Goal::Run) if step > SpeedStep::STAND => {
                 self.finish(ground, now, task.order, None, None, out);
             }
-            (Phase::Telling { .. } | Phase::Running { .. }, _) if step == SpeedStep::STAND => {
+            // A stop that leaves after it has been told to run again was of what it did before.
+            (Phase::Telling { .. } | Phase::Running { .. }, _)
+                if step == SpeedStep::STAND && self.told == SpeedStep::STAND =>
+            {
                 let rest = self.locator.rest_if_stopped(ground, &self.model, now);
                 let promise = match task.goal {
                     Goal::RestAt(Destination { at: Some(at), .. }) => {

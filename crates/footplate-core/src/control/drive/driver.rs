@@ -45,7 +45,7 @@ pub struct Driver {
     closed: BTreeMap<SensorId, Timestamp>,
     /// Turnouts that were asked for and have not been told yet, by which order.
     throwing: Vec<(TurnoutId, OrderId)>,
-    attribution: Attribution,
+    pub(super) attribution: Attribution,
     pub(super) orders: u32,
     /// When the contact to be watched changes.
     pub(super) watch_changes: Option<Timestamp>,
@@ -75,6 +75,7 @@ impl Driver {
 
     /// Drives a train that somebody else has followed until now.
     pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
+        self.attribution.forget(model.train());
         self.trains.insert(model.train(), DrivenTrain::new(model, locator));
     }
 
@@ -140,6 +141,7 @@ impl Driver {
 
     /// A person put a train there, or read off where it stands.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+        self.attribution.forget(train);
         if let Some(train) = self.trains.get_mut(&train) {
             train.place(self.track.ground(), now, at, uncertainty);
         }

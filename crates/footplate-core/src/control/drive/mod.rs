@@ -24,6 +24,7 @@ mod stop_planning;
 mod task;
 mod turning;
 mod turnout_guard;
+mod watched;
 
 pub use driver::Driver;
 pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedStop, Promise};

@@ -76,6 +76,13 @@ pub enum Refusal {
         /// The target.
         target: String,
     },
+    /// The train is in danger, or could meet one that is: it is held until that is over.
+    InDanger {
+        /// The train that was asked to move.
+        train: TrainId,
+    },
+    /// The station does not answer: nothing can be told.
+    NoAnswer,
     /// Nobody knows where the train is.
     Lost {
         /// The train.
@@ -140,6 +147,10 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::InDanger { train } => {
+                write!(f, "train {train} is held until the danger is over")
+            }
+            Self::NoAnswer => f.write_str("the station does not answer"),
             Self::UnknownTrain { train } => write!(f, "train {train} is not driven here"),
             Self::UnknownTurnout { turnout } => write!(f, "the layout has no turnout {turnout}"),
             Self::StepTooHigh { step, highest } => {

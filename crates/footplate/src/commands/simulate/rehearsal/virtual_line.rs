@@ -4,7 +4,7 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Timestamp};
 use footplate_sim::{FromStation, VirtualStation};
 use footplate_wire::marklin_serial::{EncodeError, Interface, Settings};
-use footplate_wire::{Session, Transmit};
+use footplate_wire::{LinkNotice, Session, Transmit};
 
 /// S88 modules that the session asks for: the five of the course layouts.
 const MODULES: u8 = 5;
@@ -31,9 +31,19 @@ impl<'l> VirtualLine<'l> {
 
     /// Lets a machine drive until it has something to say or a time has come.
     pub(crate) fn drive<M: Machine>(&mut self, machine: &mut M, until: Timestamp) -> Option<M::Notice> {
+        self.drive_hearing(machine, until, |_, _, _| {})
+    }
+
+    /// The same with one that is told what the session has to say of the line.
+    pub(crate) fn drive_hearing<M: Machine>(
+        &mut self,
+        machine: &mut M,
+        until: Timestamp,
+        hear: impl Fn(&mut M, Timestamp, &LinkNotice),
+    ) -> Option<M::Notice> {
         loop {
             let now = self.now();
-            if let Some(notice) = self.settle(machine, now) {
+            if let Some(notice) = self.settle(machine, now, &hear) {
                 return Some(notice);
             }
             if now >= until {
@@ -55,13 +65,18 @@ impl<'l> VirtualLine<'l> {
     }
 
     /// Carries everything between machine and session that can be carried now.
-    fn settle<M: Machine>(&mut self, machine: &mut M, now: Timestamp) -> Option<M::Notice> {
+    fn settle<M: Machine>(
+        &mut self,
+        machine: &mut M,
+        now: Timestamp,
+        hear: impl Fn(&mut M, Timestamp, &LinkNotice),
+    ) -> Option<M::Notice> {
         loop {
             while let Some(transmit) = self.interface.poll_output() {
                 match transmit {
                     Transmit::Byte(byte) => self.station.write(byte),
                     Transmit::Event(event) => machine.handle_event(now, &event),
-                    Transmit::Notice(_) => {}
+                    Transmit::Notice(notice) => hear(machine, now, &notice),
                 }
             }
             match machine.poll_output()? {

@@ -1,0 +1,391 @@
+//! A watchdog stops a train that is not as it was, and all that could meet it, takes the power if a stop is not confirmed,
+//! and brings trains back by measuring them again; whatever is reported, nobody in danger is told to move meanwhile.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
+use std::collections::BTreeSet;
+
+use footplate_core::control::{
+    Alarm, LinkNews, Machine, Order, Outcome, Output, Refusal, StopOrder, Watchdog, WatchdogNotice,
+};
+use footplate_core::track::Landmark;
+use footplate_core::{
+    Command, Event, EventKind, Length, NodeId, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
+    TurnoutId,
+};
+use proptest::collection::vec;
+use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_oneof, proptest};
+
+use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
+
+const FIRST: TrainId = TrainId(24);
+const SECOND: TrainId = TrainId(58);
+
+/// A world under a watchdog, and all that it said and told.
+struct Watched {
+    world: ToyRailway,
+    dog: Watchdog,
+    said: Vec<WatchdogNotice>,
+    told: Vec<(Timestamp, Command)>,
+}
+
+impl Watched {
+    fn one() -> Self {
+        let world = ToyRailway::new(24, "D1", 300.0);
+        let driver = driver_of(&world, "D1", 300.0);
+        let dog = Watchdog::new(driver, world.now);
+        Self { world, dog, said: Vec::new(), told: Vec::new() }
+    }
+
+    /// The same, and train 58 half a round ahead.
+    fn two() -> Self {
+        let mut world = ToyRailway::new(24, "D1", 300.0);
+        world.put(58, "B1", 100.0);
+        let mut driver = driver_of(&world, "D1", 300.0);
+        add_train(&mut driver, &world, 58, Some(("B1", 100.0)));
+        let dog = Watchdog::new(driver, world.now);
+        Self { world, dog, said: Vec::new(), told: Vec::new() }
+    }
+
+    fn listen(&mut self) {
+        while let Some(output) = self.dog.poll_output() {
+            match output {
+                Output::Command(command) => {
+                    self.told.push((self.world.now, command));
+                    // Power is not part of the toy world.
+                    if !matches!(command, Command::PowerOff | Command::PowerOn) {
+                        self.world.command(command);
+                    }
+                }
+                Output::Notice(notice) => self.said.push(notice),
+                Output::HoldLine(_) | Output::Watch(_) => {}
+            }
+        }
+    }
+
+    fn run_until(&mut self, seconds: f64, is_so: impl Fn(&Self) -> bool) -> bool {
+        let end = self.world.now + TimeSpan::from_s(seconds);
+        self.listen();
+        while self.world.now < end && !is_so(self) {
+            for event in self.world.tick() {
+                self.dog.handle_event(self.world.now.max(event.time), &event);
+                self.listen();
+            }
+            if self.dog.next_timeout().is_some_and(|at| at <= self.world.now) {
+                self.dog.handle_timeout(self.world.now);
+                self.listen();
+            }
+        }
+        is_so(self)
+    }
+
+    fn run(&mut self, seconds: f64) {
+        self.run_until(seconds, |_| false);
+    }
+
+    fn go(&mut self, train: TrainId, number: u8) {
+        self.dog.order(self.world.now, Order::Speed { train, step: step(number) }).expect("free to go");
+    }
+
+    fn alarm(&self) -> Option<Alarm> {
+        self.said.iter().find_map(|notice| match notice {
+            WatchdogNotice::Danger { why, .. } => Some(*why),
+            _ => None,
+        })
+    }
+
+    fn recovered(&self) -> Option<Outcome> {
+        self.said.iter().find_map(|notice| match notice {
+            WatchdogNotice::Recovered { outcome, .. } => Some(*outcome),
+            _ => None,
+        })
+    }
+
+    fn power_off(&self) -> Option<Timestamp> {
+        self.told.iter().find(|(_, command)| *command == Command::PowerOff).map(|(at, _)| *at)
+    }
+}
+
+#[test]
+fn a_train_as_it_should_be_raises_no_alarm() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(120.0);
+    assert_eq!(watched.alarm(), None, "{:#?}", watched.said);
+}
+
+#[test]
+fn dirty_wheels_are_noticed_measured_and_made_up_for() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(20.0);
+    // When a train gets a fifth slower,
+    watched.world.trains[0].wheels = 0.8;
+    assert!(watched.run_until(15.0, |watched| watched.alarm().is_some()), "{:#?}", watched.said);
+    // then it is stopped, found, measured,
+    assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    let Some(Outcome::Rescaled { ratio }) = watched.recovered() else { panic!("{:#?}", watched.said) };
+    assert!((ratio - 0.8).abs() < 0.02, "{ratio}");
+    // goes on with what it was doing,
+    assert!(watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::Resumed { train: FIRST, .. })));
+    watched.run(20.0);
+    assert!(watched.world.trains[0].speed_mm_per_s > 100.0);
+    // and stops where it should.
+    let target = watched.dog.layout().landmark("A1+150mm").expect("a place");
+    watched.dog.order(watched.world.now, Order::Stop(StopOrder::at(FIRST, target))).expect("ahead");
+    watched.run(60.0);
+    assert!(watched.world.beyond_mm("A1+150mm").abs() < 60.0, "{}", watched.world.beyond_mm("A1+150mm"));
+    assert!(watched.power_off().is_none());
+}
+
+#[test]
+fn what_could_meet_a_train_in_danger_is_held_and_goes_on_when_it_is_over() {
+    let mut watched = Watched::two();
+    watched.go(FIRST, 8);
+    watched.go(SECOND, 8);
+    watched.run(8.0);
+    watched.dog.distrust(watched.world.now, FIRST);
+    watched.run(0.5);
+    assert!(watched.dog.is_held(FIRST));
+    let refused = watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) });
+    assert_eq!(refused, Err(Refusal::InDanger { train: FIRST }));
+    // The other one comes near, and is stopped before.
+    watched.run(12.0);
+    let moves = |watched: &Watched| watched.world.trains[1].speed_mm_per_s > 1.0;
+    assert!(watched.dog.is_held(SECOND) && !moves(&watched), "{:#?}", watched.said);
+    // On a railway as small as this neither finds a way past the other: a person puts it right.
+    let asks = |watched: &Watched| {
+        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(200.0, |watched| asks(watched) || watched.recovered().is_some()));
+    assert!(!watched.world.trains.iter().any(|train| train.is_off_the_track));
+}
+
+#[test]
+fn the_power_goes_off_when_a_stop_does_not_leave() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 10);
+    watched.run(5.0);
+    watched.world.is_silent = true;
+    watched.go(FIRST, 0);
+    let asked = watched.world.now;
+    assert!(watched.run_until(3.0, |watched| watched.power_off().is_some()));
+    let off = watched.power_off().expect("it is off");
+    assert!(off - asked <= TimeSpan::from_ms(1_010), "{:?}", off - asked);
+    assert_eq!(watched.alarm(), Some(Alarm::StopUnconfirmed));
+}
+
+#[test]
+fn the_power_goes_off_when_a_train_does_not_stop() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 10);
+    watched.run(5.0);
+    watched.go(FIRST, 0);
+    watched.run(6.0);
+    // It should stand, and the contact ahead of it closes.
+    let ahead = watched.dog.driver().contact_ahead(FIRST, watched.world.now).expect("a contact");
+    watched.world.close(ahead);
+    watched.run(0.2);
+    assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));
+    assert!(watched.power_off().is_some());
+}
+
+#[test]
+fn a_station_that_falls_silent_and_comes_back_finds_every_train_again() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(8.0);
+    watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+    watched.run(4.0);
+    assert_eq!(watched.alarm(), Some(Alarm::LinkSilent));
+    assert_eq!(
+        watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) }),
+        Err(Refusal::InDanger { train: FIRST })
+    );
+    watched.dog.handle_link(watched.world.now, LinkNews::Answers);
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
+}
+
+#[test]
+fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_down() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 8);
+    watched.run(4.0);
+    watched.world.trains.clear();
+    let asks = |watched: &Watched| {
+        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
+    assert!(watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) }).is_err());
+    watched.world.put(24, "D1", 100.0);
+    let node = watched.world.layout.node_named("D1").expect("a node");
+    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(100.0) };
+    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.go(FIRST, 8);
+    watched.run(10.0);
+    assert!(!watched.dog.is_held(FIRST));
+}
+
+#[test]
+fn who_is_asked_first_waits_for_the_answer() {
+    let mut watched = Watched::one();
+    watched.dog.ask_before_crawling();
+    watched.go(FIRST, 8);
+    watched.run(6.0);
+    watched.dog.distrust(watched.world.now, FIRST);
+    watched.run(30.0);
+    let asked = |notice: &WatchdogNotice| matches!(notice, WatchdogNotice::AsksToCrawl { train: FIRST });
+    assert_eq!(watched.said.iter().filter(|notice| asked(notice)).count(), 1);
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
+    watched.dog.permit(watched.world.now, FIRST);
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+}
+
+/// One thing that happens to a watchdog.
+#[derive(Debug, Clone)]
+enum Happening {
+    Ordered(Order),
+    Reported(u16),
+    Left,
+    Waited(u32),
+    Link(LinkNews),
+    Placed(u16, f64),
+    Distrusted(TrainId),
+}
+
+fn any_happening() -> impl Strategy<Value = Happening> {
+    let train = || prop_oneof![3 => Just(FIRST), 2 => Just(SECOND), 1 => Just(TrainId(7))];
+    let any_step = || (0_u8..14).prop_map(|number| SpeedStep::new(number).expect("a step"));
+    let order = prop_oneof![
+        4 => (train(), any_step()).prop_map(|(train, step)| Order::Speed { train, step }),
+        1 => (train(), any_step()).prop_map(|(train, then)| Order::Reverse { train, then }),
+        1 => (0_u16..4, any::<bool>())
+            .prop_map(|(turnout, curved)| Order::Turnout { turnout: TurnoutId(turnout), curved }),
+        2 => (train(), 0_u16..26, 0.0..900.0_f64).prop_map(|(train, node, mm)| {
+            let target = Landmark { node: NodeId(node), offset: Length::from_mm(mm) };
+            Order::Stop(StopOrder::at(train, target))
+        }),
+    ];
+    prop_oneof![
+        3 => order.prop_map(Happening::Ordered),
+        4 => (0_u16..14).prop_map(Happening::Reported),
+        6 => Just(Happening::Left),
+        8 => prop_oneof![0_u32..300, 0_u32..9_000].prop_map(Happening::Waited),
+        1 => prop_oneof![Just(LinkNews::Silent), Just(LinkNews::Answers)].prop_map(Happening::Link),
+        1 => (0_u16..26, -100.0..2_000.0_f64).prop_map(|(node, mm)| Happening::Placed(node, mm)),
+        1 => train().prop_map(Happening::Distrusted),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn nobody_in_danger_is_told_to_move_but_to_be_found(happenings in vec(any_happening(), 1..80)) {
+        let mut watched = Watched::two();
+        let dog = &mut watched.dog;
+        let mut now = Timestamp::from_s(1.0);
+        let mut waiting = Vec::new();
+        // Trains in danger that have not been allowed to crawl yet.
+        let mut must_stand: BTreeSet<TrainId> = BTreeSet::new();
+        for happening in happenings {
+            now += TimeSpan::from_ms(5);
+            match happening {
+                Happening::Ordered(order) => {
+                    let _ = dog.order(now, order);
+                }
+                Happening::Reported(sensor) => {
+                    let report = Report { sensor: SensorId(sensor), poll_interval: Some(TimeSpan::from_ms(65)) };
+                    dog.handle_event(now, &Event { time: now, kind: EventKind::Sensor(report) });
+                }
+                Happening::Left if !waiting.is_empty() => {
+                    let kind = match waiting.remove(0) {
+                        Command::Speed { train, step } => EventKind::Speed { train, step },
+                        Command::Reverse { train } => EventKind::Reverse { train },
+                        Command::Turnout { turnout, curved } => EventKind::Turnout { turnout, curved },
+                        Command::PowerOff | Command::PowerOn => continue,
+                    };
+                    dog.handle_event(now, &Event { time: now, kind });
+                }
+                Happening::Left => {}
+                Happening::Waited(ms) => {
+                    let end = now + TimeSpan::from_ms(ms.into());
+                    for _ in 0..50 {
+                        match dog.next_timeout().filter(|at| *at <= end) {
+                            Some(at) => {
+                                now = now.max(at);
+                                dog.handle_timeout(now);
+                            }
+                            None => break,
+                        }
+                    }
+                    now = now.max(end);
+                    dog.handle_timeout(now);
+                }
+                Happening::Link(news) => dog.handle_link(now, news),
+                Happening::Placed(node, mm) => {
+                    let at = footplate_core::estimation::WayPoint { node: NodeId(node), way: Length::from_mm(mm) };
+                    dog.place(now, FIRST, at, Length::from_mm(5.0));
+                    if !dog.is_held(FIRST) {
+                        must_stand.remove(&FIRST);
+                    }
+                }
+                Happening::Distrusted(train) => dog.distrust(now, train),
+            }
+            while let Some(output) = dog.poll_output() {
+                match output {
+                    Output::Command(command) => {
+                        if let Command::Speed { train, step } = command {
+                            let stands = step == SpeedStep::STAND || !must_stand.contains(&train);
+                            prop_assert!(stands, "{train} is in danger and told {step}");
+                        }
+                        waiting.push(command);
+                    }
+                    Output::Notice(WatchdogNotice::Danger { train, stopped, why, .. }) => {
+                        prop_assert!(!why.to_string().is_empty());
+                        must_stand.insert(train);
+                        must_stand.extend(stopped);
+                    }
+                    Output::Notice(WatchdogNotice::Crawls { train, .. }) => {
+                        must_stand.remove(&train);
+                    }
+                    Output::Notice(notice @ (WatchdogNotice::Recovered { .. } | WatchdogNotice::Resumed { .. })) => {
+                        prop_assert!(!notice.to_string().is_empty());
+                        must_stand.retain(|train| dog.is_held(*train));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stop_that_does_not_leave_is_followed_by_the_power_within_a_second(
+        runs_for in 0.5..20.0_f64,
+        throttle in 4_u8..13,
+    ) {
+        let mut watched = Watched::one();
+        watched.go(FIRST, throttle);
+        watched.run(runs_for);
+        watched.world.is_silent = true;
+        watched.dog.distrust(watched.world.now, FIRST);
+        let asked = watched.world.now;
+        prop_assert!(watched.run_until(2.0, |watched| watched.power_off().is_some()));
+        prop_assert!(watched.power_off().is_some_and(|off| off - asked <= TimeSpan::from_ms(1_010)));
+    }
+
+    #[test]
+    fn a_train_that_no_contact_reports_is_told_to_stop(throttle in 5_u8..13, runs_for in 1.0..10.0_f64) {
+        let mut watched = Watched::one();
+        watched.go(FIRST, throttle);
+        watched.run(runs_for);
+        watched.world.dead = (0..12).map(SensorId).collect();
+        let stops = |watched: &Watched| {
+            watched.alarm().is_some()
+                && watched.told.iter().any(|(_, command)| {
+                    matches!(command, Command::Speed { train: FIRST, step: SpeedStep::STAND })
+                })
+        };
+        prop_assert!(watched.run_until(30.0, stops), "{:#?}", watched.said);
+    }
+}

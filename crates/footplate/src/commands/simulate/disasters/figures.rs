@@ -1,0 +1,70 @@
+//! What many runs of one kind come to.
+
+use serde_json::{Value, json};
+
+use super::kind::Kind;
+use super::scene::Outcomes;
+
+/// Figures of one kind of disaster.
+pub(super) struct Figures {
+    pub(super) kind: Kind,
+    pub(super) runs: usize,
+    /// Seconds until it was noticed and the way run until then (mm).
+    pub(super) noticed: Vec<[f64; 2]>,
+    /// Seconds until the train was known again.
+    pub(super) recovered: Vec<f64>,
+    /// As what: as before, rescaled, learnt anew.
+    pub(super) outcomes: [usize; 3],
+    pub(super) needed_person: usize,
+    /// Absolute errors of stops (mm).
+    pub(super) before: Vec<f64>,
+    pub(super) after: Vec<f64>,
+    pub(super) mishaps: usize,
+    pub(super) powered_off: usize,
+}
+
+impl Figures {
+    pub(super) fn of(kind: Kind, runs: &[&Outcomes]) -> Self {
+        let all = |of: fn(&Outcomes) -> &Vec<f64>| {
+            runs.iter().flat_map(|run| of(run)).map(|error| error.abs()).collect::<Vec<f64>>()
+        };
+        let counted = |name: &str| {
+            runs.iter().filter(|run| run.recovered.is_some_and(|(_, what)| what == name)).count()
+        };
+        Self {
+            kind,
+            runs: runs.len(),
+            noticed: runs.iter().filter_map(|run| run.noticed).collect(),
+            recovered: runs.iter().filter_map(|run| run.recovered).map(|(seconds, _)| seconds).collect(),
+            outcomes: ["as before", "rescaled", "learnt anew"].map(counted),
+            needed_person: runs.iter().filter(|run| run.needed_person).count(),
+            before: all(|run| &run.before),
+            after: all(|run| &run.after),
+            mishaps: runs.iter().map(|run| run.mishaps).sum(),
+            powered_off: runs.iter().filter(|run| run.powered_off).count(),
+        }
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let [as_before, rescaled, anew] = self.outcomes;
+        json!({
+            "kind": self.kind.key(), "runs": self.runs, "noticed": self.noticed.len(),
+            "noticed_s": both(self.noticed.iter().map(|[seconds, _]| *seconds)),
+            "run_until_then_mm": both(self.noticed.iter().map(|[_, mm]| *mm)),
+            "recovered": self.recovered.len(), "recovered_s": both(self.recovered.iter().copied()),
+            "as_before": as_before, "rescaled": rescaled, "learnt_anew": anew,
+            "needed_person": self.needed_person, "powered_off": self.powered_off, "mishaps": self.mishaps,
+            "stops_before": self.before.len(), "before_mm": both(self.before.iter().copied()),
+            "stops_after": self.after.len(), "after_mm": both(self.after.iter().copied()),
+        })
+    }
+}
+
+/// Median and 95th percentile.
+pub(super) fn both(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    let at = |part: f64| values.get((last as f64 * part).round() as usize).copied();
+    Some([at(0.5)?, at(0.95)?])
+}
