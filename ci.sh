@@ -173,7 +173,7 @@ step_browser() {
   local at="$TARGET/browser"
   [[ -d $at/node_modules/playwright-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT"
   cargo build --quiet --workspace --bins --profile test
-  FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/
+  FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/*.test.mjs
 }
 
 refresh_table() {

@@ -1,8 +1,11 @@
 //! The dashboard: what the running system looks like, live in a browser, and what is asked of it from there.
 //!
 //! ```text
+//! painter          makes all of it of what a driver knows
 //! picture  spans   what there is to see now; which rails a stretch of way covers
-//! board            where the control loop leaves pictures and lines, and finds what was asked; it never waits for anybody
+//! history          what was in the last minutes; `way_travelled` makes one number of places along a way
+//! model_picture    how a train moves, step by step
+//! board            where the control loop leaves all that, and finds what was asked; it never waits for anybody
 //! guard            who may ask: hosts, origins, a token beyond loopback
 //! server  stream   HTTP on a thread of its own; what one watcher is sent
 //! assets           the pages, inside the program
@@ -11,11 +14,16 @@
 mod assets;
 mod board;
 mod guard;
+mod history;
+mod model_picture;
+mod painter;
 mod picture;
 mod server;
 mod spans;
 mod stream;
+mod way_travelled;
 
 pub(crate) use board::{Answer, Board};
-pub(crate) use picture::{Painter, Picture, TrainTask};
+pub(crate) use painter::{Painter, TrainPassed};
+pub(crate) use picture::TrainTask;
 pub(crate) use server::{Dashboard, ServedAt};

@@ -14,7 +14,7 @@ function element(name, attributes, parent) {
 export const colourOf = (place) => `var(--t${place % COLOURS})`;
 
 export class Track {
-  #nodes = new Map(); #edges = new Map(); #legs = []; #contacts = new Map(); #layer; #trains = new Map(); #unit;
+  #nodes = new Map(); #edges = new Map(); #legs = []; #contacts = new Map(); #layer; #trains = new Map(); #unit; #picked;
 
   constructor(svg, layout) {
     const drawn = layout.nodes.filter((node) => node.point);
@@ -27,6 +27,7 @@ export class Track {
     this.#unit = side / 160;
     const margin = side * 0.04;
     this.whole = [left - margin, top - margin, width + 2 * margin, height + 2 * margin];
+    svg.style.aspectRatio = `${this.whole[2]} / ${this.whole[3]}`;
     const rails = element("g", { "stroke-width": this.#unit * 0.5 }, svg);
     for (const edge of layout.edges) {
       const ends = [this.#nodes.get(edge.from)?.point, this.#nodes.get(edge.to)?.point];
@@ -43,6 +44,8 @@ export class Track {
     this.#layer = element("g", {}, svg);
     const marks = element("g", {}, svg);
     this.#mark(drawn, marks);
+    this.#picked = element("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, svg);
+    this.#picked.style.display = "none";
   }
 
   #mark(drawn, marks) {
@@ -105,6 +108,7 @@ export class Track {
       const stroke = colourOf(place);
       const wide = this.#unit;
       parts = {
+        held: element("path", { class: "held", stroke, "stroke-width": wide * 1.2 }, this.#layer),
         haze: element("path", { class: "haze", stroke, "stroke-width": wide * 3 }, this.#layer),
         rests: element("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
         body: element("path", { class: "body", stroke, "stroke-width": wide * 1.4 }, this.#layer),
@@ -114,6 +118,7 @@ export class Track {
       parts.number.textContent = String(train.train);
       this.#trains.set(train.train, parts);
     }
+    parts.held.setAttribute("d", this.#path(train.held));
     parts.haze.setAttribute("d", this.#path(train.haze));
     parts.body.setAttribute("d", this.#path(train.body));
     parts.rests.setAttribute("d", this.#path(train.rests));
@@ -130,6 +135,15 @@ export class Track {
       parts.number.setAttribute("x", front[0]);
       parts.number.setAttribute("y", front[1] + this.#unit * 3.2);
     }
+  }
+
+  /** Marks the place that was picked; none if there is none. */
+  pick(place) {
+    const [, name, mm] = /^(.+?)(?:\+(\d+)mm)?$/.exec(place ?? "") ?? [];
+    const from = [...this.#edges.values()].find((edge) => this.#nodes.get(edge.from).name === name);
+    const at = from && this.point(from.id, Number(mm ?? 0));
+    this.#picked.style.display = at ? "" : "none";
+    if (at) this.#picked.setAttribute("d", `M${at[0] - this.#unit * 1.6} ${at[1]}h${this.#unit * 3.2}M${at[0]} ${at[1] - this.#unit * 1.6}v${this.#unit * 3.2}`);
   }
 
   /** The place nearest to a point of the drawing, as the prompt names it: from the last contact before it. */

@@ -1,5 +1,6 @@
 // Draws the charts of a run of odometry from the data inside the page, with what chart.js offers.
 
+const report = JSON.parse(document.getElementById("report").textContent);
 /** The run shown. */
 let run = report.runs[0];
 const SYNC = "odometry";

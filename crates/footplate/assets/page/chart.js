@@ -1,10 +1,11 @@
 // What charts of all pages have in common: colours, axes, keys, and drawing again when the page changes. uPlot draws
 // lines; error bars are drawn here.
 
-const report = JSON.parse(document.getElementById("report").textContent);
 /** Pixels of a chart's height; strips below a chart are lower. */
 const HEIGHT = 280;
 const STRIP = 190;
+/** Pixels between two ticks of an upright axis, in a strip and in a chart. */
+const [TIGHT, ROOMY] = [18, 30];
 /** Charts drawn so far, by figure, to be taken down when colours change. */
 const drawn = new Map();
 
@@ -113,16 +114,16 @@ function zoom(u, part) {
 
 const KEYS = "Arrow keys move along the values, plus and minus zoom, Escape shows all.";
 
-function onKey(u, event) {
+function onKey(u, event, zooms) {
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   const part = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   if (step) {
     const last = u.data[0].length - 1;
     pointAt(u, Math.min(Math.max((u.cursor.idx ?? (step > 0 ? -1 : last + 1)) + step, 0), last));
-  } else if (part) {
+  } else if (part && zooms) {
     zoom(u, part);
-  } else if (event.key === "Escape") {
+  } else if (event.key === "Escape" && zooms) {
     for (const one of together(u)) one.setData(one.data, true);
   } else {
     return;
@@ -130,29 +131,31 @@ function onKey(u, event) {
   event.preventDefault();
 }
 
-/** Puts a chart into a figure; `below` draws between grid and lines. */
-function chart(figure, { name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [] }) {
+/** Puts a chart into a figure; `below` draws between grid and lines. What it shows is zoomed unless something else decides it. */
+function chart(figure, {
+  name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, keys = KEYS,
+}) {
   const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
   const u = new uPlot({
     // Whole pixels would make stairs of a gentle slope.
     pxAlign: 0,
     width: figure.clientWidth - 2 * parseFloat(getComputedStyle(figure).paddingLeft), height,
     cursor: {
-      dataIdx: nearest, y: false, drag: { x: true, y: false }, points: { size: 9 },
+      dataIdx: nearest, y: false, drag: { x: zooms, y: false }, points: { size: 9 },
       ...(sync && { sync: { key: sync, scales: ["x", null] } }),
     },
     legend: { live: true },
     scales: { x: { time: false, ...range?.x }, y: { ...range?.y } },
-    axes: [axis(x.label, { incrs: ticks }), axis(y, { vertical: true })],
+    axes: [axis(x.label, { incrs: ticks }), axis(y, { vertical: true, space: height < HEIGHT ? TIGHT : ROOMY })],
     series: [{ label: x.label.split(" (")[0], value: x.value ?? withUnit(x.unit, x.digits) }, ...series],
     bands,
     hooks: { drawAxes: [...below, ...(zero ? [zeroLine] : [])], draw },
   }, data, figure);
   u.over.tabIndex = 0;
   u.over.setAttribute("role", "application");
-  u.over.setAttribute("aria-label", `${name}. ${KEYS}`);
-  u.over.addEventListener("keydown", (event) => onKey(u, event));
-  drawn.get(figure).push(u);
+  u.over.setAttribute("aria-label", `${name}. ${keys}`);
+  u.over.addEventListener("keydown", (event) => onKey(u, event, zooms));
+  drawn.set(figure, [...(drawn.get(figure) ?? []), u]);
   return u;
 }
 

@@ -1,5 +1,6 @@
 // Draws the charts of what is known of trains from the data inside the page, with what chart.js offers.
 
+const report = JSON.parse(document.getElementById("report").textContent);
 const trains = new Map(report.trains.map((train) => [String(train.calibration.train), train]));
 
 const APPROACHES = [

@@ -228,10 +228,16 @@ impl Arguments {
                 if let Spoken::Begun(train) = spoken {
                     beginnings.note(runtime.link(), train);
                 }
-                if let Some(ended) = ended(&spoken).filter(|_| self.json) {
+                if let Some(ended) = ended(&spoken) {
                     let truth = beginnings.error(runtime.link(), layout, ended);
-                    writeln!(output, "{}", serde_json::to_string(&ResultLine::of(layout, ended, truth))?)?;
-                    output.flush()?;
+                    let result = ResultLine::of(layout, ended, truth);
+                    if let Some(dashboard) = dashboard {
+                        dashboard.board.tell("ended", &result);
+                    }
+                    if self.json {
+                        writeln!(output, "{}", serde_json::to_string(&result)?)?;
+                        output.flush()?;
+                    }
                 }
             }
             if stage.is_over || !matches!(ending, Ended::Finished) {

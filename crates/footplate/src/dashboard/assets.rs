@@ -8,29 +8,44 @@ const POLICY: &str = "default-src 'none'; connect-src 'self'; img-src 'self' dat
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A file of the pages.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Asset {
     kind: &'static str,
     text: &'static str,
 }
 
-macro_rules! file {
-    ($kind:literal, $name:literal) => {
-        Asset { kind: $kind, text: include_str!(concat!("../../assets/dashboard/", $name)) }
+macro_rules! files {
+    ($path:ident: $($name:literal)+) => {
+        match $path {
+            $($name => include_str!(concat!("../../assets/dashboard/", $name)),)+
+            _ => return None,
+        }
     };
 }
 
 /// The file of a path.
 pub(super) fn asset(path: &str) -> Option<Asset> {
-    const HTML: &str = "text/html; charset=utf-8";
-    Some(match path {
-        "" | "index.html" => Asset { kind: HTML, text: include_str!("../../assets/dashboard/index.html") },
-        "dashboard.css" => file!("text/css; charset=utf-8", "dashboard.css"),
-        "dashboard.js" => file!("text/javascript; charset=utf-8", "dashboard.js"),
-        "track.js" => file!("text/javascript; charset=utf-8", "track.js"),
-        "view.js" => file!("text/javascript; charset=utf-8", "view.js"),
-        "words.js" => file!("text/javascript; charset=utf-8", "words.js"),
-        _ => return None,
-    })
+    let path = if path.is_empty() { "index.html" } else { path };
+    let text = match path {
+        "uplot.js" => include_str!("../../assets/vendor/uplot/uPlot.iife.min.js"),
+        "uplot.css" => include_str!("../../assets/vendor/uplot/uPlot.min.css"),
+        // Reports have the same text inside a module of their own, where nothing has to leave it.
+        "chart.js" => concat!(
+            include_str!("../../assets/page/chart.js"),
+            "\nexport { chart, colour, dots, line, rounded };\n"
+        ),
+        _ => files! { path:
+            "index.html" "dashboard.css" "dashboard.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
+            "german.js" "charts.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
+            "train_charts.js"
+        },
+    };
+    let kind = match path.rsplit_once('.') {
+        Some((_, "js")) => "text/javascript; charset=utf-8",
+        Some((_, "css")) => "text/css; charset=utf-8",
+        _ => "text/html; charset=utf-8",
+    };
+    Some(Asset { kind, text })
 }
 
 impl IntoResponse for Asset {

@@ -1,24 +1,30 @@
 //! Between the control loop and those who watch it: the loop leaves things here and never waits.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use footplate_core::TrainId;
+use footplate_core::calibration::motion::MotionModel;
 use serde::Serialize;
+use serde_json::json;
 use tokio::sync::{oneshot, watch};
 
-/// Lines that are kept for watchers who were away: a quarter of an hour of a busy railway.
-const LINES_KEPT: usize = 4_000;
+use super::history::{History, Sample};
+
+/// Happenings that are kept for watchers who were away: a quarter of an hour of a busy railway.
+const MOST_KEPT: usize = 4_000;
 /// Orders that can wait for the loop, which looks every few hundredths of a second: more come from no person.
 const MOST_WAITING: usize = 64;
 
-/// Something that was said, with its number.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Line {
-    /// One more than that of the line before.
+/// Something that happened, with its number. Many watchers are sent the same text.
+#[derive(Debug, Clone)]
+pub(super) struct Happening {
+    /// One more than that of the one before.
     pub(super) number: u64,
-    /// When, in seconds of the line's clock.
-    pub(super) t_s: f64,
-    pub(super) text: String,
+    /// What kind it is of: `line`, `passed`, `ended`.
+    pub(super) kind: &'static str,
+    /// As JSON.
+    pub(super) json: Arc<str>,
 }
 
 /// How an order was taken.
@@ -51,23 +57,25 @@ pub(super) struct TooMany;
 
 #[derive(Debug, Default)]
 struct Log {
-    lines: VecDeque<Line>,
+    happened: VecDeque<Happening>,
     /// The number of the next.
     next: u64,
 }
 
-/// Pictures, lines and orders.
+/// Pictures, what happened, what was, and orders.
 ///
-/// Pictures are views: one takes the place of the last, and who looks seldom sees few. Lines are kept, and whoever was
-/// away finds those that it missed, or is told how many are gone.
+/// Pictures are views: one takes the place of the last, and who looks seldom sees few. What happened is kept, and whoever was
+/// away finds what it missed, or is told how much is gone.
 #[derive(Debug)]
 pub(crate) struct Board {
     /// Tells lines of this session from those of another, which may have the same numbers.
     session: i64,
     picture: watch::Sender<Arc<str>>,
     log: Mutex<Log>,
-    /// The number of the next line, to wake those that wait for it.
+    /// The number of the next happening, to wake those that wait for it.
     written: watch::Sender<u64>,
+    histories: Mutex<BTreeMap<TrainId, History>>,
+    models: Mutex<BTreeMap<TrainId, Arc<MotionModel>>>,
     waiting: Mutex<VecDeque<Asked>>,
 }
 
@@ -78,6 +86,8 @@ impl Board {
             picture: watch::Sender::new("null".into()),
             log: Mutex::default(),
             written: watch::Sender::new(0),
+            histories: Mutex::default(),
+            models: Mutex::default(),
             waiting: Mutex::default(),
         })
     }
@@ -90,17 +100,46 @@ impl Board {
         }
     }
 
-    /// Says something to everybody.
+    /// Says a line to everybody.
     pub(crate) fn say(&self, t_s: f64, text: &str) {
+        self.tell("line", &json!({ "t_s": t_s, "text": text }));
+    }
+
+    /// Tells everybody that something happened.
+    pub(crate) fn tell(&self, kind: &'static str, what: &impl Serialize) {
+        let Ok(text) = serde_json::to_string(what) else { return };
         let mut log = lock(&self.log);
         let number = log.next;
         log.next += 1;
-        log.lines.push_back(Line { number, t_s, text: text.into() });
-        if log.lines.len() > LINES_KEPT {
-            log.lines.pop_front();
+        log.happened.push_back(Happening { number, kind, json: text.into() });
+        if log.happened.len() > MOST_KEPT {
+            log.happened.pop_front();
         }
         drop(log);
         self.written.send_replace(number + 1);
+    }
+
+    /// Adds to what was. Whoever reads it at this moment is not waited for: what is left over comes with the next.
+    pub(super) fn remember(&self, fresh: &mut Vec<(TrainId, Sample)>) {
+        let Ok(mut histories) = self.histories.try_lock() else { return };
+        for (train, sample) in fresh.drain(..) {
+            histories.entry(train).or_default().add(sample);
+        }
+    }
+
+    /// What was of a train; nothing if none of its number is driven.
+    pub(super) fn history(&self, train: TrainId) -> Option<History> {
+        lock(&self.histories).get(&train).cloned()
+    }
+
+    /// How a train moves is known better from now on.
+    pub(super) fn know(&self, model: &MotionModel) {
+        lock(&self.models).insert(model.train(), Arc::new(model.clone()));
+    }
+
+    /// How a train moves.
+    pub(super) fn model(&self, train: TrainId) -> Option<Arc<MotionModel>> {
+        lock(&self.models).get(&train).cloned()
     }
 
     /// The next thing that was asked for, until `None`.
@@ -130,23 +169,26 @@ impl Board {
         self.written.subscribe()
     }
 
-    /// What a line is called, so that a browser that was away can say up to where it has heard.
+    /// What a happening is called, so that a browser that was away can say up to where it has heard.
     pub(super) fn name_of(&self, number: u64) -> String {
         format!("{}-{number}", self.session)
     }
 
-    /// The number after that of a name; `None` for a line of another session.
+    /// The number after that of a name; `None` for one of another session.
     pub(super) fn number_after(&self, name: &str) -> Option<u64> {
         let (session, number) = name.rsplit_once('-')?;
         (session.parse() == Ok(self.session)).then_some(number.parse::<u64>().ok()?.saturating_add(1))
     }
 
-    /// The lines from a number on, and how many of them are gone.
-    pub(super) fn lines_from(&self, number: u64) -> (Vec<Line>, u64) {
+    /// What happened from a number on, and how much of it is gone.
+    pub(super) fn happened_from(&self, number: u64) -> (Vec<Happening>, u64) {
         let log = lock(&self.log);
-        let first = log.lines.front().map_or(log.next, |line| line.number);
+        let first = log.happened.front().map_or(log.next, |happening| happening.number);
         let lost = first.saturating_sub(number);
-        (log.lines.iter().filter(|line| line.number >= number).cloned().collect(), lost)
+        // Numbers have no gaps, so the place follows from the number.
+        let from =
+            usize::try_from(number.saturating_sub(first)).unwrap_or(usize::MAX).min(log.happened.len());
+        (log.happened.range(from..).cloned().collect(), lost)
     }
 }
 
@@ -162,16 +204,16 @@ mod tests {
     #[test]
     fn who_was_away_finds_what_was_said_and_how_much_is_gone() {
         let board = Board::new(7);
-        for number in 0..LINES_KEPT + 10 {
+        for number in 0..MOST_KEPT + 10 {
             board.say(number as f64, "a line");
         }
-        let (lines, lost) = board.lines_from(4);
-        assert_eq!((lines.len(), lost), (LINES_KEPT, 6));
-        assert_eq!(lines[0].number, 10);
-        assert_eq!(board.lines_from(LINES_KEPT as u64 + 10).0.len(), 0);
+        let (happened, lost) = board.happened_from(4);
+        assert_eq!((happened.len(), lost), (MOST_KEPT, 6));
+        assert_eq!(happened[0].number, 10);
+        assert_eq!(board.happened_from(MOST_KEPT as u64 + 10).0.len(), 0);
         assert_eq!(board.number_after(&board.name_of(12)), Some(13));
         assert_eq!(board.number_after("8-12"), None, "of another session");
-        assert_eq!(*board.written().borrow(), LINES_KEPT as u64 + 10);
+        assert_eq!(*board.written().borrow(), MOST_KEPT as u64 + 10);
     }
 
     #[test]

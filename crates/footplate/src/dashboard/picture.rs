@@ -3,17 +3,16 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
+use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, NodeKind};
-use footplate_core::{Length, SensorId, Timestamp, TrainId};
+use footplate_core::{Length, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
 
 use super::spans::{Span, spans};
 
 /// 95 % of a normal distribution lie within so many standard deviations.
-const PROMISED: f64 = 1.959_964;
-/// A contact is shown as just passed for so long (s).
-const FLASHES_S: f64 = 1.5;
+pub(super) const PROMISED: f64 = 1.959_964;
 /// What trains look like whose length nobody said: a short locomotive of the gauge (mm from the pickup's leading end).
 const NOSE: Length = Length::from_mm(20.0);
 const TAIL: Length = Length::from_mm(130.0);
@@ -31,16 +30,17 @@ pub(crate) struct TrainTask {
 
 /// One moment.
 #[derive(Debug, Serialize)]
-pub(crate) struct Picture {
-    t_s: f64,
-    trains: Vec<TrainPicture>,
-    turnouts: BTreeMap<u16, Option<&'static str>>,
+pub(super) struct Picture {
+    pub(super) t_s: f64,
+    pub(super) trains: Vec<TrainPicture>,
+    pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
     /// Contacts passed a moment ago, by the seconds since.
-    passed: BTreeMap<u16, f64>,
+    pub(super) passed: BTreeMap<u16, f64>,
 }
 
+/// One train at that moment.
 #[derive(Debug, Serialize)]
-struct TrainPicture {
+pub(super) struct TrainPicture {
     train: u16,
     step: u8,
     speed_mm_per_s: f64,
@@ -48,12 +48,28 @@ struct TrainPicture {
     at: Option<String>,
     half_mm: Option<f64>,
     at_rest: bool,
+    /// How far it has come since it was found.
+    way_mm: Option<f64>,
     body: Vec<Span>,
     haze: Vec<Span>,
+    /// Track that it holds, and nobody else may enter.
+    held: Vec<Span>,
     doing: Option<String>,
     target: Option<Spot>,
     promise_mm: Option<[f64; 3]>,
     rests: Vec<Span>,
+    if_stopped: Option<RestPicture>,
+}
+
+/// Where a train comes to rest if it is told to stop now.
+#[derive(Debug, Serialize)]
+struct RestPicture {
+    at: Option<String>,
+    /// From where it is now, and half the 95 % interval of single stops.
+    way_mm: f64,
+    half_mm: f64,
+    /// From now.
+    in_s: f64,
 }
 
 /// A point on the rails.
@@ -63,53 +79,14 @@ struct Spot {
     offset_mm: f64,
 }
 
-/// Paints pictures of what a driver knows.
-#[derive(Debug)]
-pub(crate) struct Painter {
-    passed: BTreeMap<SensorId, Timestamp>,
-}
-
-impl Painter {
-    pub(crate) const fn new() -> Self {
-        Self { passed: BTreeMap::new() }
-    }
-
-    /// A contact was passed.
-    pub(crate) fn passed(&mut self, sensor: SensorId, at: Timestamp) {
-        self.passed.insert(sensor, at);
-    }
-
-    /// The picture of a moment that is not before the last entry.
-    pub(crate) fn paint(
-        &self,
-        driver: &Driver,
-        tasks: &BTreeMap<TrainId, TrainTask>,
-        now: Timestamp,
-        began: Timestamp,
-    ) -> Picture {
-        let seconds_since = |at: Timestamp| (now - at).as_s();
-        let layout = driver.layout();
-        Picture {
-            t_s: millis((now - began).as_s()),
-            trains: driver.trains().map(|train| paint_train(driver, train, tasks.get(&train), now)).collect(),
-            turnouts: layout
-                .turnouts()
-                .map(|(turnout, _)| {
-                    let leg = driver.turnouts().get(turnout);
-                    (turnout.0, leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }))
-                })
-                .collect(),
-            passed: self
-                .passed
-                .iter()
-                .filter(|(_, at)| seconds_since(**at) < FLASHES_S)
-                .map(|(sensor, at)| (sensor.0, millis(seconds_since(*at))))
-                .collect(),
-        }
-    }
-}
-
-fn paint_train(driver: &Driver, train: TrainId, task: Option<&TrainTask>, now: Timestamp) -> TrainPicture {
+/// The picture of a train; `way` is how far it has come.
+pub(super) fn paint_train(
+    driver: &Driver,
+    train: TrainId,
+    task: Option<&TrainTask>,
+    now: Timestamp,
+    way: Option<Length>,
+) -> TrainPicture {
     let (layout, turnouts) = (driver.layout(), driver.turnouts());
     let located = driver.locate(train, now);
     let position = driver.position(train, now);
@@ -129,21 +106,40 @@ fn paint_train(driver: &Driver, train: TrainId, task: Option<&TrainTask>, now: T
         speed_mm_per_s: located.map_or(0.0, |located| tenths(located.speed.as_mm_per_s())),
         speed_half_mm_per_s: located
             .map_or(0.0, |located| tenths(PROMISED * located.speed_uncertainty.as_mm_per_s())),
-        at: located.and_then(|located| {
-            let landmark = driver.landmark(train, located.at)?;
-            let mm = landmark.offset.as_mm().round();
-            let name = layout.node_name(landmark.node);
-            Some(if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") })
-        }),
+        at: located.and_then(|located| name(driver, train, located.at)),
         half_mm: half.map(|half| tenths(half.as_mm())),
         at_rest: located.is_some_and(|located| located.at_rest),
+        way_mm: way.map(|way| tenths(way.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),
+        held: Vec::new(),
         doing: task.map(|task| task.text.clone()),
         target: place.map(|at| Spot { edge: at.edge.0, offset_mm: tenths(at.offset.as_mm()) }),
         promise_mm: promise.map(|promise| promise.map(|length| tenths(length.as_mm()))),
         rests: rests.unwrap_or_default(),
+        if_stopped: located
+            .filter(|located| !located.at_rest)
+            .and_then(|located| if_stopped(driver, train, located.at, now)),
     }
+}
+
+fn if_stopped(driver: &Driver, train: TrainId, from: WayPoint, now: Timestamp) -> Option<RestPicture> {
+    let rest = driver.stopped_at(train, now)?;
+    // A way that is counted from another contact is none that can be subtracted.
+    (rest.at.node == from.node).then(|| RestPicture {
+        at: name(driver, train, rest.at),
+        way_mm: tenths((rest.at.way - from.way).as_mm()),
+        half_mm: tenths(PROMISED * libm::hypot(rest.doubt.as_mm(), rest.scatter.as_mm())),
+        in_s: tenths((rest.time - now).as_s()),
+    })
+}
+
+/// A place to the millimetre.
+fn name(driver: &Driver, train: TrainId, at: WayPoint) -> Option<String> {
+    let landmark = driver.landmark(train, at)?;
+    let mm = landmark.offset.as_mm().round();
+    let name = driver.layout().node_name(landmark.node);
+    Some(if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") })
 }
 
 /// The layout as the browser draws it, once.
@@ -201,10 +197,10 @@ impl LayoutPicture {
 }
 
 /// Nothing that is drawn is known better.
-fn tenths(number: f64) -> f64 {
+pub(super) fn tenths(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }
 
-fn millis(seconds: f64) -> f64 {
+pub(super) fn millis(seconds: f64) -> f64 {
     (seconds * 1e3).round() / 1e3
 }

@@ -4,7 +4,9 @@
 //! GET  /                     the pages
 //! GET  /api/layout           the layout, with where to draw it
 //! GET  /api/picture          what there is to see now
-//! GET  /api/events           server-sent events: `picture`, `line`, `gap`; `Last-Event-ID` goes on from a line
+//! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `gap`; `Last-Event-ID` goes on
+//! GET  /api/trains/24/history   the last five minutes of a train
+//! GET  /api/trains/24/model     how it moves
 //! POST /api/orders           {"line": "stop 24 at C13+120mm"}: what the prompt understands
 //! POST /api/emergency-stop   {}: all trains stop, power off
 //! ```
@@ -23,14 +25,16 @@ use axum::response::sse::{KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use footplate_core::TrainId;
 use footplate_store::LayoutFile;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::net::TcpListener;
 
 use super::assets::asset;
 use super::board::{Answer, Board};
 use super::guard::Guard;
+use super::model_picture::ModelPicture;
 use super::picture::LayoutPicture;
 use super::stream::events;
 use crate::clock::now;
@@ -126,6 +130,8 @@ fn router(shared: Shared) -> Router {
         .route("/api/layout", get(layout))
         .route("/api/picture", get(picture))
         .route("/api/events", get(watch))
+        .route("/api/trains/{train}/history", get(history))
+        .route("/api/trains/{train}/model", get(model))
         .route("/api/orders", post(order))
         .route("/api/emergency-stop", post(emergency_stop))
         .route("/", get(|| page(Path(String::new()))))
@@ -170,6 +176,25 @@ async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
     let from = last.and_then(|last| shared.board.number_after(last)).unwrap_or(0);
     Sse::new(events(shared.board, from)).keep_alive(KeepAlive::default()).into_response()
+}
+
+/// A number in a path that is none of a train is none of a train that is driven.
+fn of_train<T: Serialize>(train: &str, found: impl FnOnce(TrainId) -> Option<T>) -> Response {
+    match train.parse().ok().and_then(|number| found(TrainId(number))) {
+        Some(found) => ([(header::CACHE_CONTROL, "no-store")], Json(found)).into_response(),
+        None => {
+            let says = format!("`{train}` is no train that is driven here; /api/picture lists them");
+            (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response()
+        }
+    }
+}
+
+async fn history(State(shared): State<Shared>, Path(train): Path<String>) -> Response {
+    of_train(&train, |train| shared.board.history(train).map(|history| history.columns()))
+}
+
+async fn model(State(shared): State<Shared>, Path(train): Path<String>) -> Response {
+    of_train(&train, |train| shared.board.model(train).map(|model| ModelPicture::of(&model)))
 }
 
 #[derive(Debug, Deserialize)]

@@ -59,6 +59,10 @@ fn covered(
         let Some(edge) = layout.edge(at.edge) else { break };
         let to = (at.offset + left).min(edge.length);
         found.push((at.edge, [at.offset, to]));
+        // What is left when an edge is not covered to its end is what was lost in rounding.
+        if to < edge.length {
+            break;
+        }
         left -= to - at.offset;
         let end = Position { edge: at.edge, offset: edge.length };
         match layout.advance(end, Length::ZERO, turnouts) {
@@ -88,5 +92,12 @@ mod tests {
         let sum: f64 = found.iter().map(|span| span.to_mm - span.from_mm).sum();
         assert!((sum - 780.0).abs() < 1.0, "{sum}");
         assert!(found.iter().any(|span| span.edge == id.0));
+        // However lengths are rounded, nothing is covered beyond: the last part is not an empty one of another edge.
+        for mm in 0..400 {
+            let at = Position { edge: id, offset: Length::from_mm(0.1 * f64::from(mm)) };
+            let found = spans(&layout, &turnouts, at, behind, Length::from_mm(20.3));
+            let last = found.last().expect("a span");
+            assert!(last.to_mm > last.from_mm, "{mm}: {found:?}");
+        }
     }
 }

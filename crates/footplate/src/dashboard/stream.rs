@@ -1,4 +1,4 @@
-//! What one watcher is sent: the newest picture whenever it is ready for one, and every line.
+//! What one watcher is sent: the newest picture whenever it is ready for one, and everything that happens.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -18,29 +18,23 @@ struct Watcher {
     board: Arc<Board>,
     pictures: watch::Receiver<Arc<str>>,
     written: watch::Receiver<u64>,
-    /// The number of the line that it is sent next.
-    next_line: u64,
+    /// The number of the happening that it is sent next.
+    next: u64,
     /// What waits to be sent.
     ready: std::collections::VecDeque<Event>,
     paced: tokio::time::Interval,
 }
 
-/// Events for one watcher, from a line on. A slow one gets fewer pictures; lines that are gone are counted in `gap`.
-pub(super) fn events(board: Arc<Board>, from_line: u64) -> impl Stream<Item = Result<Event, Infallible>> {
+/// Events for one watcher, from a number on. A slow one gets fewer pictures; happenings that are gone are counted in `gap`.
+pub(super) fn events(board: Arc<Board>, from: u64) -> impl Stream<Item = Result<Event, Infallible>> {
     let mut pictures = board.pictures();
     pictures.mark_changed();
     let mut written = board.written();
     written.mark_changed();
     let mut paced = tokio::time::interval(BETWEEN_PICTURES);
     paced.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    let watcher = Watcher {
-        board,
-        pictures,
-        written,
-        next_line: from_line,
-        ready: std::collections::VecDeque::new(),
-        paced,
-    };
+    let watcher =
+        Watcher { board, pictures, written, next: from, ready: std::collections::VecDeque::new(), paced };
     unfold(watcher, |mut watcher| async move {
         loop {
             if let Some(event) = watcher.ready.pop_front() {
@@ -49,7 +43,7 @@ pub(super) fn events(board: Arc<Board>, from_line: u64) -> impl Stream<Item = Re
             tokio::select! {
                 changed = watcher.written.changed() => {
                     changed.ok()?;
-                    watcher.gather_lines();
+                    watcher.gather();
                 }
                 changed = watcher.pictures.changed() => {
                     changed.ok()?;
@@ -63,18 +57,16 @@ pub(super) fn events(board: Arc<Board>, from_line: u64) -> impl Stream<Item = Re
 }
 
 impl Watcher {
-    fn gather_lines(&mut self) {
+    fn gather(&mut self) {
         self.written.mark_unchanged();
-        let (lines, lost) = self.board.lines_from(self.next_line);
+        let (happened, lost) = self.board.happened_from(self.next);
         if lost > 0 {
             self.ready.push_back(Event::default().event("gap").data(lost.to_string()));
         }
-        for line in lines {
-            self.next_line = line.number + 1;
-            if let Ok(text) = serde_json::to_string(&line) {
-                self.ready
-                    .push_back(Event::default().event("line").id(self.board.name_of(line.number)).data(text));
-            }
+        for happening in happened {
+            self.next = happening.number + 1;
+            let name = self.board.name_of(happening.number);
+            self.ready.push_back(Event::default().event(happening.kind).id(name).data(&*happening.json));
         }
     }
 }

@@ -23,6 +23,16 @@ export async function openPage(browser, address, options = {}) {
   return { page, complaints };
 }
 
+/** Opens a live page; what it complains of is collected. */
+export async function openQuietly(browser, address, options = {}) {
+  const page = await browser.newPage({ viewport: { width: 1300, height: 900 }, ...options });
+  const complaints = [];
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  await page.goto(address);
+  return { page, complaints };
+}
+
 /** How many different colours each chart's canvas shows: a blank one has a single one. */
 export const colours = (page) => page.$$eval(".uplot canvas", (all) => all.map((canvas) => {
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

@@ -2,44 +2,19 @@
 // emergency stop is one key, pages from elsewhere are turned away, and a server that comes back is found again.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync } from "node:fs";
 import { request } from "node:http";
-import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
-import { AT, launch } from "./browser.mjs";
+import { AT, launch, openQuietly } from "./browser.mjs";
+import { PATIENCE, calibratedStore, end, serve } from "./railway.mjs";
 
-const LINK = "sim:track-a?seed=7&speed=4";
 /** A stop that ends further off than this has missed its place: more than a train's length of doubt. */
 const MISSED_MM = 60;
-/** The longest that anything takes in a test: a lap of the track, at four times real time. */
-const PATIENCE = 60_000;
 
-const store = join(mkdtempSync(join(tmpdir(), "footplate-dashboard-")), "railway.db");
 let browser;
 let running;
-
-/** Starts the program; resolves with the address that it prints. */
-function serve(port) {
-  const child = spawn(process.env.FOOTPLATE, ["drive", "--link", LINK, "--train", "24", "--store", store, "--serve", String(port)], { stdio: ["ignore", "ignore", "pipe"] });
-  return new Promise((resolve, reject) => {
-    let said = "";
-    child.stderr.on("data", (text) => {
-      said += text;
-      const found = /the dashboard is at (http:\S+)/.exec(said);
-      if (found) resolve({ child, url: found[1], port: Number(new URL(found[1]).port) });
-    });
-    child.on("exit", () => reject(new Error(said)));
-  });
-}
-
-function end({ child }) {
-  const gone = new Promise((resolve) => child.on("exit", resolve));
-  child.kill("SIGTERM");
-  return gone;
-}
+let store;
 
 /** A request as no browser would send it; its status. */
 function ask(path, headers, body) {
@@ -56,8 +31,8 @@ function ask(path, headers, body) {
 const picture = async () => (await fetch(`${running.url}api/picture`)).json();
 
 before(async () => {
-  execFileSync(process.env.FOOTPLATE, ["calibrate", "--link", "sim:track-a?seed=7", "--layout", "track-a", "--train", "24", "--store", store], { stdio: "pipe" });
-  running = await serve(0);
+  store = calibratedStore("dashboard");
+  running = await serve(store, 0);
   browser = await launch();
 });
 
@@ -67,11 +42,7 @@ after(async () => {
 });
 
 test("a train is found, driven by clicking and stopped where it should, and stands at the space bar", async () => {
-  const page = await browser.newPage({ viewport: { width: 1300, height: 900 } });
-  const complaints = [];
-  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
-  page.on("pageerror", (error) => complaints.push(String(error)));
-  await page.goto(running.url);
+  const { page, complaints } = await openQuietly(browser, running.url);
   await page.waitForSelector(".train");
   await page.fill("#line", "turnout all straight");
   await page.click("#order button");
@@ -132,7 +103,7 @@ test("it fits a phone, in the dark and in German, and finds a server that comes 
   const { port } = running;
   await end(running);
   await page.waitForSelector("#connection.red", { timeout: PATIENCE });
-  running = await serve(port);
+  running = await serve(store, port);
   await page.waitForSelector("#connection.green", { timeout: PATIENCE });
   await page.close();
 });

@@ -1,6 +1,6 @@
 //! What a train shall not pass, whatever it was ordered, and places as whoever sets limits needs them.
 
-use crate::estimation::{Ground, WayPoint, place_of, way_to};
+use crate::estimation::{Ground, Rest, WayPoint, place_of, way_to};
 use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::Position;
@@ -42,8 +42,14 @@ impl Driver {
     /// entry.
     #[must_use]
     pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<WayPoint> {
+        Some(self.stopped_at(train, at)?.at)
+    }
+
+    /// The same with how sure that is, and when it stands.
+    #[must_use]
+    pub fn stopped_at(&self, train: TrainId, at: Timestamp) -> Option<Rest> {
         let train = self.trains.get(&train)?;
-        Some(train.locator.rest_if_stopped(self.track.ground(), &train.model, at)?.at)
+        train.locator.rest_if_stopped(self.track.ground(), &train.model, at)
     }
 
     /// How far a train reaches ahead of and behind the leading end of its pickup, whichever way it runs. Unless it is said,

@@ -17,7 +17,7 @@ use super::reader::Known;
 use super::script::{Step, step};
 use super::spoken::Spoken;
 use super::told::Tongue;
-use crate::dashboard::{Painter, Picture, TrainTask};
+use crate::dashboard::{Painter, TrainTask};
 use crate::witness::{Input, Listener};
 
 /// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
@@ -281,8 +281,8 @@ impl Conductor {
         step(line, known).err().map(|mistake| mistake.to_string())
     }
 
-    /// What there is to see now.
-    pub(super) fn picture(&self, painter: &Painter, now: Timestamp) -> Picture {
+    /// Shows what there is to see now.
+    pub(super) fn show(&self, painter: &mut Painter, now: Timestamp) {
         let task = |train: TrainId| {
             let order = self.driver.busy(train)?;
             let step = self.pending.get(&order)?;
@@ -296,7 +296,7 @@ impl Conductor {
             Some((train, TrainTask { text: step.text.clone(), target, promise }))
         };
         let tasks = self.trains.keys().copied().filter_map(task).collect();
-        painter.paint(&self.driver, &tasks, now, self.began.unwrap_or(now))
+        painter.paint(&self.driver, &tasks, now, self.began.unwrap_or(now));
     }
 
     /// A person says where a train stands.

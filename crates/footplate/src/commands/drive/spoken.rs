@@ -2,7 +2,9 @@
 
 use footplate_core::control::Promise;
 use footplate_core::track::Landmark;
-use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Length, TimeSpan, TrainId};
+
+use crate::dashboard::TrainPassed;
 
 /// Something to be said.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,8 +16,8 @@ pub(crate) enum Spoken {
         /// Where trains are, shortly.
         status: String,
     },
-    /// A train passed a contact at a time; for whoever draws it.
-    Passed(SensorId, Timestamp),
+    /// A train passed a contact; for whoever draws it.
+    Passed(TrainPassed),
     /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
     Begun(TrainId),
     /// An order has ended.

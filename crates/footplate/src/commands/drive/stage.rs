@@ -65,7 +65,7 @@ impl Watched {
         let elapsed = self.stopwatch.elapsed();
         if elapsed >= self.painted + BETWEEN_PICTURES {
             self.painted = elapsed;
-            self.board.show(&conductor.machine().picture(&self.painter, now));
+            conductor.machine().show(&mut self.painter, now);
         }
     }
 }
@@ -95,7 +95,7 @@ impl Stage {
     pub(super) fn new(lines: Option<Receiver<String>>, json: bool, dashboard: Option<&Dashboard>) -> Self {
         let watched = dashboard.map(|dashboard| Watched {
             board: Arc::clone(&dashboard.board),
-            painter: Painter::new(),
+            painter: Painter::new(&dashboard.board),
             stopwatch: Stopwatch::start(),
             painted: Duration::ZERO,
         });
@@ -119,9 +119,9 @@ impl Attendant<Witnessed<Conductor>> for Stage {
                 }
                 self.screen.say(&text, &status);
             }
-            Spoken::Passed(sensor, at) => {
+            Spoken::Passed(passed) => {
                 if let Some(watched) = &mut self.watched {
-                    watched.painter.passed(sensor, at);
+                    watched.painter.passed(passed);
                 }
             }
             Spoken::Over => self.is_over = true,

@@ -8,6 +8,7 @@ use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
 use crate::commands::drive::told::verb;
+use crate::dashboard::TrainPassed;
 
 impl Conductor {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
@@ -52,9 +53,9 @@ impl Conductor {
             DriveNotice::Planned(plan) => {
                 self.promises.insert(plan.order, plan.promise);
             }
-            DriveNotice::Passed { train, passed, .. } => {
-                let at = passed.window.middle();
-                self.outputs.push_back(Output::Notice(Spoken::Passed(passed.sensor, at)));
+            DriveNotice::Passed { train, passed, next } => {
+                let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
+                self.outputs.push_back(Output::Notice(Spoken::Passed(passed_by)));
                 self.learning.passed(*train, &self.driver, passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);

@@ -1,0 +1,44 @@
+// Charts that go on: drawn with what the reports draw with, and again when colours or widths change.
+
+import { chart } from "./chart.js";
+import { say } from "./words.js";
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+
+export class LiveChart {
+  #figure; #options; #u; #data; #watch; #again;
+
+  /** `options` makes the options of a chart, in the colours of the moment; `data` is what it shows at first. */
+  constructor(figure, options, data) {
+    this.#figure = figure;
+    this.#options = options;
+    this.#data = data;
+    this.#draw();
+    let width = figure.clientWidth;
+    this.#watch = new ResizeObserver(() => {
+      if (figure.clientWidth === width) return;
+      width = figure.clientWidth;
+      const padding = 2 * parseFloat(getComputedStyle(figure).paddingLeft);
+      this.#u.setSize({ width: width - padding, height: this.#u.height });
+    });
+    this.#watch.observe(figure);
+    this.#again = () => this.#draw();
+    dark.addEventListener("change", this.#again);
+  }
+
+  #draw() {
+    this.#u?.destroy();
+    this.#u = chart(this.#figure, { keys: say("chart-keys"), ...this.#options(), data: this.#data });
+  }
+
+  set(data) {
+    this.#data = data;
+    this.#u.setData(data);
+  }
+
+  close() {
+    this.#watch.disconnect();
+    dark.removeEventListener("change", this.#again);
+    this.#u.destroy();
+  }
+}

@@ -1,0 +1,71 @@
+// All that is heard of the running system: pictures as they come, and what has happened, for whichever page is open.
+
+import { get, withToken } from "./server.js";
+
+/** Lines, contacts and orders that are kept: as many as the server keeps. */
+const KEPT = 4000;
+
+/** Adds to a list that has an end. */
+function keep(list, item) {
+  list.push(item);
+  if (list.length > KEPT) list.splice(0, list.length - KEPT);
+}
+
+/**
+ * Says `state` (with `connecting`, `connected` or `lost`), `picture`, `line`, `passed`, `ended`, `gap`, and `anew` when
+ * another session has begun and nothing of before counts.
+ */
+export class Live extends EventTarget {
+  layout; picture; state = "connecting"; lines = []; passed = []; ended = [];
+  #session; #drawing = false;
+
+  async begin() {
+    this.layout = await get("/api/layout");
+    this.#listen();
+  }
+
+  #say(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  #stands(state) {
+    this.state = state;
+    this.#say("state", state);
+  }
+
+  /** What happened has a name of its session and its number: `1700000000-12`. */
+  #isOf({ lastEventId }) {
+    const session = lastEventId.slice(0, lastEventId.lastIndexOf("-"));
+    if (this.#session !== undefined && session !== this.#session) {
+      [this.lines, this.passed, this.ended] = [[], [], []];
+      this.#say("anew");
+    }
+    this.#session = session;
+  }
+
+  #listen() {
+    const events = new EventSource(withToken("/api/events"));
+    events.addEventListener("open", () => this.#stands("connected"));
+    events.addEventListener("error", () => this.#stands("lost"));
+    events.addEventListener("picture", (event) => {
+      this.picture = JSON.parse(event.data);
+      // One drawing a frame, of the newest picture.
+      if (!this.picture || this.#drawing) return;
+      this.#drawing = true;
+      requestAnimationFrame(() => {
+        this.#drawing = false;
+        this.#say("picture", this.picture);
+      });
+    });
+    const happens = (kind, list) => events.addEventListener(kind, (event) => {
+      this.#isOf(event);
+      const what = JSON.parse(event.data);
+      keep(this[list], what);
+      this.#say(kind, what);
+    });
+    happens("line", "lines");
+    happens("passed", "passed");
+    happens("ended", "ended");
+    events.addEventListener("gap", (event) => this.#say("gap", event.data));
+  }
+}

@@ -1,0 +1,133 @@
+// One train: how it has moved against what contacts reported, where it would stop, and what it can be told.
+
+import { TrainCharts } from "./train_charts.js";
+import { make, put, shown, signed } from "./dom.js";
+import { PickTrack } from "./pick_track.js";
+import { order } from "./server.js";
+import { say } from "./words.js";
+
+/** Contacts in the list; the charts show more. */
+const LISTED = 40;
+
+export function trainPage(root, live, number) {
+  const train = Number(number);
+  const $ = (selector) => root.querySelector(selector);
+  $("h2").textContent = say("train", train);
+  const charts = new TrainCharts(root, live, train);
+  const answer = $("#answer");
+
+  async function give(line) {
+    answer.className = "answer";
+    put(answer, say("sent", line));
+    try {
+      await order(line);
+    } catch (error) {
+      refused(say("unread", error.message));
+    }
+  }
+
+  function refused(text) {
+    answer.className = "answer bad";
+    put(answer, text);
+  }
+
+  const track = new PickTrack($("#track"), live.layout, (place) => {
+    put($("#picked"), place ? say("picked-for", place, train) : say("pick-hint"));
+    put($("#stop-at"), say("stop-here", place ?? "…"));
+    $("#stop-at").disabled = !place;
+    if (place) $("#arrive-at").value = place;
+  });
+
+  put($("#stop-at"), say("stop-here", "…"));
+  const slider = $("#step");
+  const told = $("#step-told");
+  let held = false;
+  slider.addEventListener("input", () => { held = true; put(told, slider.value); });
+  slider.addEventListener("change", () => { held = false; give(`speed ${train} ${slider.value}`); });
+  const by = (change) => () => {
+    const step = Math.min(Math.max(Number(slider.value) + change, 0), Number(slider.max));
+    slider.value = String(step);
+    give(`speed ${train} ${step}`);
+  };
+  $("#slower").addEventListener("click", by(-1));
+  $("#faster").addEventListener("click", by(1));
+  $("#stop").addEventListener("click", () => give(`stop ${train}`));
+  $("#reverse").addEventListener("click", () => give(`reverse ${train}`));
+  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}`));
+  const asks = (form, line) => $(form).addEventListener("submit", (event) => {
+    event.preventDefault();
+    give(line(new FormData(event.target)));
+  });
+  asks("#hold", (said) => `hold ${train} ${said.get("speed")}mm/s`);
+  asks("#follow", (said) => `follow ${train} behind ${said.get("leader")} by ${said.get("gap")}s`);
+  asks("#arrive", (said) => `arrive ${train} at ${said.get("at")} in ${said.get("in")}s`);
+  asks("#move", (said) => `move ${train} ${said.get("way")}mm`);
+
+  function leaders(picture) {
+    const others = picture.trains.map((other) => String(other.train)).filter((other) => other !== String(train));
+    const select = $("#leader");
+    if ([...select.options].map((option) => option.value).join() === others.join()) return;
+    select.replaceChildren(...others.map((other) => new Option(say("train", other), other)));
+    $("#follow").hidden = others.length === 0;
+  }
+
+  let due;
+  function list() {
+    const own = live.passed.filter((passed) => passed.train === train);
+    const rows = own.slice(-LISTED).reverse().map((passed) => make("tr", {},
+      make("th", { scope: "row" }, passed.contact),
+      make("td", { class: "number" }, passed.t_s.toFixed(2)),
+      make("td", { class: "number" }, passed.late_ms == null ? say("found") : `${signed(passed.late_ms)} ± ${shown(passed.late_half_ms)}`),
+      make("td", { class: "number" }, passed.short_mm == null ? "–" : signed(-passed.short_mm, 1)),
+      make("td", { class: "number" }, passed.mean == null ? "–" : shown(passed.mean[1])),
+      make("td", { class: "number" }, passed.missed > 0 ? String(passed.missed) : "–")));
+    $("#passed").replaceChildren(...rows);
+    due = own.at(-1)?.next;
+  }
+
+  function ends() {
+    const own = live.ended.filter((ended) => ended.train === train && ended.achieved);
+    const rows = own.slice(-LISTED).reverse().map((ended) => make("tr", {},
+      make("th", { scope: "row" }, `${say(`did-${ended.command}`)} ${ended.target ?? ""}`),
+      make("td", {}, ended.achieved),
+      make("td", { class: "number" }, ended.error_mm == null ? "–" : signed(ended.error_mm, 1)),
+      make("td", { class: "number" }, ended.promised_low_mm == null ? "–" : `${signed(ended.promised_low_mm)} … ${signed(ended.promised_high_mm)}`),
+      make("td", { class: "number" }, ended.true_error_mm == null ? "–" : signed(ended.true_error_mm, 1))));
+    $("#ends").replaceChildren(...rows);
+    $("#ended").hidden = rows.length === 0;
+  }
+
+  list();
+  ends();
+  $("#window").addEventListener("change", (event) => charts.shows(Number(event.target.value)));
+
+  return {
+    picture(picture) {
+      track.show(picture);
+      leaders(picture);
+      const own = picture.trains.find((one) => one.train === train);
+      $("#unknown").hidden = Boolean(own);
+      if (!own) return put($("#unknown"), say("no-such-train", train));
+      charts.goesOn(picture.t_s, own);
+      put($("#at"), own.at ? `${own.at} ± ${shown(own.half_mm)} mm` : say("nowhere"));
+      put($("#speed"), own.at ? `${shown(own.speed_mm_per_s)} ± ${shown(own.speed_half_mm_per_s)} mm/s` : "–");
+      put($("#busy"), own.doing ?? "–");
+      const rest = own.if_stopped;
+      put($("#if-stopped"), rest ? say("rest-way", shown(rest.way_mm), shown(rest.half_mm), rest.at ?? "?", shown(rest.in_s, 1)) : own.at_rest ? say("at-rest") : "–");
+      put($("#due"), due && !own.at_rest ? say("due-in", due.contact, shown(Math.max(due.t_s - picture.t_s, 0), 1), shown(due.half_ms)) : "–");
+      if (charts.highest) slider.max = String(charts.highest);
+      if (!held && document.activeElement !== slider) slider.value = String(own.step);
+      if (!held) put(told, String(own.step));
+    },
+    passed(passed) {
+      if (passed.train === train) { list(); charts.passed(passed); }
+    },
+    ended(ended) {
+      if (ended.train !== train) return;
+      if (ended.refused) refused(say("refused", ended.refused));
+      ends();
+    },
+    anew() { charts.anew(); list(); ends(); },
+    close: () => charts.close(),
+  };
+}

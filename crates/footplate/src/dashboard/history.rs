@@ -1,0 +1,95 @@
+//! What was of a train in the last minutes, for charts over time.
+
+use std::collections::VecDeque;
+
+use footplate_core::estimation::Located;
+use footplate_core::{Length, SpeedStep};
+use serde::Serialize;
+
+use super::picture::{PROMISED, millis, tenths};
+
+/// Five minutes at ten times a second. Older ones are dropped.
+const MOST_SAMPLES: usize = 3_000;
+
+/// One moment of a train. Intervals are 95 %.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    t_s: f64,
+    step: u8,
+    at: Option<Where>,
+}
+
+/// Where it was, if anybody knew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Where {
+    speed: f64,
+    speed_half: f64,
+    way: f64,
+    half: f64,
+}
+
+impl Sample {
+    /// A train that was told a step, and where it is and how far it has come, if that is known.
+    pub(super) fn of(t_s: f64, told: SpeedStep, located: Option<&Located>, way: Option<Length>) -> Self {
+        let at = located.zip(way).map(|(located, way)| Where {
+            speed: tenths(located.speed.as_mm_per_s()),
+            speed_half: tenths(PROMISED * located.speed_uncertainty.as_mm_per_s()),
+            way: tenths(way.as_mm()),
+            half: tenths(PROMISED * located.uncertainty.as_mm()),
+        });
+        Self { t_s: millis(t_s), step: told.get(), at }
+    }
+}
+
+/// The last minutes, oldest first.
+#[derive(Debug, Clone, Default)]
+pub(super) struct History(VecDeque<Sample>);
+
+/// The same, column by column.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Columns {
+    t_s: Vec<f64>,
+    step: Vec<u8>,
+    speed_mm_per_s: Vec<Option<f64>>,
+    speed_half_mm_per_s: Vec<Option<f64>>,
+    way_mm: Vec<Option<f64>>,
+    half_mm: Vec<Option<f64>>,
+}
+
+impl History {
+    pub(super) fn add(&mut self, sample: Sample) {
+        if self.0.len() == MOST_SAMPLES {
+            self.0.pop_front();
+        }
+        self.0.push_back(sample);
+    }
+
+    pub(super) fn columns(&self) -> Columns {
+        let mut columns = Columns::default();
+        for Sample { t_s, step, at } in &self.0 {
+            columns.t_s.push(*t_s);
+            columns.step.push(*step);
+            columns.speed_mm_per_s.push(at.map(|at| at.speed));
+            columns.speed_half_mm_per_s.push(at.map(|at| at.speed_half));
+            columns.way_mm.push(at.map(|at| at.way));
+            columns.half_mm.push(at.map(|at| at.half));
+        }
+        columns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_moments_are_dropped_and_the_newest_kept() {
+        let mut history = History::default();
+        for number in 0..MOST_SAMPLES + 10 {
+            history.add(Sample::of(number as f64, SpeedStep::STAND, None, None));
+        }
+        let columns = history.columns();
+        assert_eq!((columns.t_s.len(), columns.t_s[0]), (MOST_SAMPLES, 10.0));
+        assert_eq!(columns.t_s.last(), Some(&(MOST_SAMPLES as f64 + 9.0)));
+    }
+}

@@ -1,0 +1,77 @@
+//! How a train moves, as far as is known, for a chart of its speeds and one of its stops.
+
+use footplate_core::Approach;
+use footplate_core::SpeedStep;
+use footplate_core::calibration::motion::{MotionModel, StepUse, StopForecast};
+use serde::Serialize;
+
+use super::picture::{PROMISED, tenths};
+
+/// A motion model, step by step.
+#[derive(Debug, Serialize)]
+pub(super) struct ModelPicture {
+    train: u16,
+    highest: u8,
+    steps: Vec<StepPicture>,
+}
+
+/// A step as it is reached from one side. Intervals are 95 %.
+#[derive(Debug, Serialize)]
+struct StepPicture {
+    step: u8,
+    approach: &'static str,
+    /// `untried`, `moves` or `unreliable`.
+    uses: StepUse,
+    speed_mm_per_s: f64,
+    speed_half_mm_per_s: f64,
+    /// Contacts passed at it.
+    contacts: u32,
+    stop_mm: f64,
+    /// Of what is not known of the way to rest.
+    stop_doubt_half_mm: f64,
+    /// Of single stops: what is not known, and how they scatter.
+    stop_half_mm: f64,
+    stop_s: f64,
+    /// Stops measured from it.
+    stops: u32,
+}
+
+impl ModelPicture {
+    pub(super) fn of(model: &MotionModel) -> Self {
+        let steps = (1..=model.highest().get()).filter_map(SpeedStep::new);
+        let both = [(Approach::Below, "below"), (Approach::Above, "above")];
+        let step =
+            |step: SpeedStep| both.map(|(approach, name)| StepPicture::of(model, step, approach, name));
+        Self {
+            train: model.train().0,
+            highest: model.highest().get(),
+            // Nothing is faster than the highest step, so nobody comes to it from above.
+            steps: steps.flat_map(step).filter(|step| !step.is_above(model.highest())).collect(),
+        }
+    }
+}
+
+impl StepPicture {
+    fn of(model: &MotionModel, step: SpeedStep, approach: Approach, name: &'static str) -> Self {
+        let speed = model.speed(step, approach);
+        let StopForecast { distance, doubt, scatter, time, count } = model.stop(step, approach);
+        let both = libm::hypot(doubt.as_mm(), scatter.as_mm());
+        Self {
+            step: step.get(),
+            approach: name,
+            uses: model.uses(step),
+            speed_mm_per_s: tenths(speed.value.as_mm_per_s()),
+            speed_half_mm_per_s: tenths(PROMISED * speed.uncertainty.as_mm_per_s()),
+            contacts: speed.count,
+            stop_mm: tenths(distance.as_mm()),
+            stop_doubt_half_mm: tenths(PROMISED * doubt.as_mm()),
+            stop_half_mm: tenths(PROMISED * both),
+            stop_s: tenths(time.as_s()),
+            stops: count,
+        }
+    }
+
+    fn is_above(&self, highest: SpeedStep) -> bool {
+        self.step == highest.get() && self.approach == "above"
+    }
+}

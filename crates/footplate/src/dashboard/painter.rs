@@ -1,0 +1,191 @@
+//! Paints what a driver knows: the picture of now, what was along the way, and the contacts that trains passed.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use footplate_core::calibration::motion::MotionModel;
+use footplate_core::control::Driver;
+use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
+use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
+use serde::Serialize;
+
+use super::board::Board;
+use super::history::Sample;
+use super::picture::{PROMISED, Picture, TrainTask, millis, paint_train, tenths};
+use super::way_travelled::WayTravelled;
+
+/// A contact is shown as just passed for so long (s).
+const FLASHES_S: f64 = 1.5;
+/// How often it is kept where trains are: ten times a second.
+const BETWEEN_SAMPLES: TimeSpan = TimeSpan::from_ms(100);
+/// How often it is looked whether a train is known better.
+const BETWEEN_MODELS: TimeSpan = TimeSpan::from_ms(1_000);
+
+/// A train passed a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TrainPassed {
+    pub(crate) train: TrainId,
+    /// Beside what had been expected.
+    pub(crate) passed: PassedContact,
+    /// What comes next.
+    pub(crate) next: Option<DueContact>,
+}
+
+/// Leaves on a board what a driver knows.
+#[derive(Debug)]
+pub(crate) struct Painter {
+    board: Arc<Board>,
+    /// When each contact was passed last.
+    flashes: BTreeMap<SensorId, Timestamp>,
+    /// What has not been told yet.
+    fresh: Vec<TrainPassed>,
+    ways: BTreeMap<TrainId, WayTravelled>,
+    samples: Vec<(TrainId, Sample)>,
+    sampled: Option<Timestamp>,
+    models: BTreeMap<TrainId, MotionModel>,
+    looked_at_models: Option<Timestamp>,
+}
+
+/// A passed contact as the browser gets it.
+#[derive(Debug, Serialize)]
+struct PassedPicture<'l> {
+    train: u16,
+    contact: &'l str,
+    /// The middle of the time in which it closed, and the width of that.
+    t_s: f64,
+    window_ms: f64,
+    /// Later than predicted, and half the 95 % interval of that.
+    late_ms: Option<f64>,
+    late_half_ms: Option<f64>,
+    /// Short of the contact when it was predicted there.
+    short_mm: Option<f64>,
+    missed: usize,
+    /// How far the train has come.
+    way_mm: f64,
+    /// The mean speed since the contact before, by the surveyed length alone: when, and how much.
+    mean: Option<[f64; 2]>,
+    next: Option<DuePicture<'l>>,
+}
+
+/// The contact that is due.
+#[derive(Debug, Serialize)]
+struct DuePicture<'l> {
+    contact: &'l str,
+    t_s: f64,
+    half_ms: f64,
+}
+
+impl Painter {
+    pub(crate) fn new(board: &Arc<Board>) -> Self {
+        Self {
+            board: Arc::clone(board),
+            flashes: BTreeMap::new(),
+            fresh: Vec::new(),
+            ways: BTreeMap::new(),
+            samples: Vec::new(),
+            sampled: None,
+            models: BTreeMap::new(),
+            looked_at_models: None,
+        }
+    }
+
+    /// A train passed a contact.
+    pub(crate) fn passed(&mut self, passed: TrainPassed) {
+        self.flashes.insert(passed.passed.sensor, passed.passed.window.middle());
+        self.fresh.push(passed);
+    }
+
+    /// Leaves the picture of a moment that is not before the last entry, and what has become of it since.
+    pub(crate) fn paint(
+        &mut self,
+        driver: &Driver,
+        tasks: &BTreeMap<TrainId, TrainTask>,
+        now: Timestamp,
+        began: Timestamp,
+    ) {
+        for passed in std::mem::take(&mut self.fresh) {
+            self.tell_passed(driver, &passed, began);
+        }
+        let is_due = |last: Option<Timestamp>, between| last.is_none_or(|last| now - last >= between);
+        let is_sampled = is_due(self.sampled, BETWEEN_SAMPLES);
+        let mut trains = Vec::new();
+        for train in driver.trains() {
+            let located = driver.locate(train, now);
+            let way = located.map(|located| self.way(driver, train, located.at));
+            trains.push(paint_train(driver, train, tasks.get(&train), now, way));
+            if is_sampled {
+                let sample = Sample::of((now - began).as_s(), driver.told(train), located.as_ref(), way);
+                self.samples.push((train, sample));
+            }
+        }
+        if is_sampled {
+            self.sampled = Some(now);
+            self.board.remember(&mut self.samples);
+        }
+        if is_due(self.looked_at_models, BETWEEN_MODELS) {
+            self.looked_at_models = Some(now);
+            self.look_at_models(driver);
+        }
+        let seconds_since = |at: Timestamp| (now - at).as_s();
+        self.flashes.retain(|_, at| seconds_since(*at) < FLASHES_S);
+        self.board.show(&Picture {
+            t_s: millis((now - began).as_s()),
+            trains,
+            turnouts: driver
+                .layout()
+                .turnouts()
+                .map(|(turnout, _)| {
+                    let leg = driver.turnouts().get(turnout);
+                    (turnout.0, leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }))
+                })
+                .collect(),
+            passed: self.flashes.iter().map(|(sensor, at)| (sensor.0, millis(seconds_since(*at)))).collect(),
+        });
+    }
+
+    /// How far a train has come.
+    fn way(&mut self, driver: &Driver, train: TrainId, at: WayPoint) -> Length {
+        let way = self.ways.entry(train).or_insert_with(|| WayTravelled::from(at));
+        way.goes_on(driver.layout(), at)
+    }
+
+    fn tell_passed(&mut self, driver: &Driver, passed: &TrainPassed, began: Timestamp) {
+        let TrainPassed { train, passed, next } = passed;
+        let layout = driver.layout();
+        let time = passed.window.middle();
+        let since = |time: Timestamp| millis((time - began).as_s());
+        let Some(node) = layout.sensor_node(passed.sensor) else { return };
+        let at = WayPoint { node, way: Length::ZERO };
+        let way = self.ways.entry(*train).or_insert_with(|| WayTravelled::from(at));
+        let mean = way.passes(layout, node, time);
+        self.board.tell(
+            "passed",
+            &PassedPicture {
+                train: train.0,
+                contact: layout.sensor_name(passed.sensor),
+                t_s: since(time),
+                window_ms: tenths(passed.window.width().as_ms()),
+                late_ms: passed.late.map(|[late, _]| tenths(late.as_ms())),
+                late_half_ms: passed.late.map(|[_, doubt]| tenths(PROMISED * doubt.as_ms())),
+                short_mm: passed.short.map(|short| tenths(short.as_mm())),
+                missed: passed.missed,
+                way_mm: tenths(way.at_contact().as_mm()),
+                mean: mean.map(|(at, speed)| [since(at), tenths(speed.as_mm_per_s())]),
+                next: next.map(|next| DuePicture {
+                    contact: layout.sensor_name(next.sensor),
+                    t_s: since(next.time),
+                    half_ms: tenths(PROMISED * next.uncertainty.as_ms()),
+                }),
+            },
+        );
+    }
+
+    fn look_at_models(&mut self, driver: &Driver) {
+        for model in driver.trains().filter_map(|train| driver.model(train)) {
+            if self.models.get(&model.train()) != Some(model) {
+                self.models.insert(model.train(), model.clone());
+                self.board.know(model);
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+// The page of a train in a real browser: its curves are drawn and go on, it is told what to do from there, and what is
+// refused says why.
+
+import assert from "node:assert/strict";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
+import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
+
+/** A stop that ends further off than this has missed its place: more than a train's length of doubt. */
+const MISSED_MM = 60;
+
+let browser;
+let running;
+
+before(async () => {
+  running = await serve(calibratedStore("train"), 0);
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  if (running) await end(running);
+});
+
+const text = (page, selector) => page.locator(selector).textContent();
+const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
+
+test("a train runs at the step of its slider, and its curves show what contacts said", async () => {
+  const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`);
+  await say(running, "turnout all straight");
+  await page.waitForSelector("#pages a[aria-current][data-train='24']");
+  await until(page, () => document.querySelector("#step").max === "14");
+  await page.locator("#step").focus();
+  for (let step = 0; step < 8; step++) await page.keyboard.press("ArrowRight");
+  await until(page, () => document.querySelectorAll("#passed tr").length > 6 && document.querySelector("#step-told").textContent === "8");
+  assert.match(await text(page, "#at"), /^\S+ ± \d+ mm$/);
+  assert.match(await text(page, "#speed"), /^\d+ ± \d+ mm\/s$/);
+  assert.match(await text(page, "#due"), /^\S+ in [\d.]+ s ± \d+ ms$/);
+  assert.match(await text(page, "#if-stopped"), /^rests \d+ ± \d+ mm further, at \S+, in [\d.]+ s$/);
+  const drawn = await colours(page);
+  assert.equal(drawn.length, 5);
+  for (const [place, count] of drawn.entries()) assert.ok(count > 5, `chart ${place}: ${count} colours`);
+  await page.screenshot({ path: join(AT, "train.png"), fullPage: true });
+
+  // The page is opened anew and still knows what was: it asks the server for the last minutes.
+  await page.reload();
+  await until(page, () => document.querySelectorAll("#passed tr").length > 6);
+  const { t_s: times, way_mm: way } = await (await fetch(`${running.url}api/trains/24/history`)).json();
+  assert.equal(times.length, way.length);
+  assert.ok(times.at(-1) - times[0] > 10, `${times.length} moments`);
+  assert.ok(way.at(-1) > 1000, `${way.at(-1)} mm`);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test("it is stopped at a place on the track, and what cannot be done says why", async () => {
+  const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`);
+  await until(page, () => document.querySelectorAll("#passed tr").length > 0);
+  // A lap ahead, so that there is room to stop.
+  await until(page, () => document.querySelector("#passed th").textContent === "E7");
+  const spot = await page.locator("#track text", { hasText: "C13 C14" }).boundingBox();
+  await page.mouse.click(spot.x + spot.width / 2, spot.y + spot.height + 3);
+  await until(page, () => !document.querySelector("#stop-at").disabled);
+  await page.click("#stop-at");
+  await until(page, () => document.querySelectorAll("#ends tr").length > 0);
+  const row = await page.locator("#ends tr").first().locator("td").allTextContents();
+  const off = Number(row[3].replace("−", "-"));
+  assert.ok(Math.abs(off) < MISSED_MM, `${row}`);
+
+  await page.fill("#hold input", "4900");
+  await page.click("#hold button");
+  await until(page, () => /refused/.test(document.querySelector("#answer").textContent));
+  await page.fill("#arrive-at", "Z99");
+  await page.click("#arrive button");
+  await until(page, () => /Z99/.test(document.querySelector("#answer").textContent));
+  // The server said no to the last one, which a browser writes down as an error of the page.
+  assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
+  await page.close();
+});
+
+test("on a phone, in the dark and in German nothing is wider than the page", async () => {
+  const options = { viewport: { width: 390, height: 800 }, colorScheme: "dark", locale: "de-DE", hasTouch: true };
+  const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`, options);
+  await until(page, () => document.querySelectorAll("#passed tr").length > 0);
+  assert.equal(await width(page), 390);
+  assert.equal(await text(page, "#reverse"), "Wenden");
+  for (const count of await colours(page)) assert.ok(count > 1);
+  await page.screenshot({ path: join(AT, "train-phone.png"), fullPage: true });
+  await page.goto(`${running.url}#/train/7`);
+  await until(page, () => /Zug 7 wird hier nicht gefahren/.test(document.querySelector("#unknown").textContent));
+  assert.deepEqual(complaints.filter((complaint) => !/404/.test(complaint)), []);
+  await page.close();
+});
