@@ -83,7 +83,8 @@ pub(super) fn granted(
             return None;
         }
         let begin = start - room.behind;
-        let needs = way.needs(layout, begin, end);
+        // What it came over matters again only when it goes back.
+        let needs = way.needs(layout, if run.turns { begin } else { start }, end);
         let taken = way.footprint(layout, begin, end);
         let mut granted = GrantedRun { turns: run.turns, way, start, stop, begin, limit, end, needs, taken };
         // Its place is counted from the node behind it once it has turned around.

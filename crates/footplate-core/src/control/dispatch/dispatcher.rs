@@ -21,7 +21,7 @@ use super::parking::{PARKED, parking_places};
 use super::setting::Told;
 
 /// How often it looks what can be done while something waits to be.
-const LOOK: TimeSpan = TimeSpan::from_ms(200);
+pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
 
 /// Trains at rest that wait are looked at again after this long even if nothing has changed.
 const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
@@ -38,6 +38,8 @@ pub struct Dispatcher {
     pub(super) outputs: VecDeque<Output<DispatchNotice>>,
     /// Whether anything has changed since trains at rest were last looked at.
     pub(super) is_stirred: bool,
+    /// How often trains were moved only to have other places to begin from.
+    pub(super) shuffled: usize,
     looks_at: Option<Timestamp>,
     /// When it last looked at trains at rest.
     arranged: Option<Timestamp>,
@@ -58,6 +60,7 @@ impl Dispatcher {
             throwing: BTreeSet::new(),
             outputs: VecDeque::new(),
             is_stirred: true,
+            shuffled: 0,
             looks_at: None,
             arranged: None,
         };

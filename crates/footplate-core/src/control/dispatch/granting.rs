@@ -12,12 +12,13 @@ use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::{Length, Speed};
 
 use super::course::{GrantedRun, Room, granted};
-use super::dispatched_train::{Purpose, State};
+use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::footprint::Footprint;
 use super::itinerary::{Itinerary, Pace, Search};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
+use super::way::Way;
 
 /// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
 /// away, and the other will be gone soon.
@@ -28,6 +29,8 @@ const LONGER: f64 = 1.5;
 const LONGER_BY_S: f64 = 10.0;
 /// Who has waited so long is next: nobody else is granted what is on its way.
 const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
+/// When all trains at rest have waited so long and nobody runs, nothing that was looked for will be found.
+const STALLED: TimeSpan = TimeSpan::from_s(20.0);
 /// Who waits is looked at again after this long, whatever happens: much does that is nothing to it.
 const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
 /// From the end of a run until its train is taken to stand, and turning around: commands and margins of time.
@@ -78,8 +81,9 @@ impl Dispatcher {
             .filter_map(|train| Some((train.asked?.since, train.id)))
             .collect();
         waiting.sort_unstable();
-        let mut kept_free: Option<(TrainId, Proposal)> = None;
-        for (since, id) in waiting {
+        let mut kept_free: Option<Proposal> = None;
+        let mut all_wait = !waiting.is_empty();
+        for (since, id) in waiting.iter().copied() {
             if self
                 .trains
                 .get(&id)
@@ -95,9 +99,8 @@ impl Dispatcher {
             };
             let free = self.free_way(id, &start, &targets).filter(|free| {
                 let allowed = unobstructed * LONGER + LONGER_BY_S + (now - since).as_s();
-                let spares = kept_free
-                    .as_ref()
-                    .is_none_or(|(_, wish)| !free.runs.iter().any(|run| wish.meets(&run.taken)));
+                let spares =
+                    kept_free.as_ref().is_none_or(|wish| !free.runs.iter().any(|run| wish.meets(&run.taken)));
                 free.itinerary.seconds <= allowed && spares
             });
             if let Some(free) = free {
@@ -106,12 +109,18 @@ impl Dispatcher {
             }
             let Some(wish) = self.wish(id, &start, &targets) else { continue };
             self.waits(id, &wish);
-            if kept_free.is_none() {
-                self.make_room(now, id, &targets, &wish);
-                if now - since >= PATIENCE {
-                    kept_free = Some((id, wish));
-                }
+            self.make_room(now, id, &targets, &wish);
+            // Nothing is kept free for who has nobody to wait for.
+            let somebody_runs = self.trains.values().any(|train| !train.course.is_empty());
+            if now - since >= PATIENCE && kept_free.is_none() && somebody_runs {
+                kept_free = Some(wish);
             }
+        }
+        all_wait &= waiting.iter().all(|(since, id)| {
+            now - *since >= STALLED && self.trains.get(id).is_some_and(DispatchedTrain::rests)
+        });
+        if let (true, Some((_, id))) = (all_wait, waiting.first()) {
+            self.shuffle(now, *id);
         }
     }
 
@@ -145,13 +154,11 @@ impl Dispatcher {
         let train = self.trains.get(&id)?;
         let place = self.driver.position(id, now)?;
         let room = self.room(now, train);
-        let layout = self.driver.layout();
-        let near = layout.turnouts().filter(|(turnout, _)| self.driver.is_on(*turnout, now) == Some(id));
         let as_it_lies = |turnout| {
             let leg = self.driver.turnouts().get(turnout)?;
             Some(TurnoutNeed { turnout, leg, facing: true })
         };
-        let frozen = near.filter_map(|(turnout, _)| as_it_lies(turnout)).collect();
+        let frozen = self.driver.turnouts_under(id, now).into_iter().filter_map(as_it_lies).collect();
         Some(Start { place, room, pace: self.pace(id), pickup: train.lengths.pickup, frozen })
     }
 
@@ -177,11 +184,20 @@ impl Dispatcher {
         Search { layout: self.driver.layout(), pace: start.pace, clears, obstacles, frozen: &start.frozen }
     }
 
-    /// Where the leading end of the pickup would be if the train turned around.
+    /// Where the leading end of the pickup would be if the train turned around; `None` where it would back over points
+    /// that lie for the other leg. They gave way when it came, and would not when it goes.
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.driver.layout();
         let back = layout.reversed(start.place)?;
-        layout.advance(back, start.pickup, self.driver.turnouts()).ok()
+        let turned = layout.advance(back, start.pickup, self.driver.turnouts()).ok()?;
+        let (way, at) = Way::around(layout, self.driver.turnouts(), turned, start.room.behind, Length::ZERO);
+        let lies_otherwise = |need: TurnoutNeed| {
+            start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)
+        };
+        // Its place is counted from the node behind it: the turnout there has to lie as it does, too.
+        let own = layout.needs_of(turned.edge);
+        let needs = way.needs(layout, at - start.room.behind, at);
+        (!needs.into_iter().chain(own).any(|need| need.facing && lies_otherwise(need))).then_some(turned)
     }
 
     /// The way that a train would take if others made room for it in time; those that nobody can find do not.
@@ -246,13 +262,9 @@ impl Dispatcher {
     /// How far a train may come to rest beyond where it should, but for one time in a thousand.
     /// The place is no surer then than now if no contact comes on the way.
     pub(super) fn overrun(&self, id: TrainId, uncertainty: Length) -> Length {
-        let spread = |model: &MotionModel, step| {
-            let stop = model.stop(step, Approach::Below);
-            let parts = [stop.doubt, stop.scatter, PLACE.max(uncertainty)].map(Length::as_m);
-            Length::from_m(libm::sqrt(parts.iter().map(|part| part * part).sum()))
-        };
-        let model = self.driver.model(id);
-        let widest = model.and_then(|model| steps(model).map(|step| spread(model, step)).reduce(Length::max));
+        let place = PLACE.max(uncertainty).as_m();
+        let widest = self.driver.widest_stop(id);
+        let widest = widest.map(|widest| Length::from_m(libm::hypot(widest.as_m(), place)));
         let usual = widest.map_or(OVERRUNS[1], |widest| (widest * OVERRUN).max(OVERRUNS[0]).min(OVERRUNS[1]));
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
     }

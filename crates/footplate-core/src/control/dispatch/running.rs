@@ -8,7 +8,7 @@ use crate::units::Length;
 
 use super::course::{GrantedRun, SLACK};
 use super::dispatched_train::{Purpose, State};
-use super::dispatcher::Dispatcher;
+use super::dispatcher::{Dispatcher, LOOK};
 use super::footprint::Footprint;
 use super::notice::DispatchNotice;
 
@@ -154,11 +154,13 @@ impl Dispatcher {
 
     /// Takes back what was granted to a train at rest.
     pub(super) fn withdraw(&mut self, now: Timestamp, id: TrainId, why: Option<Refusal>) {
+        // The next way begins with the turnouts as they lie under it.
+        let is_in_its_own_way = why.as_ref().and_then(Refusal::occupier) == Some(id);
         if let Some(train) = self.trains.get_mut(&id) {
             train.course.clear();
             train.state = State::Resting;
             train.purpose = Purpose::Journey;
-            train.not_before = now + PAUSE;
+            train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
         self.driver.set_limit(now, id, None);
         self.hold_again(now, id);

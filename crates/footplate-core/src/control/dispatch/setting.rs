@@ -71,7 +71,8 @@ impl Dispatcher {
                         train.skipped.insert(need.turnout);
                     }
                 }
-                Err(why) if now - since > PATIENCE => {
+                // It stands too near itself: no waiting helps, but another way may.
+                Err(why) if why.occupier() == Some(id) || now - since > PATIENCE => {
                     self.withdraw(now, id, Some(why));
                     return false;
                 }

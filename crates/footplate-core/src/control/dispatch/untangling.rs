@@ -76,10 +76,58 @@ impl Dispatcher {
         if let Some(proposal) = self.propose(&start, &self.both_ways(place), &obstacles)
             && self.is_free(first, &proposal)
         {
-            let to = Landmark { node: self.node_before(place), offset: place.offset };
-            self.say(DispatchNotice::StepsAside { train: first, makes_room_for: id, to });
-            self.grant(now, first, Purpose::Aside, proposal);
+            self.send_aside(now, first, id, place, proposal);
         }
+    }
+
+    /// Nobody runs and no sequence of moves was found that helps: the trains at rest take turns in going somewhere else,
+    /// so that the next search begins from other places.
+    pub(super) fn shuffle(&mut self, now: Timestamp, id: TrainId) {
+        if self.trains.values().any(|train| !train.course.is_empty()) {
+            return;
+        }
+        let ready: Vec<TrainId> =
+            self.trains.values().filter(|train| train.is_ready(now)).map(|train| train.id).collect();
+        for nth in 0..ready.len() {
+            let turn = (self.shuffled + nth) % ready.len().max(1);
+            let Some(mover) = ready.get(turn).copied() else { continue };
+            if let Some((place, proposal)) = self.elsewhere(now, mover) {
+                self.shuffled += nth + 1;
+                self.say(DispatchNotice::Deadlock { train: id, moves: alloc::vec![mover] });
+                self.send_aside(now, mover, id, place, proposal);
+                return;
+            }
+        }
+    }
+
+    /// A place that a train at rest can go to now: each time another one of those that are soonest reached.
+    fn elsewhere(&self, now: Timestamp, id: TrainId) -> Option<(Position, Proposal)> {
+        let start = self.start(now, id)?;
+        let obstacles = self.obstacles_of_others(id);
+        let reached = self.search(&start, &obstacles).from(start.place, self.turned(&start));
+        let train = self.trains.get(&id)?;
+        let places = train.parking.iter().filter_map(|(place, is_clear)| {
+            let itinerary = reached.to(self.both_ways(*place).into_iter()).filter(|_| *is_clear)?;
+            let proposal = self.proposal(&start, itinerary)?;
+            self.is_free(id, &proposal).then_some((*place, proposal))
+        });
+        let mut places: Vec<(Position, Proposal)> = places.collect();
+        places.sort_by(|(_, one), (_, other)| one.itinerary.seconds.total_cmp(&other.itinerary.seconds));
+        let nth = self.shuffled.checked_rem(places.len())?;
+        (nth < places.len()).then(|| places.swap_remove(nth))
+    }
+
+    fn send_aside(
+        &mut self,
+        now: Timestamp,
+        id: TrainId,
+        makes_room_for: TrainId,
+        place: Position,
+        proposal: Proposal,
+    ) {
+        let to = Landmark { node: self.node_before(place), offset: place.offset };
+        self.say(DispatchNotice::StepsAside { train: id, makes_room_for, to });
+        self.grant(now, id, Purpose::Aside, proposal);
     }
 
     fn obstacles_of_others(&self, id: TrainId) -> Obstacles {

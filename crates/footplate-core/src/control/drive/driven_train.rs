@@ -1,8 +1,8 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
-use crate::calibration::motion::MotionModel;
+use crate::calibration::motion::{MotionModel, StepUse};
 use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint, landmark_of};
-use crate::event::{Command, Event, EventKind};
+use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
@@ -38,6 +38,8 @@ const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
 pub(super) struct DrivenTrain {
     pub(super) locator: Locator,
     pub(super) model: MotionModel,
+    /// One standard deviation of its widest stop from a step that moves it.
+    pub(super) widest_stop: Option<Length>,
     pub(super) task: Option<Task>,
     /// The step it was told last, whether or not that has left yet.
     pub(super) told: SpeedStep,
@@ -57,6 +59,7 @@ impl DrivenTrain {
     pub(super) fn new(model: MotionModel, locator: Locator) -> Self {
         Self {
             locator,
+            widest_stop: widest_stop(&model),
             model,
             task: None,
             told: SpeedStep::STAND,
@@ -66,6 +69,12 @@ impl DrivenTrain {
             reach: [TRAIN_REACH; 2],
             pacing: None,
         }
+    }
+
+    /// Puts something better in the place of what is known of how it moves.
+    pub(super) fn set_model(&mut self, model: MotionModel) {
+        self.widest_stop = widest_stop(&model);
+        self.model = model;
     }
 
     pub(super) const fn id(&self) -> TrainId {
@@ -379,4 +388,14 @@ impl DrivenTrain {
         let unseen = self.expected.unseen;
         out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
     }
+}
+
+fn widest_stop(model: &MotionModel) -> Option<Length> {
+    let steps = (1..=model.highest().get()).filter_map(SpeedStep::new);
+    let moves = steps.filter(|step| model.uses(*step) == StepUse::Moves);
+    let spread = |step| {
+        let stop = model.stop(step, Approach::Below);
+        Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
+    };
+    moves.map(spread).reduce(Length::max)
 }

@@ -88,7 +88,7 @@ impl Driver {
     /// Puts something better in its place.
     pub fn set_model(&mut self, model: MotionModel) {
         if let Some(train) = self.trains.get_mut(&model.train()) {
-            train.model = model;
+            train.set_model(model);
         }
     }
 

@@ -1,5 +1,7 @@
 //! What a train shall not pass, whatever it was ordered, and places as whoever sets limits needs them.
 
+use alloc::collections::BTreeSet;
+
 use crate::estimation::{Ground, Rest, WayPoint, place_of, way_to};
 use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::Timestamp;
@@ -10,7 +12,7 @@ use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::felt_way::counted_from;
 use super::order::OrderId;
-use super::turnout_guard::train_on;
+use super::turnout_guard::turnouts_under;
 
 impl Driver {
     /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is told to stop in time, by
@@ -60,10 +62,18 @@ impl Driver {
         }
     }
 
-    /// The train for which a turnout cannot be thrown now, because it is on it or will be.
+    /// One standard deviation of the widest stop that a train may make from a step that moves it; `None` if none is known
+    /// to.
     #[must_use]
-    pub fn is_on(&self, turnout: TurnoutId, now: Timestamp) -> Option<TrainId> {
-        train_on(&self.trains, self.track.ground(), now, turnout)
+    pub fn widest_stop(&self, train: TrainId) -> Option<Length> {
+        self.trains.get(&train)?.widest_stop
+    }
+
+    /// The turnouts that cannot be thrown now for this train.
+    #[must_use]
+    pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
+        let train = self.trains.get(&train);
+        train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.ground(), train, now))
     }
 
     /// The place of a train on the layout; `None` if nobody knows it.

@@ -144,6 +144,16 @@ pub enum Refusal {
     },
 }
 
+impl Refusal {
+    /// The train that is on a turnout that cannot be thrown for it.
+    pub(in crate::control) const fn occupier(&self) -> Option<TrainId> {
+        match self {
+            Self::TurnoutOccupied { train, .. } | Self::PartnerOccupied { train, .. } => Some(*train),
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,11 +1,12 @@
 //! No turnout is thrown under a train.
 
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::vec::Vec;
 
-use crate::estimation::{Ground, Located, place_of};
+use crate::estimation::{Ground, place_of};
 use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Position, Ways};
+use crate::track::{NodeKind, Position};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
@@ -18,6 +19,8 @@ pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 const CERTAIN: f64 = 4.0;
 /// From the order until the points lie: a poll and the command on the line, and the solenoid.
 const THROWING: TimeSpan = TimeSpan::from_ms(500);
+/// A place this near to the start of its edge is at the node there: sums of lengths are rounded.
+const AT_NODE: Length = Length::from_mm(1e-6);
 
 /// A train that is on a turnout as far as is known, or will be before it has been thrown.
 pub(super) fn train_on(
@@ -27,32 +30,55 @@ pub(super) fn train_on(
     turnout: TurnoutId,
 ) -> Option<TrainId> {
     let nodes = nodes_of_turnout(ground, turnout)?;
-    let on_it = |train: &DrivenTrain| {
-        train.located(ground, now).is_some_and(|located| is_near(ground, train, &located, nodes))
-    };
-    trains.values().find(|train| on_it(train)).map(DrivenTrain::id)
+    let on_it =
+        |train: &&DrivenTrain| nodes_under(ground, train, now).iter().any(|(under, _)| nodes.contains(under));
+    trains.values().find(on_it).map(DrivenTrain::id)
 }
 
-fn is_near(ground: Ground<'_>, train: &DrivenTrain, located: &Located, nodes: [NodeId; 2]) -> bool {
-    let Some(place) = place_of(ground, &train.model, located.at) else { return false };
+/// The turnouts that a train is on, or will be before they have been thrown.
+pub(super) fn turnouts_under(ground: Ground<'_>, train: &DrivenTrain, now: Timestamp) -> BTreeSet<TurnoutId> {
+    let turnout_at = |node| match ground.layout.node(node)?.kind {
+        NodeKind::Branch(turnout) | NodeKind::Merge(turnout) => Some(turnout),
+        _ => None,
+    };
+    nodes_under(ground, train, now).into_iter().filter_map(|(node, _)| turnout_at(node)).collect()
+}
+
+/// The nodes that a train is on, or will be soon, seen in either direction: it may come from the toe or from a leg.
+fn nodes_under(ground: Ground<'_>, train: &DrivenTrain, now: Timestamp) -> Vec<(NodeId, Length)> {
+    let mut under = Vec::new();
+    let located = train.located(ground, now);
+    let place = located.and_then(|located| place_of(ground, &train.model, located.at));
+    let (Some(located), Some(place)) = (located, place) else { return under };
     let [ahead, behind] = train.reach.map(|reach| reach + located.uncertainty * CERTAIN);
-    let ahead = ahead + located.speed * THROWING;
-    let within = |from: Position, to: Position, limit: Length| {
-        ground.layout.distance_ahead(from, to, ground.turnouts).is_some_and(|way| way <= limit)
-    };
-    // Either way along the rails: the train may be seen from the toe or from a leg.
-    let positions = || nodes.into_iter().flat_map(|node| starts_at(ground, node));
-    let back = ground.layout.reversed(place);
-    positions().any(|node| within(place, node, ahead) || within(node, place, behind))
-        || back.is_some_and(|back| positions().any(|node| within(back, node, behind)))
+    nodes_within(ground, place, (ahead + located.speed * THROWING).max(behind), &mut under);
+    if let Some(back) = ground.layout.reversed(place) {
+        nodes_within(ground, back, behind, &mut under);
+    }
+    under
 }
 
-/// A node as positions, one for each edge that leaves it.
-fn starts_at(ground: Ground<'_>, node: NodeId) -> impl Iterator<Item = Position> + use<'_> {
-    let edges = match ground.layout.ways(node) {
-        Ways::Ahead(edge) => [Some(edge), None],
-        Ways::Legs { straight, curved } => [Some(straight), Some(curved)],
-        Ways::Ended => [None, None],
-    };
-    edges.into_iter().flatten().map(|edge| Position { edge, offset: Length::ZERO })
+/// Adds the nodes ahead of a place that are no further than a limit, over turnouts that lie right or are unknown, each
+/// with how far it is from there.
+fn nodes_within(ground: Ground<'_>, from: Position, limit: Length, found: &mut Vec<(NodeId, Length)>) {
+    let Some(edge) = ground.layout.edge(from.edge) else { return };
+    let begin = found.len();
+    let mut open = alloc::vec![(edge.to, edge.length - from.offset)];
+    if from.offset <= AT_NODE {
+        open.push((edge.from, Length::ZERO));
+    }
+    while let Some((node, way)) = open.pop() {
+        let nearer = |(known, before): &(NodeId, Length)| *known == node && *before <= way;
+        if way > limit || found.iter().skip(begin).any(nearer) {
+            continue;
+        }
+        found.push((node, way));
+        for id in ground.layout.ways(node).edges() {
+            if let Some(next) = ground.layout.edge(id)
+                && ground.layout.needs_of(id).all(|need| ground.turnouts.allow(need))
+            {
+                open.push((next.to, way + next.length));
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::bail;
 use footplate_core::control::{DispatchNotice, Dispatcher, DriveNotice, Journey, Span, TrainLengths};
 use footplate_core::estimation::WayPoint;
-use footplate_core::track::{Landmark, Layout};
+use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingSwitches, Mishap};
 
@@ -104,7 +104,9 @@ impl<'l> Session<'l> {
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
                 });
-                if is_apart {
+                let is_off_turnouts =
+                    holds(&trains[nth]).is_some_and(|held| held.turnouts().next().is_none());
+                if is_apart && is_off_turnouts {
                     is_put = true;
                     break;
                 }
@@ -232,6 +234,7 @@ impl<'l> Session<'l> {
                 self.tally.intrusions.push((now, train));
                 if self.talk {
                     eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
+                    self.tell_truth(train);
                 }
             }
             if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
@@ -254,6 +257,27 @@ impl<'l> Session<'l> {
             };
             held.covers(id.stretch(), span, ROUNDING)
         })
+    }
+
+    /// What a train and the turnouts really do, where that is not what is believed.
+    fn tell_truth(&self, train: TrainId) {
+        let (truth, driver) = (self.rehearsal.world().truth(), self.dispatcher.driver());
+        let name = |edge| {
+            let edge = self.layout.edge(edge)?;
+            Some([edge.from, edge.to].map(|node| self.layout.node_name(node)).join(" to "))
+        };
+        let place = |place: Position| {
+            format!("{:.0} mm from {}", place.offset.as_mm(), name(place.edge).unwrap_or_default())
+        };
+        let really = truth.train(train).and_then(|train| train.position).map(place);
+        let believed = driver.position(train, self.rehearsal.line.now()).map(place);
+        eprintln!("          really {really:?}, believed {believed:?}");
+        for (turnout, _) in self.layout.turnouts() {
+            let (lies, known) = (self.rehearsal.world().lies(turnout), driver.turnouts().get(turnout));
+            if lies != known {
+                eprintln!("          turnout {turnout} lies {lies:?}, believed {known:?}");
+            }
+        }
     }
 
     /// A person reads off where a train stands.
