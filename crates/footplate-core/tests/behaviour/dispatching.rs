@@ -5,11 +5,12 @@ use std::sync::OnceLock;
 
 use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
-    DispatchNotice, Dispatcher, Driver, Footprint, Journey, Machine, Order, Output, Refusal, TrainLengths,
+    DispatchNotice, Dispatcher, Driver, Footprint, Journey, LinkNews, Machine, Order, Output, Refusal,
+    TrainLengths, WatchdogNotice,
 };
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Layout, Position, TurnoutStates};
-use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -41,6 +42,15 @@ struct Traffic {
 
 impl Traffic {
     fn new() -> Self {
+        Self::with(Dispatcher::new)
+    }
+
+    /// The same under a watchdog.
+    fn watched() -> Self {
+        Self::with(Dispatcher::watched)
+    }
+
+    fn with(dispatch: impl FnOnce(Timestamp, Driver) -> Dispatcher) -> Self {
         let [(node, mm), _] = STARTS;
         let mut world = ToyRailway::new(TRAINS[0].0, node, mm);
         let mut driver = Driver::new(world.layout.clone(), straight());
@@ -50,7 +60,7 @@ impl Traffic {
             driver.place(world.now, train, WayPoint { node, way: Length::from_mm(mm) }, Length::from_mm(2.0));
             world.put(train.0, name, mm);
         }
-        let mut dispatcher = Dispatcher::new(world.now, driver);
+        let mut dispatcher = dispatch(world.now, driver);
         for train in TRAINS {
             dispatcher.set_lengths(world.now, train, LENGTHS);
         }
@@ -193,4 +203,61 @@ proptest! {
         traffic.run(60.0);
         prop_assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
     }
+}
+
+#[test]
+fn a_journey_that_a_silent_station_interrupted_is_ended_once_the_train_has_been_found_again() {
+    let mut traffic = Traffic::watched();
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(2.5);
+    assert!(traffic.world.trains[0].speed_mm_per_s > 50.0);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Silent);
+    traffic.run(4.0);
+    assert!(traffic.world.trains[0].speed_mm_per_s < 1.0);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Answers);
+    traffic.run(200.0);
+    let watched = |wanted: fn(&WatchdogNotice) -> bool| {
+        let found =
+            |notice: &&DispatchNotice| matches!(notice, DispatchNotice::Watch(notice) if wanted(notice));
+        traffic.notices.iter().filter(found).count()
+    };
+    assert_eq!(watched(|notice| matches!(notice, WatchdogNotice::Danger { .. })), 1);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!(watched(|notice| matches!(notice, WatchdogNotice::Recovered { .. })), 1);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1);
+}
+
+#[test]
+fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_sent_somewhere_then() {
+    let mut traffic = Traffic::new();
+    traffic
+        .dispatcher
+        .order(traffic.world.now, Order::Speed { train: TRAINS[0], step: step(9) })
+        .expect("free");
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert!(traffic.world.trains[0].speed_mm_per_s < 1.0);
+    // The one that stood holds no more than where it stands: both can go their ways.
+    traffic.go(TRAINS[1], "D1+150mm");
+    traffic.run(60.0);
+    traffic.go(TRAINS[0], "A1+150mm");
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!((traffic.arrivals(TRAINS[0]), traffic.arrivals(TRAINS[1])), (1, 1), "{:#?}", traffic.notices);
+}
+
+#[test]
+fn nobody_is_sent_anywhere_while_a_train_stands_nobody_knows_where() {
+    let traffic = Traffic::new();
+    let mut driver = Driver::new(traffic.world.layout.clone(), straight());
+    TRAINS.into_iter().for_each(|train| driver.add_train(model(train)));
+    let node = traffic.world.layout.node_named("D1").expect("a node");
+    driver.place(traffic.world.now, TRAINS[0], WayPoint { node, way: Length::ZERO }, Length::from_mm(2.0));
+    let mut dispatcher = Dispatcher::new(traffic.world.now, driver);
+    let journey = Journey::to(traffic.world.layout.landmark("C1+150mm").expect("a place"));
+    let [known, other] = TRAINS;
+    let refused = dispatcher.go(traffic.world.now, known, journey);
+    assert_eq!(refused, Err(Refusal::OtherNowhere { train: known, other }));
+    let refused = dispatcher.go(traffic.world.now, other, journey);
+    assert_eq!(refused, Err(Refusal::Lost { train: other }));
 }

@@ -182,7 +182,7 @@ fn the_power_goes_off_when_a_train_does_not_stop() {
     watched.go(FIRST, 0);
     watched.run(6.0);
     // It should stand, and the contact ahead of it closes.
-    let ahead = watched.dog.driver().contact_ahead(FIRST, watched.world.now).expect("a contact");
+    let ahead = watched.dog.contact_ahead(FIRST, watched.world.now).expect("a contact");
     watched.world.close(ahead);
     watched.run(0.2);
     assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));

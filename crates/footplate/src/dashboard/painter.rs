@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::control::Driver;
+use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::board::Board;
 use super::history::Sample;
 use super::picture::{PROMISED, Picture, TrainTask, millis, paint_train, tenths};
+use super::spans::held_spans;
 use super::way_travelled::WayTravelled;
 
 /// A contact is shown as just passed for so long (s).
@@ -98,11 +99,12 @@ impl Painter {
     /// Leaves the picture of a moment that is not before the last entry, and what has become of it since.
     pub(crate) fn paint(
         &mut self,
-        driver: &Driver,
+        dispatcher: &Dispatcher,
         tasks: &BTreeMap<TrainId, TrainTask>,
         now: Timestamp,
         began: Timestamp,
     ) {
+        let driver = dispatcher.driver();
         for passed in std::mem::take(&mut self.fresh) {
             self.tell_passed(driver, &passed, began);
         }
@@ -112,7 +114,8 @@ impl Painter {
         for train in driver.trains() {
             let located = driver.locate(train, now);
             let way = located.map(|located| self.way(driver, train, located.at));
-            trains.push(paint_train(driver, train, tasks.get(&train), now, way));
+            let held = dispatcher.holds(train).map_or_else(Vec::new, held_spans);
+            trains.push(paint_train(driver, train, tasks.get(&train), now, way, held));
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), driver.told(train), located.as_ref(), way);
                 self.samples.push((train, sample));

@@ -79,13 +79,14 @@ struct Spot {
     offset_mm: f64,
 }
 
-/// The picture of a train; `way` is how far it has come.
+/// The picture of a train; `way` is how far it has come, `held` the track that it holds.
 pub(super) fn paint_train(
     driver: &Driver,
     train: TrainId,
     task: Option<&TrainTask>,
     now: Timestamp,
     way: Option<Length>,
+    held: Vec<Span>,
 ) -> TrainPicture {
     let (layout, turnouts) = (driver.layout(), driver.turnouts());
     let located = driver.locate(train, now);
@@ -112,7 +113,7 @@ pub(super) fn paint_train(
         way_mm: way.map(|way| tenths(way.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),
-        held: Vec::new(),
+        held,
         doing: task.map(|task| task.text.clone()),
         target: place.map(|at| Spot { edge: at.edge.0, offset_mm: tenths(at.offset.as_mm()) }),
         promise_mm: promise.map(|promise| promise.map(|length| tenths(length.as_mm()))),

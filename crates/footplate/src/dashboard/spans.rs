@@ -1,7 +1,8 @@
 //! Which rails a stretch of way covers, for a body, a haze or a reservation to be drawn on them.
 
+use footplate_core::control::Footprint;
 use footplate_core::track::{Layout, Position, TurnoutStates};
-use footplate_core::{EdgeId, Length};
+use footplate_core::{EdgeId, Length, StretchId};
 use serde::Serialize;
 
 /// A part of an edge.
@@ -22,6 +23,13 @@ impl Span {
 
 /// No drawing covers more edges: a lap of any layout in use.
 const MOST_EDGES: usize = 200;
+
+/// The rails that somebody holds.
+pub(super) fn held_spans(held: &Footprint) -> Vec<Span> {
+    // The first of the two edges of a stretch, from whose start its intervals are counted.
+    let first = |stretch: StretchId| EdgeId(2 * stretch.0);
+    held.spans().map(|(stretch, span)| Span::new(first(stretch), span.from, span.to)).collect()
+}
 
 /// What is covered from so far behind a place to so far ahead of it, as the turnouts lie; as much as there is track.
 pub(super) fn spans(

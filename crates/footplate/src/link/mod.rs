@@ -3,6 +3,7 @@
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`
 //! line        what every link can do, and what is heard of it
+//! news        what of that a watchdog wants to know
 //! open        an address becomes a link
 //! simulated   a virtual station in this process, as fast as it goes or paced
 //! served      a virtual station for other programs, at a network port or a pseudo-terminal
@@ -12,6 +13,7 @@
 
 mod address;
 mod line;
+mod news;
 mod open;
 mod served;
 mod simulated;
@@ -20,6 +22,7 @@ mod tapped;
 
 pub(crate) use address::{Address, SimulatedAddress, Speed, law_named, trains};
 pub(crate) use line::{Heard, Link, Lost};
+pub(crate) use news::news_of;
 pub(crate) use open::{module_count, open, open_simulated, session_settings, station};
 pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;

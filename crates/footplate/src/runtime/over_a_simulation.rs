@@ -191,3 +191,38 @@ fn two_trains_run_many_times_faster_than_real_time() {
     // The figure is the release build's; this only notices when something is badly wrong.
     assert!(times > 200.0, "{times:.0} times real time");
 }
+
+/// Asks for a time that has long passed, again and again.
+#[derive(Default)]
+struct Impatient {
+    woken: usize,
+}
+
+impl Machine for Impatient {
+    type Notice = ();
+
+    fn handle_event(&mut self, _: Timestamp, _: &Event) {}
+
+    fn handle_timeout(&mut self, _: Timestamp) {
+        self.woken += 1;
+    }
+
+    fn poll_output(&mut self) -> Option<Output<()>> {
+        None
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        Some(Timestamp::ZERO)
+    }
+}
+
+#[test]
+fn a_machine_that_asks_for_a_time_that_has_passed_does_not_stop_the_clock() {
+    let mut machine = Impatient::default();
+    with_runtime(None, |mut runtime| {
+        let end = runtime.link().now() + TimeSpan::from_s(10.0);
+        let ended = runtime.run(&mut machine, &mut Until(end, Vec::new())).expect("nothing is recorded");
+        assert!(matches!(ended, Ended::Finished));
+    });
+    assert!((1_000..=4_000).contains(&machine.woken), "{}", machine.woken);
+}

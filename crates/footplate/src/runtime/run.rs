@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use footplate_core::control::{Machine, Output};
-use footplate_core::{Event, Timestamp};
+use footplate_core::{Event, TimeSpan, Timestamp};
 use footplate_wire::marklin_serial::Interface;
 use footplate_wire::{Closing, LinkNotice, Session, Transmit};
 
@@ -12,6 +12,10 @@ use super::ending::{Ended, REOPEN_WITHIN_S, SECOND_CHANCE, WITHIN};
 use super::stop_flag::StopFlag;
 use crate::clock::Stopwatch;
 use crate::link::{Heard, Link, Lost};
+
+/// A machine that was woken and still asks for a time that has passed is woken again after this, so that time goes on
+/// whatever it asks for: as long as a byte takes on the line.
+const NEXT_WAKING: TimeSpan = TimeSpan::from_ms(5);
 
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
@@ -105,13 +109,13 @@ impl<'r, L: Link> Runtime<'r, L> {
                 }
                 eventful = true;
             }
-            if wakes.is_some_and(|at| now >= at) {
+            let is_woken = wakes.is_some_and(|at| now >= at);
+            if is_woken {
                 machine.handle_timeout(now);
-                eventful = true;
             }
-            if eventful {
+            if is_woken || eventful {
                 self.ask(machine, attendant);
-                wakes = machine.next_timeout();
+                wakes = next_waking(machine, now, is_woken);
             }
             if self.session.next_timeout().is_some_and(|at| now >= at) {
                 self.session.handle_timeout(now);
@@ -135,7 +139,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                     if wakes.is_some_and(|at| now >= at) {
                         machine.handle_timeout(now);
                         self.ask(machine, attendant);
-                        wakes = machine.next_timeout();
+                        wakes = next_waking(machine, now, true);
                     }
                     match heard {
                         Heard::Byte(byte) => self.session.handle_bytes(now, &[byte]),
@@ -261,6 +265,12 @@ impl<'r, L: Link> Runtime<'r, L> {
             }
         }
     }
+}
+
+/// When a machine is woken next, after it was just now or was not.
+fn next_waking<M: Machine>(machine: &M, now: Timestamp, is_woken: bool) -> Option<Timestamp> {
+    let asked = machine.next_timeout()?;
+    Some(if is_woken && asked <= now { now + NEXT_WAKING } else { asked })
 }
 
 /// Whether a notice puts the station in doubt or clears it.

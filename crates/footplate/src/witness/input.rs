@@ -1,7 +1,7 @@
 //! What a machine can be told, and the words for it in a recording.
 
 use footplate_core::Event;
-use footplate_core::control::Order;
+use footplate_core::control::{LinkNews, Order};
 use serde::de::DeserializeOwned;
 
 /// Something that a machine is told. All that it decides follows from how it began and these, in their order and at
@@ -18,6 +18,8 @@ pub(crate) enum Input {
     NoMoreLines,
     /// A program gave an order.
     Order(Order),
+    /// The station has fallen silent, or answers again.
+    Link(LinkNews),
     /// Nothing more: whoever ran it had enough. Not told to the machine; a recording without it was cut off.
     End,
 }
@@ -53,6 +55,8 @@ impl Input {
             // Numbers and names of variants have a form in JSON, so this cannot fail; an empty text would be no input.
             Self::Event(event) => ("event", serde_json::to_string(event).unwrap_or_default()),
             Self::Order(order) => ("order", serde_json::to_string(order).unwrap_or_default()),
+            Self::Link(LinkNews::Silent) => ("link", "silent".to_owned()),
+            Self::Link(LinkNews::Answers) => ("link", "answers".to_owned()),
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
@@ -68,6 +72,14 @@ impl Input {
         Ok(match kind {
             "event" => Self::Event(of_json(kind, text)?),
             "order" => Self::Order(of_json(kind, text)?),
+            "link" => match text {
+                "silent" => Self::Link(LinkNews::Silent),
+                "answers" => Self::Link(LinkNews::Answers),
+                _ => {
+                    let why = "it should be `silent` or `answers`".to_owned();
+                    return Err(InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why });
+                }
+            },
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
             "no-more-lines" => Self::NoMoreLines,
@@ -115,6 +127,8 @@ mod tests {
             Input::Timeout,
             Input::Line("stop 24 at C13+120mm  # näher".to_owned()),
             Input::NoMoreLines,
+            Input::Link(LinkNews::Silent),
+            Input::Link(LinkNews::Answers),
             Input::Order(Order::Stop(StopOrder {
                 aim: Aim::NotBeyond(Ratio::from_parts(0.001)),
                 ..StopOrder::at(train, Landmark { node: NodeId(7), offset: Length::from_m(0.1 + 0.2) })

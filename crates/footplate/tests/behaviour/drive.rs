@@ -166,3 +166,27 @@ fn lines_from_standard_input_are_carried_out_and_trains_stand_in_the_end() {
     assert!(output.contains("column 10: a step from 0 to 14 is missing after `24`"), "{output}");
     assert!(output.contains("found"), "{output}");
 }
+
+#[test]
+fn a_train_goes_where_it_is_sent_by_turnouts_and_reversals_and_is_told_by_hand_again() {
+    let learns =
+        "turnout all straight\nspeed 24 9\nwait 24 located\nwait 40s\nstop 24 at C13+120mm\nstop 24 at E7\n";
+    let script = format!("{learns}go 24 to A4+100mm\ngo 24 to C6+200mm\nmove 24 60mm\ngo 24 to EX1+0mm\n");
+    let run = drive("go", LINK, &script, &["--json"]);
+    let lines = lines(&run);
+    let went: Vec<_> = lines.iter().filter(|line| line["command"] == "go").collect();
+    assert_eq!(went.len(), 3, "{}{}", run.output, run.errors);
+    for line in &went[..2] {
+        let number = |field: &str| line[field].as_f64().unwrap_or_else(|| panic!("{field}: {line}"));
+        let width = number("promised_high_mm") - number("promised_low_mm");
+        assert!(number("true_error_mm").abs() < width && width < 400.0, "{line}");
+    }
+    assert!(run.errors.contains("train 24 has its way: about "), "{}", run.errors);
+    // With its front at the very end of the track there is no room to stop.
+    assert!(
+        went[2]["refused"].as_str().is_some_and(|why| why.starts_with("no way leads train 24 to `EX1`"))
+            && run.status == 1,
+        "{}",
+        went[2]
+    );
+}

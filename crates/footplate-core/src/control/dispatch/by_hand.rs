@@ -21,12 +21,38 @@ impl Dispatcher {
         let train = self.trains.get_mut(&id).ok_or(Refusal::UnknownTrain { train: id })?;
         train.asked = None;
         train.course.clear();
-        if !matches!(train.state, State::ByHand | State::Lost) {
+        if !matches!(train.state, State::ByHand | State::Lost | State::InDanger) {
             train.kept = train.held.clone();
             train.state = State::ByHand;
         }
         self.drive_by_hand(now, id);
         Ok(())
+    }
+
+    /// A train that was driven by hand is to be sent somewhere: it comes to rest first.
+    pub(super) fn give_back(&mut self, now: Timestamp, id: TrainId) {
+        if self.trains.get(&id).is_some_and(|train| train.state == State::ByHand)
+            && !self.rest_by_hand(now, id)
+        {
+            self.halt(now, id);
+        }
+    }
+
+    /// A train that was driven by hand and stands, with nothing more to do, holds no more than where it stands; whether it
+    /// does.
+    pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
+        let is_done = self.driver.stands(id, now) && self.driver.busy(id).is_none();
+        let is_known = self.driver.locate(id, now).is_some();
+        if is_done && is_known {
+            self.halted(now, id, true);
+        }
+        is_done && is_known
+    }
+
+    /// A train that nobody knew to be anywhere has passed a contact while it runs.
+    pub(super) fn found_by_hand(&mut self, now: Timestamp, id: TrainId) {
+        self.set_state(id, State::ByHand);
+        self.drive_by_hand(now, id);
     }
 
     /// Takes more of the track ahead, and lets go of what is behind.
@@ -43,7 +69,8 @@ impl Dispatcher {
             let taken = way.footprint(layout, at - room.behind, end + room.ahead);
             self.trains.values().all(|other| other.id == id || !other.held.meets(&taken))
         };
-        let mut end = (way.length() - room.ahead).min(at + AHEAD);
+        let reach = (way.length() - room.ahead).min(at + AHEAD);
+        let mut end = reach;
         while end > at && !is_free(end) {
             end -= EVERY;
         }
@@ -55,9 +82,13 @@ impl Dispatcher {
         }
         let mut held = way.footprint(layout, at - room.behind, end + room.ahead);
         self.take_anchors(now, id, place, &mut held);
-        let limit = way.place(end).and_then(|place| self.driver.way_point(id, located.at.node, place));
-        let limit = limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at);
-        self.driver.set_limit(now, id, Some(limit));
+        // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:
+        // whoever drives by hand sees it.
+        let limit = (end < reach).then(|| {
+            let limit = way.place(end).and_then(|place| self.driver.way_point(id, located.at.node, place));
+            limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
+        });
+        self.driver.set_limit(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

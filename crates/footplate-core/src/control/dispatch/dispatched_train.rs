@@ -47,6 +47,8 @@ pub(super) enum State {
     ByHand,
     /// Nobody knows where it is.
     Lost,
+    /// It is not as it was: its watchdog brings it back.
+    InDanger,
 }
 
 /// A train that is dispatched.
@@ -109,6 +111,11 @@ impl DispatchedTrain {
     /// Whether it stands and can be given something to do.
     pub(super) fn rests(&self) -> bool {
         self.state == State::Resting
+    }
+
+    /// Whether nobody else may throw a turnout because it was granted this, or stands there.
+    pub(super) fn keeps(&self, turnout: TurnoutId) -> bool {
+        self.state != State::ByHand && self.held.takes(turnout)
     }
 
     /// Whether that can be now.

@@ -3,7 +3,9 @@
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
+use crate::calibration::motion::MotionModel;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
+use crate::control::watch::{LinkNews, Watchdog, WatchdogNotice};
 use crate::control::{Machine, Output};
 use crate::estimation::WayPoint;
 use crate::event::Event;
@@ -29,7 +31,9 @@ const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
 /// Keeps trains apart, and sends them on their ways.
 #[derive(Debug, Clone)]
 pub struct Dispatcher {
-    pub(super) driver: Driver,
+    pub(super) driver: Watchdog,
+    /// Trains that were in danger and wait to be let crawl.
+    pub(super) crawlers: BTreeSet<TrainId>,
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
     /// How turnouts were told to lie, and how often and when last since anything said that they lay otherwise.
     pub(super) told: BTreeMap<TurnoutId, Told>,
@@ -49,12 +53,26 @@ impl Dispatcher {
     /// Dispatches the trains of a driver. Turnouts that it knows lie as it says.
     #[must_use]
     pub fn new(now: Timestamp, driver: Driver) -> Self {
+        Self::over(now, Watchdog::unwatched(driver, now))
+    }
+
+    /// The same with a [`Watchdog`] over the driver: while a train is in danger nobody sets out, and it is found and
+    /// measured again once all others stand.
+    #[must_use]
+    pub fn watched(now: Timestamp, driver: Driver) -> Self {
+        let mut watchdog = Watchdog::new(driver, now);
+        watchdog.ask_before_crawling();
+        Self::over(now, watchdog)
+    }
+
+    fn over(now: Timestamp, driver: Watchdog) -> Self {
         let layout = driver.layout();
         let lies = |turnout| Some((turnout, Told::sure(now, driver.turnouts().get(turnout)?)));
         let told = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
         let ids: Vec<TrainId> = driver.trains().collect();
         let mut dispatcher = Self {
             driver,
+            crawlers: BTreeSet::new(),
             trains: BTreeMap::new(),
             told,
             throwing: BTreeSet::new(),
@@ -72,7 +90,7 @@ impl Dispatcher {
 
     /// Says how long a train is. Until then it is taken for a long locomotive.
     pub fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
-        self.driver.set_reach(train, lengths.ahead(), lengths.behind());
+        self.driver.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
         let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
         known.lengths = lengths;
         let room = Room::of(lengths, PARKED, Length::ZERO);
@@ -87,7 +105,7 @@ impl Dispatcher {
 
     /// What drives the trains.
     #[must_use]
-    pub const fn driver(&self) -> &Driver {
+    pub fn driver(&self) -> &Driver {
         &self.driver
     }
 
@@ -101,6 +119,11 @@ impl Dispatcher {
     #[must_use]
     pub fn journey(&self, train: TrainId) -> Option<(OrderId, Journey)> {
         self.trains.get(&train)?.asked.map(|asked| (asked.order, asked.journey))
+    }
+
+    /// See [`Driver::set_model`].
+    pub fn set_model(&mut self, model: MotionModel) {
+        self.driver.set_model(model);
     }
 
     /// A person put a train there, or read off where it stands.
@@ -122,10 +145,17 @@ impl Dispatcher {
     pub fn go(&mut self, now: Timestamp, train: TrainId, journey: Journey) -> Result<OrderId, Refusal> {
         let layout = self.driver.layout();
         let place = layout.locate(journey.target, self.driver.turnouts()).map_err(Refusal::Place)?;
-        if !self.trains.contains_key(&train) {
-            return Err(Refusal::UnknownTrain { train });
+        let Some(known) = self.trains.get(&train) else { return Err(Refusal::UnknownTrain { train }) };
+        let is_nowhere =
+            |known: &DispatchedTrain| known.held.is_empty() && self.driver.locate(known.id, now).is_none();
+        if is_nowhere(known) {
+            return Err(Refusal::Lost { train });
         }
-        let order = self.driver.number();
+        if let Some(other) = self.trains.values().find(|other| is_nowhere(other)) {
+            return Err(Refusal::OtherNowhere { train, other: other.id });
+        }
+        self.give_back(now, train);
+        let order = self.driver.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
             known.asked = Some(Asked { order, journey, place, since: now });
             known.waits_said = false;
@@ -136,14 +166,35 @@ impl Dispatcher {
         Ok(order)
     }
 
-    /// Passes an order on to the driver. A turnout that a train holds is thrown for nobody else, and no train is driven
-    /// beyond what it holds: what lies ahead of it is taken as far as it is free, as the turnouts lie.
+    /// A person takes the power from the track, or gives it back; see [`Watchdog::switch_power`].
+    pub fn switch_power(&mut self, now: Timestamp, on: bool) {
+        self.driver.switch_power(now, on);
+        self.settle(now);
+    }
+
+    /// What is heard of the station's line; see [`Watchdog::handle_link`].
+    pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
+        self.driver.handle_link(now, news);
+        self.settle(now);
+    }
+
+    /// A train is not wanted at its destination any more. What it is granted it still runs.
+    pub fn call_off(&mut self, now: Timestamp, train: TrainId) {
+        if let Some(known) = self.trains.get_mut(&train) {
+            known.asked = None;
+        }
+        self.settle(now);
+    }
+
+    /// Passes an order on to the driver. A turnout that a train was granted is thrown for nobody else; ahead of one that is
+    /// driven by hand people throw them. No train is driven beyond what it holds: what lies ahead of it is taken as far as
+    /// it is free, as the turnouts lie.
     ///
     /// # Errors
     /// As [`Driver::order`], and if the turnout is held.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Order::Turnout { turnout, .. } = order
-            && let Some(holder) = self.trains.values().find(|train| train.held.takes(turnout))
+            && let Some(holder) = self.trains.values().find(|train| train.keeps(turnout))
         {
             return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
         }
@@ -212,14 +263,18 @@ impl Dispatcher {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                     Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                     Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                    Output::Notice(notice) => {
+                    Output::Notice(WatchdogNotice::Drive(notice)) => {
+                        self.say(DispatchNotice::Drive(notice.clone()));
                         self.hear(now, &notice);
-                        self.say(DispatchNotice::Drive(notice));
                     }
+                    Output::Notice(notice) => self.hear_of_danger(now, notice),
                 }
             }
             self.go_on(now);
-            if core::mem::take(&mut self.is_stirred) {
+            if self.let_crawl(now) {
+                continue;
+            }
+            if core::mem::take(&mut self.is_stirred) && !self.driver.has_danger() {
                 self.arranged = Some(now);
                 self.arrange(now);
                 continue;

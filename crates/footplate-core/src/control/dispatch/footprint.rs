@@ -74,6 +74,13 @@ impl Footprint {
         self.turnouts.extend(layout.never_curved_with(turnout));
     }
 
+    /// Takes part of an edge, counted from its start, and no turnout with it.
+    pub(super) fn take_rails(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
+        if let Some(span) = Span::on(layout, id, from, to) {
+            self.spans.entry(id.stretch()).or_default().push(span);
+        }
+    }
+
     /// Takes part of an edge, counted from its start, and the turnouts of which it is a leg if that comes near their toes.
     pub fn take(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         let Some(span) = Span::on(layout, id, from, to) else { return };

@@ -44,8 +44,9 @@ const SLOWEST: Speed = Speed::from_mm_per_s(60.0);
 const OVERRUN: f64 = 3.09 + 0.5;
 /// What is not known of the place at which a stop begins: contacts, survey and speed, one standard deviation.
 const PLACE: Length = Length::from_mm(10.0);
-/// An overrun is not taken for less, nor more: nothing is known so well, and no train should need more.
-const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(160.0)];
+/// An overrun is not taken for less, nor more: nothing is known so well, and a train that needs more is one of which
+/// nobody knows how it stops (its limit would stop it again and again if it were granted less than it needs).
+const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(1_200.0)];
 
 /// A way to somewhere with the track that it takes.
 #[derive(Debug, Clone)]
@@ -256,7 +257,7 @@ impl Dispatcher {
         let layout = self.driver.layout();
         let display = |landmark: Landmark| alloc::format!("{}", layout.display(landmark));
         let target = self.journey(id).map_or_else(Default::default, |(_, journey)| display(journey.target));
-        Refusal::NoWay { target, from: alloc::format!("train {id}"), unknown: None }
+        Refusal::Unreachable { train: id, target }
     }
 
     /// How far a train may come to rest beyond where it should, but for one time in a thousand.

@@ -28,7 +28,9 @@ impl Dispatcher {
             DriveNotice::Thrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
             DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
                 self.turnout_shown(now, *turnout, *curved);
-                self.diverged(now, *train);
+                if !self.driver.is_in_danger(*train) {
+                    self.diverged(now, *train);
+                }
             }
             DriveNotice::Passed { train, passed, .. } => {
                 let node = self.driver.layout().sensor_node(passed.sensor);

@@ -6,6 +6,7 @@
 
 mod by_hand;
 mod course;
+mod danger;
 mod dispatched_train;
 mod dispatcher;
 mod footprint;

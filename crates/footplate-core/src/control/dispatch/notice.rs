@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::control::drive::{DriveNotice, OrderId, Refusal};
+use crate::control::watch::WatchdogNotice;
 use crate::ids::TrainId;
 use crate::time::TimeSpan;
 use crate::track::Landmark;
@@ -13,6 +14,8 @@ use crate::units::Length;
 pub enum DispatchNotice {
     /// What the driver says.
     Drive(DriveNotice),
+    /// What its watchdog says.
+    Watch(WatchdogNotice),
     /// A train got all the track to its destination, or to where it steps aside to.
     RouteSet {
         /// The train.

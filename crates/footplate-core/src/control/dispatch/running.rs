@@ -32,7 +32,8 @@ impl Dispatcher {
                 State::Lost if self.driver.stands(id, now) && self.driver.position(id, now).is_some() => {
                     self.halted(now, id, true);
                 }
-                State::ByHand => self.drive_by_hand(now, id),
+                State::Lost if self.driver.position(id, now).is_some() => self.found_by_hand(now, id),
+                State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
                 _ => {}
             }
         }

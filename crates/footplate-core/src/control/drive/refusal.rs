@@ -55,6 +55,13 @@ pub enum Refusal {
         /// A turnout ahead of which nobody knows how it lies.
         unknown: Option<TurnoutId>,
     },
+    /// No way leads there from where the train stands, however turnouts are thrown and wherever it turns around.
+    Unreachable {
+        /// The train.
+        train: TrainId,
+        /// The target.
+        target: String,
+    },
     /// The train cannot come to rest so soon.
     TooNear {
         /// The target.
@@ -83,10 +90,26 @@ pub enum Refusal {
     },
     /// The station does not answer: nothing can be told.
     NoAnswer,
+    /// The power is off the track.
+    NoPower,
     /// Nobody knows where the train is.
     Lost {
         /// The train.
         train: TrainId,
+    },
+    /// Nobody knows where another train is, so that nothing can be kept clear of it.
+    OtherNowhere {
+        /// The train that was to be sent somewhere.
+        train: TrainId,
+        /// The train that nobody has seen yet.
+        other: TrainId,
+    },
+    /// No way to its destination has come free for so long.
+    NoFreeWay {
+        /// The train.
+        train: TrainId,
+        /// How long it was waited for.
+        within: TimeSpan,
     },
     /// The track ends ahead of the train, which has been stopped for that.
     TrackEnds {
@@ -161,6 +184,7 @@ impl fmt::Display for Refusal {
                 write!(f, "train {train} is held until the danger is over")
             }
             Self::NoAnswer => f.write_str("the station does not answer"),
+            Self::NoPower => f.write_str("the power is off the track: `power on` gives it back"),
             Self::UnknownTrain { train } => write!(f, "train {train} is not driven here"),
             Self::UnknownTurnout { turnout } => write!(f, "the layout has no turnout {turnout}"),
             Self::StepTooHigh { step, highest } => {
@@ -184,6 +208,11 @@ impl fmt::Display for Refusal {
             Self::NoWay { target, from, unknown: None } => {
                 write!(f, "no way leads from `{from}` to `{target}` as the turnouts lie")
             }
+            Self::Unreachable { train, target } => write!(
+                f,
+                "no way leads train {train} to `{target}`, however turnouts are thrown and wherever it turns around: \
+                 there may be no room to stop or to turn, or none to come to face that way"
+            ),
             Self::TooNear { target, nearest, beyond, round } => {
                 write!(
                     f,
@@ -204,6 +233,17 @@ impl fmt::Display for Refusal {
             Self::Lost { train } => write!(
                 f,
                 "nobody knows where train {train} is: let it run over a contact, as with `speed {train} 6`"
+            ),
+            Self::OtherNowhere { train, other } => write!(
+                f,
+                "train {train} can be kept clear of train {other} only once that has been found: let it run over a \
+                 contact, as with `speed {other} 6`, or say where it stands, as with `place {other} at C13`"
+            ),
+            Self::NoFreeWay { train, within } => write!(
+                f,
+                "no way has come free for train {train} within {:.0} s: move what stands in its way, or let trains \
+                 pass a contact whose places are uncertain",
+                within.as_s()
             ),
             Self::TrackEnds { train, end } => {
                 write!(f, "the track ends at `{end}` ahead of train {train}, which was stopped for that")

@@ -41,7 +41,7 @@ const LONGER_STOP: f64 = 1.5;
 impl Watchdog {
     /// A train is not as it was: it is stopped, with all that could meet it.
     pub(super) fn raise(&mut self, now: Timestamp, train: TrainId, why: Alarm) {
-        if self.dangers.contains_key(&train) {
+        if self.dangers.contains_key(&train) || !self.is_watching() {
             return;
         }
         let Some(model) = self.driver.model(train).cloned() else { return };
@@ -112,12 +112,8 @@ impl Watchdog {
         Some(rails_within(layout, place, stop.distance * LONGER_STOP + doubt, doubt))
     }
 
-    /// A train that crawls or is measured stays clear of all that stand. Who is above keeps trains apart by limits of its
-    /// own.
+    /// A train that crawls or is measured stays clear of all that stand. Who is above lets nobody else run meanwhile.
     pub(super) fn keep_clear(&mut self, now: Timestamp, train: TrainId) {
-        if !self.permits_all {
-            return;
-        }
         let layout = self.driver.layout();
         let others = self.driver.trains().filter(|other| *other != train);
         let taken: BTreeSet<EdgeId> = others
@@ -143,12 +139,16 @@ impl Watchdog {
 
     /// Takes the power from the track: the last thing that stops a train.
     pub(super) fn power_off(&mut self, now: Timestamp, for_train: TrainId) {
-        if self.power != Power::On {
-            return;
+        if self.power == Power::On {
+            self.say(WatchdogNotice::PowerOff { train: for_train });
+            self.cut_power(now);
         }
+    }
+
+    /// The power goes off the track, whoever wants that.
+    pub(super) fn cut_power(&mut self, now: Timestamp) {
         self.power = Power::Off { since: now };
         self.command(Command::PowerOff);
-        self.say(WatchdogNotice::PowerOff { train: for_train });
         // Everything stops, and decoders forget: what is told now is what they hear when they have power again.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
@@ -171,7 +171,7 @@ impl Watchdog {
     pub(super) fn power_on_again(&mut self, now: Timestamp) {
         let Power::Off { since } = self.power else { return };
         let told = self.driver.trains().all(|train| !self.stops.waits(train));
-        if now - since >= DEAD_AFTER && told && !self.is_silent() {
+        if now - since >= DEAD_AFTER && told && !self.is_silent() && !self.is_switched_off {
             self.power = Power::On;
             self.command(Command::PowerOn);
             self.say(WatchdogNotice::PowerOn);
@@ -181,8 +181,8 @@ impl Watchdog {
     /// When the power may come back.
     pub(super) fn power_due(&self) -> Option<Timestamp> {
         match self.power {
-            Power::Off { since } => Some(since + DEAD_AFTER),
-            Power::On => None,
+            Power::Off { since } if !self.is_switched_off => Some(since + DEAD_AFTER),
+            Power::Off { .. } | Power::On => None,
         }
     }
 

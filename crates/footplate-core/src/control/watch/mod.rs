@@ -12,12 +12,14 @@
 //! watchdog  notice           the machine; what it says
 //! alarm  vigil               what it raises; the tests at every contact
 //! danger  meeting  stops     what is stopped and held; what could meet; stops that have to be confirmed
+//! line                       the station's line, and power
 //! recovery                   where a train is on its way back
 //! remeasuring  trials        what is measured with it, and what follows
 //! ```
 
 mod alarm;
 mod danger;
+mod line;
 mod meeting;
 mod notice;
 mod recovery;
@@ -28,5 +30,6 @@ mod vigil;
 mod watchdog;
 
 pub use alarm::Alarm;
+pub use line::LinkNews;
 pub use notice::{Outcome, WatchdogNotice};
-pub use watchdog::{LinkNews, Watchdog};
+pub use watchdog::Watchdog;

@@ -393,7 +393,7 @@ impl Watchdog {
 
     fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
         // Nobody knows how far a move or a turn had got.
-        let can_go_on = !matches!(order, Order::Move { .. } | Order::Reverse { .. });
+        let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
         let resumed = if can_go_on { self.order(now, order).ok() } else { None };
         match resumed {
             Some(order) => self.say(WatchdogNotice::Resumed { train, interrupted: Some(id), order }),

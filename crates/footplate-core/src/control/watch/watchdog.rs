@@ -2,15 +2,16 @@
 
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
+use core::ops::Deref;
 
 use crate::calibration::motion::MotionModel;
 use crate::control::drive::{DriveNotice, Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
-use crate::estimation::{Located, Locator, WayPoint};
+use crate::estimation::{Locator, WayPoint};
 use crate::event::{Command, Event, EventKind};
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Position, TurnoutStates};
+use crate::track::Position;
 use crate::units::Length;
 
 use super::alarm::Alarm;
@@ -25,15 +26,6 @@ const REST_PART: f64 = 1.3;
 const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
 /// A train of which nobody knows how it moves stands after this (the longest of the published stops).
 const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
-
-/// What is heard of the station's line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LinkNews {
-    /// Nothing that was asked has been answered for a while, or nothing may be written.
-    Silent,
-    /// It answers, for the first time or again.
-    Answers,
-}
 
 /// Whether the track has power, as far as this machine has a say in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +43,7 @@ pub struct Watchdog {
     pub(super) stops: Stops,
     pub(super) power: Power,
     /// Since when the station has been silent.
-    silent: Option<Timestamp>,
+    pub(super) silent: Option<Timestamp>,
     /// Trains that are not as they were.
     pub(super) dangers: BTreeMap<TrainId, Recovery>,
     /// Trains that are held until the danger is over, with what they were doing.
@@ -62,7 +54,12 @@ pub struct Watchdog {
     pub(super) seen: BTreeMap<TrainId, Position>,
     /// Orders of the watchdog's own.
     own: BTreeMap<OrderId, TrainId>,
+    /// Nobody above keeps trains apart and gives orders anew.
     pub(super) permits_all: bool,
+    /// Whether it does more than to hand everything through.
+    is_watching: bool,
+    /// A person took the power from the track.
+    pub(super) is_switched_off: bool,
     pub(super) permitted: BTreeSet<TrainId>,
     /// When the clock was looked at last: nothing that was due until then is due again.
     looked: Timestamp,
@@ -85,6 +82,8 @@ impl Watchdog {
             seen: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
+            is_watching: true,
+            is_switched_off: false,
             permitted: BTreeSet::new(),
             looked: now,
         };
@@ -98,10 +97,10 @@ impl Watchdog {
         watchdog
     }
 
-    /// What it watches over: for looking only. What is told to it passes through the watchdog.
+    /// Watches over nothing: a driver as it is, in the place of one that is watched.
     #[must_use]
-    pub const fn driver(&self) -> &Driver {
-        &self.driver
+    pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
+        Self { is_watching: false, ..Self::new(driver, now) }
     }
 
     /// The driver itself, for what the watchdog does not look at. Whoever orders trains there does so unwatched.
@@ -121,12 +120,6 @@ impl Watchdog {
         self.driver.add_located(model, locator);
     }
 
-    /// See [`Driver::model`].
-    #[must_use]
-    pub fn model(&self, train: TrainId) -> Option<&MotionModel> {
-        self.driver.model(train)
-    }
-
     /// See [`Driver::set_model`]. What a recovery finds takes its place.
     pub fn set_model(&mut self, model: MotionModel) {
         if !self.dangers.contains_key(&model.train()) {
@@ -134,38 +127,9 @@ impl Watchdog {
         }
     }
 
-    /// See [`Driver::trains`].
-    pub fn trains(&self) -> impl Iterator<Item = TrainId> {
-        self.driver.trains()
-    }
-
-    /// See [`Driver::layout`].
-    #[must_use]
-    pub const fn layout(&self) -> &Layout {
-        self.driver.layout()
-    }
-
-    /// See [`Driver::turnouts`].
-    #[must_use]
-    pub const fn turnouts(&self) -> &TurnoutStates {
-        self.driver.turnouts()
-    }
-
-    /// See [`Driver::locate`].
-    #[must_use]
-    pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {
-        self.driver.locate(train, now)
-    }
-
-    /// See [`Driver::stands`].
-    #[must_use]
-    pub fn stands(&self, train: TrainId, now: Timestamp) -> bool {
-        self.driver.stands(train, now)
-    }
-
-    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery unless it has to be permitted.
+    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
     pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
-        if !self.permits_all || !self.dangers.contains_key(&train) {
+        if !self.dangers.contains_key(&train) {
             self.driver.set_limit(now, train, limit);
             self.drain(now);
         }
@@ -194,18 +158,20 @@ impl Watchdog {
         self.dangers.contains_key(&train) || self.held.contains_key(&train)
     }
 
-    /// Whether the track has power, as far as this machine has a say in it.
+    /// Whether any train is in danger: until none is, nobody knows what it may run into.
     #[must_use]
-    pub fn is_powered(&self) -> bool {
-        self.power == Power::On
+    pub fn has_danger(&self) -> bool {
+        !self.dangers.is_empty()
     }
 
-    pub(super) const fn is_silent(&self) -> bool {
-        self.silent.is_some()
+    /// Whether a train is in danger.
+    #[must_use]
+    pub fn is_in_danger(&self, train: TrainId) -> bool {
+        self.dangers.contains_key(&train)
     }
 
     /// Somebody above keeps trains apart: from now on a train in danger asks before it crawls, see
-    /// [`permit`](Self::permit).
+    /// [`permit`](Self::permit), and nothing that was interrupted is gone on with by itself.
     pub const fn ask_before_crawling(&mut self) {
         self.permits_all = false;
     }
@@ -240,8 +206,11 @@ impl Watchdog {
             if !stops && (self.is_held(train) || self.could_meet(now, train)) {
                 return Err(Refusal::InDanger { train });
             }
-            if !stops && (self.is_silent() || !self.is_powered()) {
+            if !stops && self.is_silent() {
                 return Err(Refusal::NoAnswer);
+            }
+            if !stops && !self.is_powered() {
+                return Err(Refusal::NoPower);
             }
         }
         let id = self.driver.order(now, order)?;
@@ -257,32 +226,6 @@ impl Watchdog {
         }
         self.act(now);
         Ok(id)
-    }
-
-    /// What is heard of the station's line.
-    pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
-        match news {
-            LinkNews::Silent if self.silent.is_none() => {
-                self.silent = Some(now);
-                let trains: Vec<TrainId> = self.driver.trains().collect();
-                for train in trains {
-                    if self.driver.told(train) > SpeedStep::STAND || !self.driver.stands(train, now) {
-                        self.raise(now, train, Alarm::LinkSilent);
-                    }
-                }
-            }
-            LinkNews::Silent => {}
-            LinkNews::Answers => {
-                if self.silent.take().is_some() {
-                    // Who knows what of it has been heard: everything stands, and is told so once more.
-                    let trains: Vec<TrainId> = self.driver.trains().collect();
-                    for train in trains {
-                        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
-                    }
-                }
-            }
-        }
-        self.act(now);
     }
 
     /// An order of the watchdog's own.
@@ -312,9 +255,9 @@ impl Watchdog {
     }
 
     /// Everything that follows from what has just been heard.
-    fn act(&mut self, now: Timestamp) {
+    pub(super) fn act(&mut self, now: Timestamp) {
         self.drain(now);
-        if let Some(train) = self.stops.overdue(now).filter(|_| self.is_powered()) {
+        if let Some(train) = self.stops.overdue(now).filter(|_| self.is_watching && self.is_powered()) {
             self.raise(now, train, Alarm::StopUnconfirmed);
             self.power_off(now, train);
         }
@@ -363,7 +306,7 @@ impl Watchdog {
                 }
                 return;
             }
-            DriveNotice::Unexplained { sensor, .. } => {
+            DriveNotice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_stand(*train, now)
                         && self.driver.contact_ahead(*train, now) == Some(*sensor)
@@ -399,14 +342,14 @@ impl Watchdog {
                 if self.own.remove(order).is_some() {
                     return self.recovering_done(now, *train, *order, Some(why));
                 }
-                if matches!(why, Refusal::Lost { .. }) {
-                    // It goes on when the train has been found.
+                // Otherwise it goes on when the train has been found.
+                if self.resumes() && matches!(why, Refusal::Lost { .. }) {
                     return;
                 }
                 self.standing.remove(train);
             }
             DriveNotice::Replaced { order, train }
-                if self.own.contains_key(order) || self.is_held(*train) =>
+                if self.own.contains_key(order) || self.resumes() && self.is_held(*train) =>
             {
                 self.own.remove(order);
                 return;
@@ -425,7 +368,7 @@ impl Watchdog {
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::estimation::PassedContact) {
         let alarm = self.vigils.entry(train).or_default().pass(passed);
         self.note_place(now, train);
-        if self.stops.should_stand(train, now) {
+        if self.is_watching && self.stops.should_stand(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
             self.power_off(now, train);
         } else if self.dangers.contains_key(&train) {
@@ -439,6 +382,15 @@ impl Watchdog {
         }
     }
 
+    /// Whether it goes on by itself with what was interrupted.
+    pub(super) const fn resumes(&self) -> bool {
+        self.permits_all && self.is_watching
+    }
+
+    pub(super) const fn is_watching(&self) -> bool {
+        self.is_watching
+    }
+
     fn stands_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
         let located = self.driver.locate(train, left);
         let model = self.driver.model(train);
@@ -448,6 +400,15 @@ impl Watchdog {
         };
         let stop = model.stop(located.step, crate::event::Approach::Above);
         left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
+    }
+}
+
+/// What it watches over, for looking only: whatever is told to it passes through the watchdog.
+impl Deref for Watchdog {
+    type Target = Driver;
+
+    fn deref(&self) -> &Driver {
+        &self.driver
     }
 }
 

@@ -1,14 +1,17 @@
-//! Carries out instructions one after the other: hands orders to the driver, waits, and says what comes of it.
+//! Carries out instructions one after the other: hands orders and journeys to the dispatcher, waits, and says what comes
+//! of it.
 
 mod outcomes;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::control::{Driver, Machine, Order, OrderId, Output, Promise, Refusal};
+use footplate_core::control::{
+    Dispatcher, Driver, Finished, Journey, Machine, Order, OrderId, Output, Promise, Refusal,
+};
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::Landmark;
-use footplate_core::{Command, Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
 use super::instruction::{HELP, Instruction, Until};
@@ -41,7 +44,7 @@ pub(super) enum Giver {
 /// Drives by instructions.
 #[derive(Debug)]
 pub(crate) struct Conductor {
-    driver: Driver,
+    dispatcher: Dispatcher,
     learning: Learning,
     giver: Giver,
     steps: VecDeque<Step>,
@@ -52,6 +55,12 @@ pub(crate) struct Conductor {
     pending: BTreeMap<OrderId, Step>,
     /// What was promised last of orders that are under way.
     promises: BTreeMap<OrderId, Promise>,
+    /// Trains that are not as they were when the session began.
+    changed: BTreeSet<TrainId>,
+    /// When a journey was asked for, begun or ended last.
+    stirred: Timestamp,
+    /// How each train came to rest last.
+    rests: BTreeMap<TrainId, Finished>,
     outputs: VecDeque<Output<Spoken>>,
     began: Option<Timestamp>,
     /// When something was last looked at.
@@ -76,7 +85,7 @@ impl Conductor {
         };
         let trains = driver.trains().map(|train| (train, highest(train))).collect();
         Self {
-            driver,
+            dispatcher: Dispatcher::watched(Timestamp::ZERO, driver),
             learning,
             giver,
             steps: steps.into(),
@@ -85,6 +94,9 @@ impl Conductor {
             wait: None,
             pending: BTreeMap::new(),
             promises: BTreeMap::new(),
+            changed: BTreeSet::new(),
+            stirred: Timestamp::ZERO,
+            rests: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
             looked: Timestamp::ZERO,
@@ -98,6 +110,11 @@ impl Conductor {
         self.giver == Giver::Person
     }
 
+    /// What drives the trains.
+    fn driver(&self) -> &Driver {
+        self.dispatcher.driver()
+    }
+
     /// Whether an order was refused or given up.
     pub(super) const fn fell_short(&self) -> bool {
         self.fell_short
@@ -106,12 +123,18 @@ impl Conductor {
     /// What trains taught.
     pub(super) fn learnt(&mut self) -> Vec<MotionModel> {
         let trains: Vec<TrainId> = self.trains.keys().copied().collect();
-        trains.into_iter().filter_map(|train| self.learning.model(train)).collect()
+        let learnt = trains.into_iter().filter_map(|train| {
+            // One that was measured again is kept as it was found then.
+            let measured_again =
+                self.changed.contains(&train).then(|| self.dispatcher.driver().model(train).cloned());
+            measured_again.flatten().or_else(|| self.learning.model(train))
+        });
+        learnt.collect()
     }
 
     /// A person wrote a line.
     fn hear(&mut self, now: Timestamp, line: &str) {
-        let known = Known { layout: self.driver.layout(), trains: &self.trains };
+        let known = Known { layout: self.driver().layout(), trains: &self.trains };
         match step(line, known) {
             Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
             Ok(heard) => {
@@ -141,7 +164,7 @@ impl Conductor {
     }
 
     fn tongue(&self) -> Tongue<'_> {
-        Tongue { driver: &self.driver, began: self.began.unwrap_or_default() }
+        Tongue { driver: self.driver(), began: self.began.unwrap_or_default() }
     }
 
     /// Does what can be done now.
@@ -159,28 +182,63 @@ impl Conductor {
                 self.hand_on(now);
             }
         }
+        self.tire_of_waiting(now);
         let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.values().all(runs_on);
         if self.complete && idle && !self.is_over {
             self.end();
         }
     }
 
+    /// When journeys are given up because nothing has come of them, if nothing else is waited for.
+    fn tires(&self) -> Option<Timestamp> {
+        let only_journeys = self
+            .pending
+            .values()
+            .all(|step| runs_on(step) || matches!(step.instruction, Instruction::Go(..)));
+        let waits = self.complete
+            && self.steps.is_empty()
+            && self.wait.is_none()
+            && only_journeys
+            && !self.pending.is_empty();
+        waits.then(|| self.stirred + WAIT_LIMIT)
+    }
+
+    fn tire_of_waiting(&mut self, now: Timestamp) {
+        if self.tires().is_none_or(|at| now < at) {
+            return;
+        }
+        for train in self.trains.keys().copied().collect::<Vec<_>>() {
+            let Some((order, _)) = self.dispatcher.journey(train) else { continue };
+            self.dispatcher.call_off(now, train);
+            if let Some(step) = self.pending.remove(&order) {
+                self.refuse(now, &step, &Refusal::NoFreeWay { train, within: WAIT_LIMIT });
+            }
+        }
+        self.hand_on(now);
+    }
+
     /// In a script a train ends one order before it begins the next, and what follows a turnout follows it.
     fn must_wait(&self, step: &Step) -> bool {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
-        match step.instruction {
-            Instruction::Order(order) => {
-                let is_busy = order.train().is_some_and(|train| self.must_end(train));
-                is_busy || !is_turnout(step) && self.pending.values().any(is_turnout)
-            }
-            _ => false,
-        }
+        let train = match step.instruction {
+            Instruction::Order(order) => order.train(),
+            Instruction::Go(train, _) => Some(train),
+            _ => return false,
+        };
+        let is_busy = train.is_some_and(|train| self.must_end(train));
+        is_busy || !is_turnout(step) && self.pending.values().any(is_turnout)
     }
 
     /// Whether a train is busy with something that ends by itself.
     fn must_end(&self, train: TrainId) -> bool {
-        let order = self.driver.busy(train);
-        order.is_some_and(|order| !self.pending.get(&order).is_some_and(runs_on))
+        let order = self.driver().busy(train);
+        let runs_on = order.and_then(|order| self.pending.get(&order)).is_some_and(runs_on);
+        self.dispatcher.journey(train).is_some() || order.is_some() && !runs_on
+    }
+
+    /// Whether a train has nothing to do.
+    fn is_idle(&self, train: TrainId) -> bool {
+        self.driver().busy(train).is_none() && self.dispatcher.journey(train).is_none()
     }
 
     fn end(&mut self) {
@@ -193,15 +251,15 @@ impl Conductor {
         let met = wait.is_met
             || match wait.until {
                 Until::Passed(span) => now - wait.since >= span,
-                Until::AtRest(train) => self.driver.busy(train).is_none() && self.driver.stands(train, now),
-                Until::Located(train) => self.driver.locate(train, now).is_some(),
+                Until::AtRest(train) => self.is_idle(train) && self.driver().stands(train, now),
+                Until::Located(train) => self.driver().locate(train, now).is_some(),
                 Until::At(..) => false,
             };
         if met {
             self.wait = None;
         } else if let Until::AtRest(train) = wait.until
-            && self.driver.busy(train).is_none()
-            && self.driver.told(train) > SpeedStep::STAND
+            && self.is_idle(train)
+            && self.driver().told(train) > SpeedStep::STAND
         {
             self.wait = None;
             self.fell_short = true;
@@ -218,7 +276,7 @@ impl Conductor {
 
     fn carry_out(&mut self, now: Timestamp, step: Step) {
         match step.instruction {
-            Instruction::Order(order) => match self.driver.order(now, order) {
+            Instruction::Order(order) => match self.hand_down(now, order) {
                 Ok(id) => {
                     if let (Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }, Some(train)) =
                         (order, order.train())
@@ -229,8 +287,10 @@ impl Conductor {
                 }
                 Err(why) => self.refuse(now, &step, &why),
             },
+            Instruction::Go(train, journey) => self.send(now, step, train, journey),
             Instruction::Straighten => {
-                let turnouts: Vec<_> = self.driver.layout().turnouts().map(|(turnout, _)| turnout).collect();
+                let turnouts: Vec<_> =
+                    self.driver().layout().turnouts().map(|(turnout, _)| turnout).collect();
                 for (place, turnout) in turnouts.into_iter().rev().enumerate() {
                     let instruction = Instruction::Order(Order::Turnout { turnout, curved: false });
                     let part = Step { text: step.text.clone(), instruction, is_part: place > 0 };
@@ -239,7 +299,7 @@ impl Conductor {
             }
             Instruction::Place(train, at) => self.place(now, &step, train, at),
             Instruction::Halt => self.halt(now),
-            Instruction::PowerOn => self.outputs.push_back(Output::Command(Command::PowerOn)),
+            Instruction::PowerOn => self.dispatcher.switch_power(now, true),
             Instruction::Where(Some(train)) => {
                 let line = self.tongue().whereabouts(train, now);
                 self.say(line);
@@ -259,16 +319,43 @@ impl Conductor {
         }
     }
 
+    /// Hands an order down; it takes the place of a journey.
+    fn hand_down(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        let journey = order.train().and_then(|train| self.dispatcher.journey(train));
+        let taken = self.dispatcher.order(now, order);
+        if let Some((journey, _)) =
+            journey.filter(|_| order.train().is_some_and(|train| self.dispatcher.journey(train).is_none()))
+        {
+            self.pending.remove(&journey);
+        }
+        taken
+    }
+
+    fn send(&mut self, now: Timestamp, step: Step, train: TrainId, journey: Journey) {
+        let before = self.dispatcher.journey(train);
+        match self.dispatcher.go(now, train, journey) {
+            Ok(id) => {
+                if let Some((before, _)) = before {
+                    self.pending.remove(&before);
+                }
+                self.stirred = now;
+                self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                self.pending.insert(id, step);
+            }
+            Err(why) => self.refuse(now, &step, &why),
+        }
+    }
+
     /// Everything stands, whatever was said before and waits.
     fn halt(&mut self, now: Timestamp) {
         self.steps.clear();
         self.wait = None;
         for train in self.trains.keys().copied().collect::<Vec<_>>() {
             // Step 0 is a step of every train, so that nothing refuses it.
-            let _ = self.driver.order(now, Order::Speed { train, step: SpeedStep::STAND });
+            let _ = self.hand_down(now, Order::Speed { train, step: SpeedStep::STAND });
         }
+        self.dispatcher.switch_power(now, false);
         self.hand_on(now);
-        self.outputs.push_back(Output::Command(Command::PowerOff));
         self.say(
             "halt: all trains are told to stand, and the power goes off; `power on` gives it back".to_owned(),
         );
@@ -277,33 +364,37 @@ impl Conductor {
 
     /// What is wrong with a line, if something is.
     pub(super) fn mistake(&self, line: &str) -> Option<String> {
-        let known = Known { layout: self.driver.layout(), trains: &self.trains };
+        let known = Known { layout: self.driver().layout(), trains: &self.trains };
         step(line, known).err().map(|mistake| mistake.to_string())
     }
 
     /// Shows what there is to see now.
     pub(super) fn show(&self, painter: &mut Painter, now: Timestamp) {
         let task = |train: TrainId| {
-            let order = self.driver.busy(train)?;
+            let busy = self.driver().busy(train);
+            let order = busy.filter(|order| self.pending.contains_key(order));
+            let order = order.or_else(|| Some(self.dispatcher.journey(train)?.0))?;
             let step = self.pending.get(&order)?;
             let target = match step.instruction {
+                Instruction::Go(_, journey) => Some(journey.target),
                 Instruction::Order(Order::Stop(stop)) => Some(stop.target),
                 Instruction::Order(Order::Arrive { target, .. }) => Some(target),
                 _ => None,
             };
-            let promise =
-                self.promises.get(&order).map(|promise| [promise.median, promise.low, promise.high]);
+            // A journey promises no more than the run that it is on, and only the last one leads to its end.
+            let promise = self.promises.get(&order).filter(|_| busy == Some(order));
+            let promise = promise.map(|promise| [promise.median, promise.low, promise.high]);
             Some((train, TrainTask { text: step.text.clone(), target, promise }))
         };
         let tasks = self.trains.keys().copied().filter_map(task).collect();
-        painter.paint(&self.driver, &tasks, now, self.began.unwrap_or(now));
+        painter.paint(&self.dispatcher, &tasks, now, self.began.unwrap_or(now));
     }
 
     /// A person says where a train stands.
     fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
-        if self.driver.stands(train, now) {
+        if self.driver().stands(train, now) {
             let at = WayPoint { node: at.node, way: at.offset };
-            self.driver.place(now, train, at, SEEN_BY_HAND);
+            self.dispatcher.place(now, train, at, SEEN_BY_HAND);
             self.learning.interrupt(train);
             let line = self.tongue().whereabouts(train, now);
             self.say(line);
@@ -314,12 +405,12 @@ impl Conductor {
 
     /// Hands on what the driver asks for, and says what it has to say.
     fn hand_on(&mut self, now: Timestamp) {
-        while let Some(output) = self.driver.poll_output() {
+        while let Some(output) = self.dispatcher.poll_output() {
             match output {
                 Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                 Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                 Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                Output::Notice(notice) => self.notice(now, &notice),
+                Output::Notice(notice) => self.dispatched(now, &notice),
             }
         }
     }
@@ -334,13 +425,13 @@ impl Machine for Conductor {
     type Notice = Spoken;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
-        self.driver.handle_event(now, event);
-        self.learning.take(&self.driver, event);
+        self.dispatcher.handle_event(now, event);
+        self.learning.take(self.dispatcher.driver(), event);
         self.go_on(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        self.driver.handle_timeout(now);
+        self.dispatcher.handle_timeout(now);
         self.go_on(now);
     }
 
@@ -357,7 +448,7 @@ impl Machine for Conductor {
             Until::AtRest(_) => self.looked + LOOK_AGAIN,
             Until::At(..) | Until::Located(_) => wait.since + WAIT_LIMIT,
         });
-        [self.driver.next_timeout(), now_and_then].into_iter().flatten().min()
+        [self.dispatcher.next_timeout(), now_and_then, self.tires()].into_iter().flatten().min()
     }
 }
 
@@ -366,6 +457,10 @@ impl Listener for Conductor {
         match word {
             Input::Line(line) => self.hear(now, line),
             Input::NoMoreLines => self.complete(),
+            Input::Link(news) => {
+                self.dispatcher.handle_link(now, *news);
+                self.go_on(now);
+            }
             _ => {}
         }
     }

@@ -1,6 +1,6 @@
 //! What a line says, once it has been understood.
 
-use footplate_core::control::Order;
+use footplate_core::control::{Journey, Order};
 use footplate_core::track::Landmark;
 use footplate_core::{SensorId, TimeSpan, TrainId};
 
@@ -9,6 +9,8 @@ use footplate_core::{SensorId, TimeSpan, TrainId};
 pub(super) enum Instruction {
     /// Something for the driver.
     Order(Order),
+    /// A train goes to a place by whatever way is free.
+    Go(TrainId, Journey),
     /// All turnouts straight, one after the other.
     Straighten,
     /// A person put a train there, or sees that it stands there.
@@ -50,6 +52,9 @@ stop 24 at C13+120mm              come to rest with the pickup 120 mm past conta
      [at step 8]                  ... from step 8
      [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most
      [next round]                 ... after passing it once
+go 24 to D5+40mm                  by the soonest way that is free, turnouts and reversals included
+     [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most
+     [facing]                     ... and facing as that contact does
 move 24 37mm                      from rest, move on by 37 mm
 hold 24 250mm/s                   run at a mean speed, whatever steps that takes
 follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, contact by contact (or by 150mm)

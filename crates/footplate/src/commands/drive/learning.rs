@@ -72,6 +72,11 @@ impl Learning {
         }
     }
 
+    /// A train is not what it was: nothing is learnt of it any more in this session, and what was is not kept.
+    pub(super) fn forget(&mut self, train: TrainId) {
+        self.fits.remove(&train);
+    }
+
     /// What is known of a train by now. Takes a while: not for between two reports.
     pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
         let fit = self.fits.get_mut(&train)?;

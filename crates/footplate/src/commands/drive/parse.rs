@@ -1,15 +1,15 @@
 //! Reads what people write to drive trains, and tells them what would be right where it is not.
 
 use footplate_core::SpeedStep;
-use footplate_core::control::{Aim, Gap, Order, StopOrder};
+use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder};
 
 use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 14] = [
-    "speed", "reverse", "turnout", "stop", "move", "hold", "follow", "arrive", "place", "halt", "power",
-    "where", "wait", "help",
+const VERBS: [&str; 15] = [
+    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "place", "halt",
+    "power", "where", "wait", "help",
 ];
 
 /// Reads one line; `None` where it says nothing.
@@ -45,6 +45,7 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             Instruction::Order(Order::Turnout { turnout, curved: words.leg()? })
         }
         "stop" => words.stop()?,
+        "go" => words.go()?,
         "move" => {
             let train = words.train()?;
             Instruction::Order(Order::Move { train, distance: words.distance()? })
@@ -116,6 +117,25 @@ impl Words<'_, '_, '_> {
             }
         }
         Ok(Instruction::Order(Order::Stop(stop)))
+    }
+
+    fn go(&mut self) -> Result<Instruction, Mistake> {
+        let train = self.train()?;
+        self.expect("to")?;
+        let mut journey = Journey::to(self.landmark()?);
+        while let Some(word) = self.rest.first().copied() {
+            self.next("")?;
+            match word.text {
+                "facing" => journey.faces = true,
+                "not-beyond" => journey.aim = Aim::NotBeyond(self.share()?),
+                other => {
+                    let known = ["facing", "not-beyond"].into_iter();
+                    let otherwise = ": write `facing` or `not-beyond 0.1%`";
+                    return Err(word.mistake(format!("says nothing here{}", meant(other, known, otherwise))));
+                }
+            }
+        }
+        Ok(Instruction::Go(train, journey))
     }
 
     fn follow(&mut self) -> Result<Instruction, Mistake> {
@@ -193,6 +213,12 @@ mod tests {
         assert_eq!(wait("wait 24 at rest"), Until::AtRest(train));
         assert_eq!(wait("wait 24 located"), Until::Located(train));
         assert!(matches!(wait("wait 24 at C13"), Until::At(TrainId(24), _)));
+        let Ok(Some(Instruction::Go(going, journey))) = read("go 24 to C13+120mm not-beyond 0.1% facing")
+        else {
+            panic!("a journey")
+        };
+        assert_eq!((going, journey.faces), (train, true));
+        assert_eq!(journey.aim, Aim::NotBeyond(Ratio::from_percent(0.1)));
         assert_eq!(order("hold 24 250mm/s"), Order::Hold { train, speed: Speed::from_mm_per_s(250.0) });
         assert_eq!(order("hold 24 0.25 m/s"), Order::Hold { train, speed: Speed::from_mm_per_s(250.0) });
         let (follower, leader) = (TrainId(58), train);
@@ -243,6 +269,8 @@ mod tests {
             ("follow 58 behind 58 by 1s", "column 18: `58` is the same train: name the one ahead of it"),
             ("follow 58 behind 24 by 1", "column 24: `1` should be a distance ahead, such as 37mm or 1.2m"),
             ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
+            ("go 24 at D5", "column 7: `at` should be `to`"),
+            ("go 24 to D5 face", "column 13: `face` says nothing here: did you mean `facing`?"),
             ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),

@@ -35,6 +35,8 @@ pub(crate) struct Ended {
     pub(super) command: &'static str,
     pub(super) train: Option<TrainId>,
     pub(super) target: Target,
+    /// The target as the train faces it, where it may have come from either side.
+    pub(super) faced: Option<Landmark>,
     /// The place, as it is believed.
     pub(super) achieved: Option<String>,
     /// How far beyond the target that is.

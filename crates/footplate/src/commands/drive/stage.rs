@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 use std::time::Duration;
 
-use footplate_core::control::Machine as _;
+use footplate_core::control::{LinkNews, Machine as _};
 use footplate_core::{Command, Timestamp};
 use footplate_wire::{CommandError, LinkNotice};
 
@@ -14,6 +14,7 @@ use super::conductor::Conductor;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Answer, Board, Dashboard, Painter};
+use crate::link::news_of;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
 
@@ -40,6 +41,8 @@ pub(super) struct Stage {
     lines: Option<Receiver<String>>,
     screen: Screen,
     watched: Option<Watched>,
+    /// What was heard of the line since the conductor was told last.
+    news: Vec<LinkNews>,
     /// What whoever knows the truth should look at before anything moves on.
     pub(super) for_referee: Vec<Spoken>,
     pub(super) is_over: bool,
@@ -102,7 +105,7 @@ impl Stage {
         let prompts =
             lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
         let screen = Screen { to_errors: json, prompts };
-        Self { lines, screen, watched, for_referee: Vec::new(), is_over: false }
+        Self { lines, screen, watched, news: Vec::new(), for_referee: Vec::new(), is_over: false }
     }
 
     pub(super) fn say(&self, text: &str, status: &str) {
@@ -130,6 +133,7 @@ impl Attendant<Witnessed<Conductor>> for Stage {
     }
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
+        self.news.extend(news_of(notice));
         if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
             self.screen.say(&notice.to_string(), "");
         }
@@ -140,6 +144,9 @@ impl Attendant<Witnessed<Conductor>> for Stage {
     }
 
     fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) -> Wish {
+        for news in std::mem::take(&mut self.news) {
+            conductor.handle_word(now, &Input::Link(news));
+        }
         while let Some(lines) = &self.lines {
             match lines.try_recv() {
                 Ok(line) => conductor.handle_word(now, &Input::Line(line)),

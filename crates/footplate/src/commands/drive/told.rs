@@ -1,6 +1,6 @@
-//! Notices of the driver as people read them.
+//! Notices of the driver and the dispatcher as people read them.
 
-use footplate_core::control::{DriveNotice, Driver, Finished, Order, PlannedStop};
+use footplate_core::control::{DispatchNotice, DriveNotice, Driver, Finished, Order, PlannedStop, Refusal};
 use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
 use footplate_core::{SensorId, Timestamp, TrainId};
@@ -20,6 +20,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Reverse { .. }) => "reverse",
         Instruction::Order(Order::Turnout { .. }) | Instruction::Straighten => "turnout",
         Instruction::Order(Order::Stop(_)) => "stop",
+        Instruction::Go(..) => "go",
         Instruction::Order(Order::Move { .. }) => "move",
         Instruction::Order(Order::Hold { .. }) => "hold",
         Instruction::Order(Order::Follow { .. }) => "follow",
@@ -144,6 +145,51 @@ impl Tongue<'_> {
         })
     }
 
+    /// What the dispatcher has to say, if people want to know.
+    pub(super) fn dispatched(&self, notice: &DispatchNotice) -> Option<String> {
+        Some(match notice {
+            DispatchNotice::Drive(notice) => return self.line(notice),
+            DispatchNotice::Watch(notice) => notice.to_string(),
+            DispatchNotice::RouteSet { train, takes, turns } => {
+                let turns = match turns {
+                    0 => String::new(),
+                    1 => ", turning around once".to_owned(),
+                    more => format!(", turning around {more} times"),
+                };
+                format!("train {train} has its way: about {:.0} s{turns}", takes.as_s())
+            }
+            DispatchNotice::Waits { train, on } => {
+                format!("train {train} waits for track that is held by {}", trains(on))
+            }
+            DispatchNotice::Deadlock { train, moves } => {
+                format!("train {train} cannot get through: {} will step aside", trains(moves))
+            }
+            DispatchNotice::StepsAside { train, makes_room_for, to } => {
+                format!("train {train} steps aside to {} for train {makes_room_for}", self.place(*to))
+            }
+            // That has been said with the refusal.
+            DispatchNotice::Withdrawn { why: Some(Refusal::Unreachable { .. }), .. } => return None,
+            DispatchNotice::Withdrawn { train, why } => {
+                let why = why.as_ref().map_or_else(String::new, |why| format!(": {why}"));
+                format!("train {train} does not set out yet{why}; it is tried again")
+            }
+            DispatchNotice::Arrived { train, took, .. } => {
+                format!("train {train} has arrived after {:.1} s", took.as_s())
+            }
+            DispatchNotice::Diverged { train, stopped } if stopped.is_empty() => {
+                format!("train {train} is not on the way that it was granted: told to stop")
+            }
+            DispatchNotice::Diverged { train, stopped } => format!(
+                "train {train} is not on the way that it was granted: told to stop, and so is what it could meet, \
+                 {}",
+                trains(stopped)
+            ),
+            DispatchNotice::HeldAsUnknown { train } => {
+                format!("nobody is sent onto the track where train {train} may be")
+            }
+        })
+    }
+
     fn passed(&self, train: TrainId, passed: &PassedContact, next: Option<&DueContact>) -> String {
         let middle = passed.window.middle();
         let mut line = format!("{}  train {train} at {}", self.at(middle), self.sensor(passed.sensor));
@@ -194,6 +240,12 @@ impl Tongue<'_> {
         }
         Some(line)
     }
+}
+
+/// Trains one after the other, as in a sentence.
+fn trains(trains: &[TrainId]) -> String {
+    let trains: Vec<String> = trains.iter().map(|train| format!("train {train}")).collect();
+    if trains.is_empty() { "nobody that can move".to_owned() } else { trains.join(", ") }
 }
 
 const fn leg(curved: bool) -> &'static str {

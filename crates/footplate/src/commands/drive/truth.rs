@@ -54,7 +54,7 @@ impl Beginnings {
     pub(super) fn error(&self, referee: &dyn Referee, layout: &Layout, ended: &Ended) -> Option<Length> {
         ended.error?;
         let train = ended.train?;
-        match ended.target {
+        match ended.faced.map_or(ended.target, Target::Place) {
             Target::Ahead(distance) => Some(referee.odometer(train)? - *self.0.get(&train)? - distance),
             target => referee.beyond(layout, train, target),
         }

@@ -1,6 +1,9 @@
-//! What comes of instructions: refusals, notices of the driver, orders that have ended, and what trains taught.
+//! What comes of instructions: refusals, notices of the driver and the dispatcher, orders that have ended, and what trains taught.
 
-use footplate_core::control::{Achieved, DriveNotice, Finished, Order, Output, Refusal};
+use footplate_core::control::{
+    Achieved, DispatchNotice, DriveNotice, Finished, Order, Outcome, Output, Refusal, WatchdogNotice,
+};
+use footplate_core::track::Landmark;
 use footplate_core::{Timestamp, TrainId};
 
 use super::Conductor;
@@ -20,6 +23,7 @@ impl Conductor {
 
     fn ended(&self, time: Timestamp, step: &Step) -> Ended {
         let (train, target) = match step.instruction {
+            Instruction::Go(train, journey) => (Some(train), Target::Place(journey.target)),
             Instruction::Order(order) => (
                 order.train(),
                 match order {
@@ -36,6 +40,7 @@ impl Conductor {
             command: verb(&step.instruction),
             train,
             target,
+            faced: None,
             achieved: None,
             error: None,
             promise: None,
@@ -45,10 +50,46 @@ impl Conductor {
         }
     }
 
-    pub(super) fn notice(&mut self, now: Timestamp, notice: &DriveNotice) {
-        if let Some(line) = self.tongue().line(notice) {
+    /// Says what the dispatcher says, and does what follows.
+    pub(super) fn dispatched(&mut self, now: Timestamp, notice: &DispatchNotice) {
+        if let Some(line) = self.tongue().dispatched(notice) {
             self.say(line);
         }
+        match notice {
+            DispatchNotice::Drive(notice) => self.driven(now, notice),
+            DispatchNotice::Watch(notice) => self.warned(now, notice),
+            DispatchNotice::RouteSet { .. } => self.stirred = now,
+            DispatchNotice::Arrived { order, train, error, .. } => {
+                self.stirred = now;
+                let Some(step) = self.pending.remove(order) else { return };
+                let rest = self.rests.remove(train);
+                let at = rest.as_ref().and_then(|rest| rest.achieved).map(|achieved| achieved.at);
+                let faced = at.zip(*error).map(|(at, error)| Landmark { offset: at.offset - error, ..at });
+                let ended = Ended { error: *error, faced, ..self.ended(now, &step) };
+                let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
+                self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+            }
+            _ => {}
+        }
+    }
+
+    fn warned(&mut self, now: Timestamp, notice: &WatchdogNotice) {
+        match notice {
+            WatchdogNotice::Danger { train, .. } => self.learning.interrupt(*train),
+            // What it was measured as is what is learnt from now on; what it taught before was another train's.
+            WatchdogNotice::Recovered { train, outcome, .. } => {
+                self.stirred = now;
+                if *outcome != Outcome::AsBefore {
+                    self.learning.forget(*train);
+                    self.changed.insert(*train);
+                }
+            }
+            WatchdogNotice::NeedsPerson { .. } => self.fell_short = true,
+            _ => {}
+        }
+    }
+
+    fn driven(&mut self, now: Timestamp, notice: &DriveNotice) {
         match notice {
             DriveNotice::Planned(plan) => {
                 self.promises.insert(plan.order, plan.promise);
@@ -56,7 +97,7 @@ impl Conductor {
             DriveNotice::Passed { train, passed, next } => {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
                 self.outputs.push_back(Output::Notice(Spoken::Passed(passed_by)));
-                self.learning.passed(*train, &self.driver, passed);
+                self.learning.passed(*train, self.dispatcher.driver(), passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
                 }
@@ -90,29 +131,38 @@ impl Conductor {
 
     fn done(&mut self, finished: &Finished) {
         self.promises.remove(&finished.order);
+        self.rests.insert(finished.train, *finished);
         let Some(step) = self.pending.remove(&finished.order) else { return };
-        let achieved = finished.achieved;
         self.fell_short |= finished.unseen.is_some();
-        let name = |achieved: Achieved| self.tongue().place(achieved.at);
         let ended = Ended {
-            achieved: achieved.map(name),
-            error: achieved.and_then(|achieved| achieved.error),
-            promise: finished.promise,
-            unseen: finished.unseen.map(|sensor| self.tongue().sensor(sensor).to_owned()),
+            error: finished.achieved.and_then(|achieved| achieved.error),
             ..self.ended(finished.time, &step)
         };
+        let ended = self.at_rest(finished, ended);
         self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
     }
+
+    /// With the place where a train came to rest, and what had been promised of that.
+    fn at_rest(&self, rest: &Finished, ended: Ended) -> Ended {
+        let name = |achieved: Achieved| self.tongue().place(achieved.at);
+        Ended {
+            achieved: rest.achieved.map(name),
+            promise: rest.promise,
+            unseen: rest.unseen.map(|sensor| self.tongue().sensor(sensor).to_owned()),
+            ..ended
+        }
+    }
+
     /// What trains taught is used from the next order on. Only while all of them stand, so that nobody waits for it.
     fn learn(&mut self, now: Timestamp, finished: &Finished) {
         if finished.unseen.is_some() {
             self.learning.interrupt(finished.train);
         }
         let trains: Vec<TrainId> = self.trains.keys().copied().collect();
-        if trains.iter().all(|train| self.driver.stands(*train, now))
+        if trains.iter().all(|train| self.driver().stands(*train, now))
             && let Some(model) = self.learning.model(finished.train)
         {
-            self.driver.set_model(model);
+            self.dispatcher.set_model(model);
         }
     }
 }

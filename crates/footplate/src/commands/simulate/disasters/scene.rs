@@ -2,17 +2,15 @@
 
 use std::cell::Cell;
 
-use footplate_core::control::{
-    DriveNotice, LinkNews, Order, OrderId, Outcome, StopOrder, Watchdog, WatchdogNotice,
-};
+use footplate_core::control::{DriveNotice, Order, OrderId, Outcome, StopOrder, Watchdog, WatchdogNotice};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
-use footplate_wire::LinkNotice;
 
 use super::kind::{Kind, places_along};
 use super::way::Way;
 use crate::commands::simulate::driving::choice::Choice;
 use crate::commands::simulate::rehearsal::Rehearsal;
+use crate::link::news_of;
 
 /// The train that something happens to.
 pub(super) const TRAIN: TrainId = TrainId(24);
@@ -117,12 +115,9 @@ impl<'l> Scene<'l> {
     /// Lets things happen until a time or a notice.
     fn drive(&mut self, until: Timestamp) -> Option<WatchdogNotice> {
         let notice = self.stage.line.drive_hearing(&mut self.watchdog, until, |watchdog, now, notice| {
-            let news = match notice {
-                LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => LinkNews::Silent,
-                LinkNotice::Answers => LinkNews::Answers,
-                _ => return,
-            };
-            watchdog.handle_link(now, news);
+            if let Some(news) = news_of(notice) {
+                watchdog.handle_link(now, news);
+            }
         })?;
         self.note(&notice);
         Some(notice)

@@ -1,0 +1,98 @@
+//! While a train is in danger nobody sets out, and it is let crawl once all others stand.
+
+use alloc::vec::Vec;
+
+use crate::control::watch::WatchdogNotice;
+use crate::ids::TrainId;
+use crate::time::Timestamp;
+use crate::units::Length;
+
+use super::dispatched_train::State;
+use super::dispatcher::Dispatcher;
+use super::footprint::{Footprint, Span};
+use super::notice::DispatchNotice;
+
+/// Track of two trains that touches is track of both: so much is left between them.
+const APART: Length = Length::from_mm(1.0);
+
+impl Dispatcher {
+    /// Takes note of what the watchdog says.
+    pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: WatchdogNotice) {
+        match &notice {
+            WatchdogNotice::Danger { train, stopped, .. } => {
+                for stopped in stopped {
+                    self.gives_up(*stopped);
+                }
+                self.gives_up(*train);
+                self.set_state(*train, State::InDanger);
+            }
+            WatchdogNotice::AsksToCrawl { train } => {
+                self.crawlers.insert(*train);
+            }
+            WatchdogNotice::Recovered { train, .. } => {
+                self.crawlers.remove(train);
+                if let Some(known) = self.trains.get_mut(train) {
+                    // What it was granted is long behind it.
+                    known.held = Footprint::empty();
+                    known.kept = Footprint::empty();
+                }
+                self.halted(now, *train, true);
+            }
+            WatchdogNotice::NeedsPerson { train, .. } => {
+                self.crawlers.remove(train);
+                self.set_state(*train, State::Lost);
+            }
+            // A journey goes on by itself.
+            WatchdogNotice::Dropped { train, .. } if self.journey(*train).is_some() => return,
+            _ => {}
+        }
+        self.is_stirred = true;
+        self.say(DispatchNotice::Watch(notice));
+    }
+
+    /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.
+    pub(super) fn let_crawl(&mut self, now: Timestamp) -> bool {
+        let mut is_let = false;
+        let crawlers: Vec<TrainId> = self.crawlers.iter().copied().collect();
+        for id in crawlers {
+            let others = self.trains.keys().filter(|other| **other != id);
+            let moves =
+                |other: &TrainId| !self.driver.is_in_danger(*other) && !self.driver.stands(*other, now);
+            if !others.copied().any(|other| moves(&other)) {
+                self.crawlers.remove(&id);
+                let free = self.all_that_is_free(id);
+                if let Some(train) = self.trains.get_mut(&id) {
+                    train.held = free;
+                }
+                self.driver.permit(now, id);
+                is_let = true;
+            }
+        }
+        is_let
+    }
+
+    /// All that nobody else holds: a train that is let crawl may come onto any of it, and nobody else sets out.
+    fn all_that_is_free(&self, id: TrainId) -> Footprint {
+        let layout = self.driver.layout();
+        let others = || self.trains.values().filter(|other| other.id != id);
+        let mut free = Footprint::empty();
+        for (edge, known) in layout.edges().filter(|(edge, _)| *edge < edge.twin()) {
+            let taken = others().flat_map(|other| other.held.spans());
+            let mut taken: Vec<Span> =
+                taken.filter(|(stretch, _)| *stretch == edge.stretch()).map(|(_, span)| span).collect();
+            taken.sort_by(|one, other| one.from.as_m().total_cmp(&other.from.as_m()));
+            let mut from = Length::ZERO;
+            for span in taken {
+                free.take_rails(layout, edge, from, span.from - APART);
+                from = from.max(span.to + APART);
+            }
+            free.take_rails(layout, edge, from, known.length);
+        }
+        for (turnout, _) in layout.turnouts() {
+            if !others().any(|other| other.held.takes(turnout)) {
+                free.take_turnout(layout, turnout);
+            }
+        }
+        free
+    }
+}
