@@ -164,6 +164,7 @@ step_scenarios() {
 
 # The exact version, so that a test that fails today fails tomorrow.
 readonly PLAYWRIGHT=playwright-core@1.65.1
+readonly AXE=axe-core@4.14.1
 
 step_browser() {
   need_compiler
@@ -171,7 +172,7 @@ step_browser() {
   need node nodejs
   need npm npm
   local at="$TARGET/browser"
-  [[ -d $at/node_modules/playwright-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT"
+  [[ -d $at/node_modules/axe-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT" "$AXE"
   cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/*.test.mjs
 }

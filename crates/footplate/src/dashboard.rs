@@ -8,6 +8,7 @@
 //! board            where the control loop leaves all that, and finds what was asked; it never waits for anybody
 //! guard            who may ask: hosts, origins, a token beyond loopback
 //! server  stream   HTTP on a thread of its own; what one watcher is sent
+//! routes           what can be asked for
 //! assets           the pages, inside the program
 //! ```
 
@@ -18,6 +19,7 @@ mod history;
 mod model_picture;
 mod painter;
 mod picture;
+mod routes;
 mod server;
 mod spans;
 mod stream;
@@ -25,5 +27,7 @@ mod way_travelled;
 
 pub(crate) use board::{Answer, Board};
 pub(crate) use painter::{Painter, TrainPassed};
+pub(crate) use picture::LayoutPicture;
 pub(crate) use picture::TrainTask;
+pub(crate) use routes::Routes;
 pub(crate) use server::{Dashboard, ServedAt};

@@ -12,6 +12,7 @@ mod runtime;
 #[allow(dead_code, reason = "the verbs that drive trains live are being written")]
 mod session_journal;
 mod spread;
+mod tally;
 mod witness;
 
 use std::io::{ErrorKind, Write};

@@ -1,7 +1,16 @@
 // Charts that go on: drawn with what the reports draw with, and again when colours or widths change.
 
-import { chart } from "./chart.js";
+import { chart, colour, rounded } from "./chart.js";
 import { say } from "./words.js";
+
+/** Error bars for a chart: points by series, each in its colour. */
+export const barsOf = (points, series) => series.map(([, name], place) => [points[place], name]);
+
+/** A series of upright bars. */
+export const upright = (label, name) => ({
+  label, stroke: colour(name), fill: colour(name), width: 0, points: { show: false }, paths: uPlot.paths.bars({ size: [0.9, 60] }),
+  value: (_, value) => (value == null ? "–" : rounded(value, 0)),
+});
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 

@@ -2,14 +2,20 @@
 
 import "./halt.js";
 import { make } from "./dom.js";
+import { calibrationPage } from "./calibration_page.js";
+import { healthPage } from "./health_page.js";
 import { layoutPage } from "./layout_page.js";
 import { Live } from "./live.js";
+import { odometryPage } from "./odometry_page.js";
+import { recordingsPage } from "./recordings_page.js";
 import { trainPage } from "./train_page.js";
 import { say, translate } from "./words.js";
 
 /** How soon a server that was not there is asked again (ms). */
 const AGAIN_MS = 3000;
-const PAGES = { layout: layoutPage, train: trainPage };
+const PAGES = {
+  layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
+};
 const COLOURS = { connecting: "amber", connected: "green", lost: "red" };
 
 const $ = (id) => document.getElementById(id);
@@ -31,7 +37,7 @@ function turn() {
   translate(page);
   open = PAGES[name](page, live, what);
   if (live.picture) open.picture?.(live.picture);
-  const here = `#/${what ? `${name}/${what}` : name}`;
+  const here = `#/${name === "train" ? `train/${what}` : name}`;
   for (const link of $("pages").querySelectorAll("a")) {
     if (link.hash === here) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
@@ -69,7 +75,7 @@ async function begin() {
   });
   live.addEventListener("picture", ({ detail }) => links(detail));
   live.addEventListener("state", state);
-  for (const kind of ["picture", "line", "passed", "ended", "gap", "anew"]) {
+  for (const kind of ["picture", "line", "passed", "ended", "alarm", "gap", "anew"]) {
     live.addEventListener(kind, ({ detail }) => open[kind]?.(detail));
   }
 }

@@ -43,4 +43,46 @@ export const ENGLISH = {
   "stops-made": "Stops made", "order-given": "order", "rests-at": "rests at", "error-mm": "off (mm)", "promised": "promised (mm)",
   "truth-mm": "in truth (mm)", "did-stop": "stop", "did-move": "move", "did-arrive": "arrive", "did-speed": "speed",
   "did-reverse": "turn", "did-hold": "hold", "did-follow": "follow",
+
+  // calibration
+  "calibration": "Calibration", "of-train": "Train", "driven-with": "What it is driven with",
+  "note-driven-with": "The model that drives the train now; it learns as the train runs. Intervals are 95 %.",
+  "note-speeds": "Steady speed by step, by the side from which the step was reached.",
+  "note-stops-by-step": "The way to rest from each step, with the interval in which 95 of 100 stops end.",
+  "reached-from": "reached from", "side-below": "below", "side-above": "above", "contacts": "contacts", "not-known": "of it not known (mm)",
+  "in-s": "in (s)", "stops-count": "stops", "why": "Why?", "why-of": "Why is {0} so?", "in-store": "What all recordings say",
+  "note-store": "Worked out from all that the store holds of this train, less what was excluded, by the same fit as `footplate calibrate --store`.",
+  "note-stored": "Steady speed by step with its 95 % interval.", "change-shown": "Change of speed shown",
+  "note-law": "The law of this change, and the mean speeds between contacts.", "note-beyond": "How far contacts lie beyond the law, with 95 % of what is not known of that.",
+  "law": "law", "law-up": "getting faster", "law-down": "getting slower", "law-from": "from {0} changes, held-out error {1} mm",
+  "why-so": "Why is this number so?", "number-asked": "Number", "reason": "Reason, to exclude or restore", "reason-first": "Write a reason first.",
+  "exclude": "Exclude", "restore": "Restore", "exclude-event": "Exclude event {0}", "restore-event": "Restore event {0}", "thinks": "mark",
+  "excluded": "excluded: event {0}; it stays in the store and can be restored", "restored": "restored: event {0}", "marked": "Excluded by a person",
+  "under-way": "A calibration is under way", "about": "experiment", "because": "why", "time-left": "time left", "time-used": "Time used",
+  "expected": "expected accuracy", "left-of": "{0} s of {1} s of track time", "expected-at": "at step {0}: stops within {1} mm, speed within {2} % (95 %)",
+  "chart-speeds": "Speed by step", "chart-stops-by-step": "Way to rest by step", "chart-stored": "Speed by step from recordings",
+  "chart-law": "Change of speed", "chart-beyond": "Beyond the law", "axis-step": "step", "axis-since": "since the command (s)",
+  "axis-beyond": "beyond (mm)", "beyond-law": "beyond the law", "from-below": "from below", "from-above": "from above", "from-unknown": "side not recorded",
+
+  // health
+  "health": "Health", "predicted": "predictions", "rms-mm": "error, rms (mm)", "mean-mm": "mean (mm)", "inside-95": "inside the 95 % interval",
+  "drift": "on the way to a drift alarm", "drift-of": "Train {0}: {1} % of the way to a drift alarm", "too-few": "too few yet",
+  "note-errors": "Where each train was beside the estimate when a contact told.", "note-doubts": "Errors in units of the interval stated beforehand: 95 of 100 belong into the shaded band.",
+  "axis-doubts": "error / half interval", "chart-errors": "Prediction errors of all trains", "chart-doubts": "Prediction errors by their intervals",
+  "alarms": "Alarms", "no-alarm": "None so far.", "line": "Line and loop", "chart-poll": "Poll period", "chart-first-byte": "First byte", "chart-turn": "Control loop",
+  "note-poll": "From one reading of the contacts to the next, with no command between them.", "note-first-byte": "From the last bit of a request to the first byte of its answer.",
+  "note-turn": "How long the control loop is busy each time it wakes.", "axis-ms": "ms", "axis-count": "times", "times": "times",
+  "quantiles": "{0} times: median {1} ms, 95 % {2}, 99 % {3}, longest {4}", "none-yet": "Nothing counted yet.",
+
+  // recordings
+  "recordings": "Recordings", "session": "session", "events": "events", "excluded-count": "excluded", "decided-by": "decided by",
+  "machine-drive": "driving", "machine-calibrate": "calibration", "machine-tour": "demo", "choose-two": "Choose a session to walk it again, or two to compare them.",
+  "no-recordings": "The store holds no recording yet.", "walking": "walking it again …", "walked-track": "The track of {0}", "play": "Play", "pause": "Pause",
+  "moment": "Moment", "compared": "Compared", "note-recorded": "Where trains were beside the estimate when a contact told; upright: the moment shown.",
+  "chart-recorded": "Prediction errors of the sessions", "axis-session": "time since its first picture (s)",
+
+  // odometry
+  "odometry": "Odometry", "drop-here": "Drop a recording of a tachometer here: CSV or Parquet.", "or-choose": "Or choose a file:",
+  "note-odometry": "Columns t_s, pulses_1, pulses_2 and more; it is walked as by `footplate odometry`, for two powered wheelsets of 80 teeth. At most 64 MB.",
+  "walking-file": "{0} is walked …", "odometry-of": "Odometry of {0}", "too-large": "{0} is too large: {1} MB; at most 64 MB are taken",
 };

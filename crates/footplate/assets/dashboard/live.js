@@ -12,11 +12,11 @@ function keep(list, item) {
 }
 
 /**
- * Says `state` (with `connecting`, `connected` or `lost`), `picture`, `line`, `passed`, `ended`, `gap`, and `anew` when
+ * Says `state` (with `connecting`, `connected` or `lost`), `picture`, `line`, `passed`, `ended`, `alarm`, `gap`, and `anew` when
  * another session has begun and nothing of before counts.
  */
 export class Live extends EventTarget {
-  layout; picture; state = "connecting"; lines = []; passed = []; ended = [];
+  layout; picture; state = "connecting"; lines = []; passed = []; ended = []; alarms = [];
   #session; #drawing = false;
 
   async begin() {
@@ -37,7 +37,7 @@ export class Live extends EventTarget {
   #isOf({ lastEventId }) {
     const session = lastEventId.slice(0, lastEventId.lastIndexOf("-"));
     if (this.#session !== undefined && session !== this.#session) {
-      [this.lines, this.passed, this.ended] = [[], [], []];
+      [this.lines, this.passed, this.ended, this.alarms] = [[], [], [], []];
       this.#say("anew");
     }
     this.#session = session;
@@ -66,6 +66,7 @@ export class Live extends EventTarget {
     happens("line", "lines");
     happens("passed", "passed");
     happens("ended", "ended");
+    happens("alarm", "alarms");
     events.addEventListener("gap", (event) => this.#say("gap", event.data));
   }
 }

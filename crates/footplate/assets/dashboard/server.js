@@ -24,5 +24,10 @@ export async function ask(path, body) {
   }));
 }
 
+/** Sends a file; throws what the server says against it. */
+export async function send(path, file) {
+  return answer(await fetch(path, { method: "POST", headers: { "Content-Type": "application/octet-stream", ...headers }, body: file }));
+}
+
 /** Gives an order as the prompt understands it. */
 export const order = (line) => ask("/api/orders", { line });

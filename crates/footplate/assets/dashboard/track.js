@@ -1,7 +1,8 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
 const SVG = "http://www.w3.org/2000/svg";
-const COLOURS = 6;
+/** Trains have so many colours. */
+export const COLOURS = 6;
 
 function element(name, attributes, parent) {
   const made = document.createElementNS(SVG, name);

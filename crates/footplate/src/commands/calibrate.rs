@@ -21,7 +21,7 @@ use super::Outcome;
 use super::log_file::LogFile;
 use crate::clock::{Moment, now};
 use crate::link::Address;
-use explain::Question;
+pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
 
 /// Calibrate a train on a layout, or trains from recorded sensor reports.

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::{
     calibrate, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
-    replay, report, simulate, store,
+    replay, report, serve, simulate, store,
 };
 
 /// Makes the list of verbs from the names of their files.
@@ -44,6 +44,7 @@ verbs! {
     Predict: predict,
     Replay: replay,
     Report: report,
+    Serve: serve,
     Simulate: simulate,
     Store: store,
 }

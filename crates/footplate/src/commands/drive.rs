@@ -18,6 +18,7 @@ mod words;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
@@ -27,21 +28,23 @@ use footplate_store::{Journal, NewMachine, Store, parse_layout};
 use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::DriveBeginning;
+pub(crate) use self::conductor::Conductor;
 use self::conductor::Giver;
 use self::instruction::HELP;
 use self::reader::Known;
 use self::result_line::ResultLine;
 use self::script::read_script;
-use self::spoken::Spoken;
+pub(crate) use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;
 use super::predict::turnout_state;
+use super::serve::{archive_routes, odometry_routes};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Dashboard, ServedAt};
-use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
+use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::witness::Witnessed;
@@ -58,6 +61,26 @@ Examples:
   footplate drive --link sim:track-a?seed=7 --store railway.db
   footplate drive --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db --script evening.txt --json")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    railway: Railway,
+    /// Lines to carry out, one after the other; a train ends one order before it begins the next.
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+    /// Print a line of JSON for every finished order; all else goes to standard error.
+    #[arg(long)]
+    json: bool,
+    /// Show trains live in a browser, and take orders from there: at a port of this machine (8417 unless named, 0 for any
+    /// that is free), or at an address. Beyond this machine a token has to be set in the environment as FOOTPLATE_TOKEN.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
+    serve: Option<ServedAt>,
+    /// Nobody sits here, whatever standard input is.
+    #[arg(skip)]
+    is_headless: bool,
+}
+
+/// What is driven: a station, a layout, and what is known of trains.
+#[derive(Args)]
+pub(crate) struct Railway {
     /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or marklin-serial:tcp://host:port.
     #[arg(long, value_name = "URL")]
     link: Address,
@@ -76,42 +99,39 @@ pub(crate) struct Arguments {
     /// How a turnout lies when the session begins, such as 6=straight; may be repeated.
     #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
     turnouts: Vec<(TurnoutId, Leg)>,
-    /// Lines to carry out, one after the other; a train ends one order before it begins the next.
-    #[arg(long, value_name = "FILE")]
-    script: Option<PathBuf>,
-    /// Print a line of JSON for every finished order; all else goes to standard error.
-    #[arg(long)]
-    json: bool,
-    /// Show trains live in a browser, and take orders from there: at a port of this machine (8417 unless named, 0 for any
-    /// that is free), or at an address. Beyond this machine a token has to be set in the environment as FOOTPLATE_TOKEN.
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
-    serve: Option<ServedAt>,
 }
 
 impl Arguments {
+    /// Drives for browsers and programs alone.
+    pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
+        Self { railway, script: None, json: false, serve: Some(at), is_headless: true }
+    }
+
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let written = self.layout()?;
         let layout = &written.layout;
-        let store = self.store.as_deref().map(Store::open_or_create).transpose()?;
-        let mut named: BTreeSet<TrainId> = self.trains.iter().copied().map(TrainId).collect();
-        if let Address::Simulated(simulated) = &self.link {
+        let store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
+        let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
+        if let Address::Simulated(simulated) = &self.railway.link {
             named.extend(&simulated.trains);
         }
-        let known =
-            KnownTrains::gather(layout, &Sources { files: &self.models, store: store.as_ref(), named })?;
+        let known = KnownTrains::gather(
+            layout,
+            &Sources { files: &self.railway.models, store: store.as_ref(), named },
+        )?;
         drop(store);
         let beginning = self.beginning(&written, known)?;
         // A person at the prompt lives in real time; a script need not.
         let is_watched = self.script.is_none() || self.serve.is_some();
         let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let dashboard = self.dashboard(&written)?;
-        match &self.link {
+        match &self.railway.link {
             Address::Simulated(simulated) => {
                 let link = open_simulated(simulated, layout, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
             Address::Serial(_) => {
-                let link = open(&self.link, layout, pace)?;
+                let link = open(&self.railway.link, layout, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
         }
@@ -119,7 +139,7 @@ impl Arguments {
 
     /// The layout: the one that was named, or the simulated one.
     fn layout(&self) -> anyhow::Result<WrittenLayout> {
-        let named = match (&self.layout, &self.link) {
+        let named = match (&self.railway.layout, &self.railway.link) {
             (Some(named), _) => named,
             (None, Address::Simulated(simulated)) => &simulated.layout,
             (None, Address::Serial(_)) => {
@@ -132,7 +152,7 @@ impl Arguments {
     fn beginning(&self, written: &WrittenLayout, known: KnownTrains) -> anyhow::Result<DriveBeginning> {
         let layout = &written.layout;
         let mut turnouts = known.turnouts;
-        for (turnout, leg) in &self.turnouts {
+        for (turnout, leg) in &self.railway.turnouts {
             if layout.branch(*turnout).is_none() {
                 bail!("--turnout: {} has no turnout {turnout}", layout.name());
             }
@@ -164,14 +184,15 @@ impl Arguments {
 
     /// Whether nobody sits here, and people are elsewhere.
     fn is_headless(&self) -> bool {
-        self.serve.is_some() && !std::io::stdin().is_terminal()
+        self.is_headless || self.serve.is_some() && !std::io::stdin().is_terminal()
     }
 
     fn dashboard(&self, written: &WrittenLayout) -> anyhow::Result<Option<Dashboard>> {
         let Some(at) = &self.serve else { return Ok(None) };
         let token = std::env::var("FOOTPLATE_TOKEN").ok();
-        let dashboard =
-            Dashboard::open(at, token, &parse_layout(written.layout.name(), written.text.as_bytes())?)?;
+        let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
+        let more = archive_routes(self.railway.store.clone(), &written.layout).and(odometry_routes());
+        let dashboard = Dashboard::open(at, token, &layout, more)?;
         eprintln!("the dashboard is at {}", dashboard.url);
         Ok(Some(dashboard))
     }
@@ -183,7 +204,7 @@ impl Arguments {
         at: Timestamp,
         beginning: &DriveBeginning,
     ) -> anyhow::Result<Option<SessionJournal>> {
-        let Some(path) = &self.store else { return Ok(None) };
+        let Some(path) = &self.railway.store else { return Ok(None) };
         let now = now();
         let began_at = Some(now + (Timestamp::ZERO - at));
         let name = format!("drive {}", local(now));
@@ -193,7 +214,7 @@ impl Arguments {
         journal
             .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
         // Only a simulated clock can wait for a disk.
-        let when_full = match &self.link {
+        let when_full = match &self.railway.link {
             Address::Simulated(_) => WhenFull::Wait,
             Address::Serial(_) => WhenFull::Lose,
         };
@@ -208,7 +229,8 @@ impl Arguments {
         dashboard: Option<&Dashboard>,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
-        let settings = session_settings(&self.link, &link, layout);
+        let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
+        let settings = session_settings(&self.railway.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
         let lines = (self.script.is_none() && !self.is_headless()).then(lines_of_stdin);
         let mut stage = Stage::new(lines, self.json, dashboard);
@@ -251,7 +273,7 @@ impl Arguments {
         if !closing.is_complete() {
             eprintln!("{closing}");
         }
-        if let Some(store) = &self.store {
+        if let Some(store) = &self.railway.store {
             // What still waits is written down before what follows from it.
             drop(journal);
             KnownTrains::keep(store, layout, &conductor.learnt())?;

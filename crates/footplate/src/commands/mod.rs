@@ -19,9 +19,12 @@ mod odometry;
 mod predict;
 mod replay;
 mod report;
+mod serve;
 mod simulate;
 mod store;
 mod web_page;
 mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
+#[cfg(test)]
+pub(crate) use serve::{archive_routes, odometry_routes};

@@ -6,6 +6,7 @@ mod recording;
 mod report;
 mod results;
 mod tables;
+mod uploaded;
 mod walked;
 
 use std::io::Write;
@@ -19,6 +20,7 @@ use footplate_store::{default_vehicle, read_vehicle};
 use super::Outcome;
 use recording::{OpenRecording, WalkedRecording};
 use results::Results;
+pub(super) use uploaded::uploaded_page;
 use walked::Walked;
 
 /// Estimate speed and distance, with bounds, from what two wheelsets counted.

@@ -1,6 +1,7 @@
 //! `footplate replay`: a session decided once more, from what was written down of it.
 
 mod page;
+mod pictures;
 mod session;
 
 use std::io::Write;
@@ -15,6 +16,7 @@ use super::Outcome;
 use crate::clock::now;
 use crate::witness::{Ending, Extent};
 use page::Page;
+pub(super) use pictures::pictures;
 use session::rehearse;
 
 /// Decide a recorded session of driving or calibrating once more, and compare.

@@ -102,6 +102,17 @@ fn of_store(layout: &Layout, store: &Store, train: Option<TrainId>) -> anyhow::R
     Ok((sessions, Batch::of_store(layout, store, now, train)?))
 }
 
+/// What a store holds of one train, as the charts of a report read it.
+///
+/// # Errors
+/// The store cannot be read, or holds nothing of the train.
+pub(super) fn store_report(layout: &Layout, store: &Store, train: TrainId) -> anyhow::Result<String> {
+    let (sessions, batch) = of_store(layout, store, Some(train))?;
+    let data = gather(layout, &sessions, &batch)?;
+    let found = data.trains.into_iter().next();
+    Ok(serde_json::to_string(&found.with_context(|| format!("nothing of train {train} was recorded yet"))?)?)
+}
+
 fn gather(layout: &Layout, sessions: &[Session], batch: &Batch) -> anyhow::Result<ReportData> {
     let file = CalibrationFile::of(layout, batch);
     let trains = file.trains.iter().map(|form| {

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::Outcome;
+pub(super) use show::words;
 
 /// Keep measurements: show, import, exclude, restore, explain and salvage them.
 #[derive(Args)]

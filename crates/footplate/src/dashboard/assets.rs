@@ -4,7 +4,7 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
 /// What a browser may do for the pages: ask this server, and nothing else.
-const POLICY: &str = "default-src 'none'; connect-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; \
+const POLICY: &str = "default-src 'none'; connect-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; frame-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A file of the pages.
@@ -37,7 +37,7 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
         _ => files! { path:
             "index.html" "dashboard.css" "dashboard.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
             "german.js" "charts.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
-            "train_charts.js"
+            "train_charts.js" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js"
         },
     };
     let kind = match path.rsplit_once('.') {

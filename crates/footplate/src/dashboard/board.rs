@@ -18,13 +18,13 @@ const MOST_WAITING: usize = 64;
 
 /// Something that happened, with its number. Many watchers are sent the same text.
 #[derive(Debug, Clone)]
-pub(super) struct Happening {
+pub(crate) struct Happening {
     /// One more than that of the one before.
     pub(super) number: u64,
-    /// What kind it is of: `line`, `passed`, `ended`.
-    pub(super) kind: &'static str,
+    /// What kind it is of: `line`, `passed`, `ended`, `alarm`.
+    pub(crate) kind: &'static str,
     /// As JSON.
-    pub(super) json: Arc<str>,
+    pub(crate) json: Arc<str>,
 }
 
 /// How an order was taken.
@@ -161,7 +161,7 @@ impl Board {
         Ok(answered)
     }
 
-    pub(super) fn pictures(&self) -> watch::Receiver<Arc<str>> {
+    pub(crate) fn pictures(&self) -> watch::Receiver<Arc<str>> {
         self.picture.subscribe()
     }
 
@@ -181,7 +181,7 @@ impl Board {
     }
 
     /// What happened from a number on, and how much of it is gone.
-    pub(super) fn happened_from(&self, number: u64) -> (Vec<Happening>, u64) {
+    pub(crate) fn happened_from(&self, number: u64) -> (Vec<Happening>, u64) {
         let log = lock(&self.log);
         let first = log.happened.front().map_or(log.next, |happening| happening.number);
         let lost = first.saturating_sub(number);

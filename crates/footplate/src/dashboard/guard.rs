@@ -24,7 +24,7 @@ pub(super) enum Denied {
     Origin,
     /// No token, or another one.
     Token,
-    /// What changes something has to come as JSON, which no form of a foreign page can send unasked.
+    /// What is sent has to come as JSON or as plain bytes, which no form of a foreign page can send unasked.
     NotJson,
 }
 
@@ -45,7 +45,9 @@ impl Denied {
             }
             Self::Origin => "only the dashboard's own pages may ask this server",
             Self::Token => "beyond this machine the token is needed, as `Authorization: Bearer ...`",
-            Self::NotJson => "orders come as `Content-Type: application/json`",
+            Self::NotJson => {
+                "orders come as `Content-Type: application/json`, recordings as `application/octet-stream`"
+            }
         }
     }
 }
@@ -81,8 +83,9 @@ impl Guard {
                 return Err(Denied::Token);
             }
         }
-        let json = text(header::CONTENT_TYPE).is_some_and(|kind| kind.starts_with("application/json"));
-        if *method == Method::POST && !json { Err(Denied::NotJson) } else { Ok(()) }
+        let kind = text(header::CONTENT_TYPE).unwrap_or_default();
+        let is_unforged = kind.starts_with("application/json") || kind == "application/octet-stream";
+        if *method == Method::POST && !is_unforged { Err(Denied::NotJson) } else { Ok(()) }
     }
 
     /// Whether a `Host` names this server on its own machine.

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use footplate_core::calibration::motion::MotionModel;
+use footplate_core::calibration::{Drift, DriftTest};
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
+use serde_json::json;
 
 use super::board::Board;
 use super::history::Sample;
 use super::picture::{PROMISED, Picture, TrainTask, millis, paint_train, tenths};
-use super::spans::held_spans;
+use super::spans::{Span, held_spans};
 use super::way_travelled::WayTravelled;
 
 /// A contact is shown as just passed for so long (s).
@@ -43,6 +45,9 @@ pub(crate) struct Painter {
     ways: BTreeMap<TrainId, WayTravelled>,
     samples: Vec<(TrainId, Sample)>,
     sampled: Option<Timestamp>,
+    drifts: BTreeMap<TrainId, DriftTest>,
+    /// The line's clock when the session began, once that is known.
+    began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
     looked_at_models: Option<Timestamp>,
 }
@@ -63,6 +68,8 @@ struct PassedPicture<'l> {
     missed: usize,
     /// How far the train has come.
     way_mm: f64,
+    /// How far the errors are on their way to a drift alarm, 0 to 1.
+    drift: f64,
     /// The mean speed since the contact before, by the surveyed length alone: when, and how much.
     mean: Option<[f64; 2]>,
     next: Option<DuePicture<'l>>,
@@ -85,6 +92,8 @@ impl Painter {
             ways: BTreeMap::new(),
             samples: Vec::new(),
             sampled: None,
+            drifts: BTreeMap::new(),
+            began: None,
             models: BTreeMap::new(),
             looked_at_models: None,
         }
@@ -96,6 +105,12 @@ impl Painter {
         self.fresh.push(passed);
     }
 
+    /// Something is not as it should be, with a train or with the line.
+    pub(crate) fn alarm(&self, now: Timestamp, train: Option<TrainId>, text: &str) {
+        let t_s = millis((now - self.began.unwrap_or(now)).as_s());
+        self.board.tell("alarm", &json!({ "t_s": t_s, "train": train, "text": text }));
+    }
+
     /// Leaves the picture of a moment that is not before the last entry, and what has become of it since.
     pub(crate) fn paint(
         &mut self,
@@ -104,7 +119,24 @@ impl Painter {
         now: Timestamp,
         began: Timestamp,
     ) {
-        let driver = dispatcher.driver();
+        let held = |train| dispatcher.holds(train).map_or_else(Vec::new, held_spans);
+        self.paint_driven(dispatcher.driver(), held, tasks, now, began);
+    }
+
+    /// The same of trains that nobody dispatches: they hold nothing.
+    pub(crate) fn paint_alone(&mut self, driver: &Driver, now: Timestamp, began: Timestamp) {
+        self.paint_driven(driver, |_| Vec::new(), &BTreeMap::new(), now, began);
+    }
+
+    fn paint_driven(
+        &mut self,
+        driver: &Driver,
+        held: impl Fn(TrainId) -> Vec<Span>,
+        tasks: &BTreeMap<TrainId, TrainTask>,
+        now: Timestamp,
+        began: Timestamp,
+    ) {
+        self.began = Some(began);
         for passed in std::mem::take(&mut self.fresh) {
             self.tell_passed(driver, &passed, began);
         }
@@ -114,8 +146,7 @@ impl Painter {
         for train in driver.trains() {
             let located = driver.locate(train, now);
             let way = located.map(|located| self.way(driver, train, located.at));
-            let held = dispatcher.holds(train).map_or_else(Vec::new, held_spans);
-            trains.push(paint_train(driver, train, tasks.get(&train), now, way, held));
+            trains.push(paint_train(driver, train, tasks.get(&train), now, way, held(train)));
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), driver.told(train), located.as_ref(), way);
                 self.samples.push((train, sample));
@@ -161,6 +192,17 @@ impl Painter {
         let at = WayPoint { node, way: Length::ZERO };
         let way = self.ways.entry(*train).or_insert_with(|| WayTravelled::from(at));
         let mean = way.passes(layout, node, time);
+        let at_contact = way.at_contact();
+        let drift = self.drifts.entry(*train).or_default();
+        let alarm = passed.late.and_then(|[late, doubt]| drift.take(late.as_s() / doubt.as_s()));
+        let level = drift.level();
+        if let Some(drift) = alarm {
+            let text = match drift {
+                Drift::Slower => "contacts close later and later: it has become slower than it was",
+                Drift::Faster => "contacts close earlier and earlier: it has become faster than it was",
+            };
+            self.alarm(time, Some(*train), text);
+        }
         self.board.tell(
             "passed",
             &PassedPicture {
@@ -172,7 +214,8 @@ impl Painter {
                 late_half_ms: passed.late.map(|[_, doubt]| tenths(PROMISED * doubt.as_ms())),
                 short_mm: passed.short.map(|short| tenths(short.as_mm())),
                 missed: passed.missed,
-                way_mm: tenths(way.at_contact().as_mm()),
+                drift: millis(level),
+                way_mm: tenths(at_contact.as_mm()),
                 mean: mean.map(|(at, speed)| [since(at), tenths(speed.as_mm_per_s())]),
                 next: next.map(|next| DuePicture {
                     contact: layout.sensor_name(next.sensor),

@@ -145,7 +145,7 @@ fn name(driver: &Driver, train: TrainId, at: WayPoint) -> Option<String> {
 
 /// The layout as the browser draws it, once.
 #[derive(Debug, Serialize)]
-pub(super) struct LayoutPicture {
+pub(crate) struct LayoutPicture {
     name: String,
     nodes: Vec<NodePicture>,
     edges: Vec<EdgePicture>,
@@ -171,7 +171,7 @@ struct EdgePicture {
 }
 
 impl LayoutPicture {
-    pub(super) fn of(file: &LayoutFile) -> Self {
+    pub(crate) fn of(file: &LayoutFile) -> Self {
         let layout = &file.layout;
         let node = |(id, node): (footplate_core::NodeId, &footplate_core::track::Node)| {
             let (kind, number) = match node.kind {

@@ -2,18 +2,20 @@
 //!
 //! ```text
 //! GET  /                     the pages
+//! GET  /api/openapi.json     all that can be asked for, as programs read it
 //! GET  /api/layout           the layout, with where to draw it
 //! GET  /api/picture          what there is to see now
 //! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `gap`; `Last-Event-ID` goes on
 //! GET  /api/trains/24/history   the last five minutes of a train
 //! GET  /api/trains/24/model     how it moves
+//! GET  /api/line             how the line and the loop keep time
 //! POST /api/orders           {"line": "stop 24 at C13+120mm"}: what the prompt understands
 //! POST /api/emergency-stop   {}: all trains stop, power off
 //! ```
 
 use std::net::SocketAddr;
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -36,8 +38,10 @@ use super::board::{Answer, Board};
 use super::guard::Guard;
 use super::model_picture::ModelPicture;
 use super::picture::LayoutPicture;
+use super::routes::Routes;
 use super::stream::events;
 use crate::clock::now;
+use crate::link::{LineTallies, SharedTallies};
 
 /// An order is a line; none that means anything is longer.
 const LONGEST_BODY: usize = 4 << 10;
@@ -45,6 +49,9 @@ const LONGEST_BODY: usize = 4 << 10;
 const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 /// The port that is asked for unless another is named.
 const USUAL_PORT: u16 = 8417;
+
+/// What can be asked for, as programs read it.
+const OPENAPI: &str = include_str!("../../assets/dashboard/openapi.json");
 
 /// What the prompt calls an emergency stop.
 const HALT: &str = "halt";
@@ -77,6 +84,8 @@ impl FromStr for ServedAt {
 #[derive(Debug)]
 pub(crate) struct Dashboard {
     pub(crate) board: Arc<Board>,
+    /// How the line keeps time, as its link counts it.
+    pub(crate) line: SharedTallies,
     /// What to open in a browser.
     pub(crate) url: String,
 }
@@ -85,15 +94,21 @@ pub(crate) struct Dashboard {
 struct Shared {
     board: Arc<Board>,
     layout: Arc<str>,
+    line: SharedTallies,
     guard: Guard,
 }
 
 impl Dashboard {
-    /// Begins to serve.
+    /// Begins to serve, with more routes than those of driving.
     ///
     /// # Errors
     /// The address is taken, or is open to others and no token was given.
-    pub(crate) fn open(at: &ServedAt, token: Option<String>, layout: &LayoutFile) -> anyhow::Result<Self> {
+    pub(crate) fn open(
+        at: &ServedAt,
+        token: Option<String>,
+        layout: &LayoutFile,
+        more: Routes,
+    ) -> anyhow::Result<Self> {
         if !at.0.ip().is_loopback() && token.as_deref().unwrap_or_default().is_empty() {
             bail!(
                 "{} can be reached from other machines: set a token in the environment as FOOTPLATE_TOKEN, or serve \
@@ -109,43 +124,57 @@ impl Dashboard {
         // Nobody else has begun at the same moment at the same port.
         let board = Board::new(now().as_ns());
         let url = format!("http://{bound}/");
-        let shared = Shared { board: Arc::clone(&board), layout, guard: Guard::new(bound, token) };
+        let line = SharedTallies::default();
+        let guard = Guard::new(bound, token);
+        let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line), guard };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
         thread::Builder::new().name("dashboard".to_owned()).spawn(move || {
             runtime.block_on(async move {
                 match TcpListener::from_std(listener) {
                     Ok(listener) => {
-                        let _ = axum::serve(listener, router(shared)).await;
+                        let _ = axum::serve(listener, router(shared, more)).await;
                     }
                     Err(error) => eprintln!("the dashboard is not served: {error}"),
                 }
             });
         })?;
-        Ok(Self { board, url })
+        Ok(Self { board, line, url })
     }
 }
 
-fn router(shared: Shared) -> Router {
+fn router(shared: Shared, more: Routes) -> Router {
+    let guard = shared.guard.clone();
     Router::new()
-        .route("/api/layout", get(layout))
-        .route("/api/picture", get(picture))
-        .route("/api/events", get(watch))
-        .route("/api/trains/{train}/history", get(history))
-        .route("/api/trains/{train}/model", get(model))
-        .route("/api/orders", post(order))
-        .route("/api/emergency-stop", post(emergency_stop))
         .route("/", get(|| page(Path(String::new()))))
         .route("/{file}", get(page))
+        .merge(own_routes(shared).and(more).into_router())
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
-        .layer(from_fn_with_state(shared.clone(), guarded))
-        .with_state(shared)
+        .layer(from_fn_with_state(guard, guarded))
 }
 
-async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+/// What can be asked of those who drive.
+fn own_routes(shared: Shared) -> Routes {
+    Routes::new(
+        shared,
+        [
+            ("/api/openapi.json", get(async || ready_json(OPENAPI))),
+            ("/api/layout", get(layout)),
+            ("/api/picture", get(picture)),
+            ("/api/events", get(watch)),
+            ("/api/trains/{train}/history", get(history)),
+            ("/api/trains/{train}/model", get(model)),
+            ("/api/line", get(line)),
+            ("/api/orders", post(order)),
+            ("/api/emergency-stop", post(emergency_stop)),
+        ],
+    )
+}
+
+async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Response {
     // Streams of events cannot send headers of their own: they show the token in the address.
     let query = request.uri().query().unwrap_or_default();
     let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-    match shared.guard.check(request.method(), request.headers(), token) {
+    match guard.check(request.method(), request.headers(), token) {
         Ok(()) => next.run(request).await,
         Err(denied) => (denied.status(), Json(json!({ "error": denied.says() }))).into_response(),
     }
@@ -176,6 +205,18 @@ async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
     let from = last.and_then(|last| shared.board.number_after(last)).unwrap_or(0);
     Sse::new(events(shared.board, from)).keep_alive(KeepAlive::default()).into_response()
+}
+
+/// How the line and the loop keep time, as counted until a moment ago.
+async fn line(State(shared): State<Shared>) -> Response {
+    let tallies = shared.line.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let LineTallies { periods, first_bytes, turns } = tallies;
+    Json(json!({
+        "poll_period": periods.picture(),
+        "first_byte": first_bytes.picture(),
+        "loop_turn": turns.picture(),
+    }))
+    .into_response()
 }
 
 /// A number in a path that is none of a train is none of a train that is driven.
@@ -229,5 +270,27 @@ async fn ask(board: &Board, line: String, is_urgent: bool) -> Response {
         Ok(Ok(Answer::Taken)) => (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response(),
         Ok(Ok(Answer::Refused(why))) => answer(StatusCode::UNPROCESSABLE_ENTITY, &why),
         _ => answer(StatusCode::GATEWAY_TIMEOUT, "the control loop did not answer: is the link in order?"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::commands::{archive_routes, odometry_routes};
+
+    #[test]
+    fn the_description_of_the_interface_has_every_route_and_no_other() {
+        let guard = Guard::new(([127, 0, 0, 1], 80).into(), None);
+        let shared =
+            Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
+        let layout = footplate_store::layout_named("track-a").expect("built in").layout;
+        let routes = own_routes(shared).and(archive_routes(None, &layout)).and(odometry_routes());
+        let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
+        let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
+        let described: BTreeSet<&str> =
+            described["paths"].as_object().expect("paths").keys().map(String::as_str).collect();
+        assert_eq!(there, described);
     }
 }

@@ -8,13 +8,17 @@
 //! simulated   a virtual station in this process, as fast as it goes or paced
 //! served      a virtual station for other programs, at a network port or a pseudo-terminal
 //! tapped      any of them, with every byte noted
+//! rhythm      what bytes tell of how often sensors are asked for
+//! observed    any of them, with its times counted while it is used
 //! stream      a serial port or a network connection, read by a thread, with the clock of this computer
 //! ```
 
 mod address;
 mod line;
 mod news;
+mod observed;
 mod open;
+mod rhythm;
 mod served;
 mod simulated;
 mod stream;
@@ -23,7 +27,9 @@ mod tapped;
 pub(crate) use address::{Address, SimulatedAddress, Speed, law_named, trains};
 pub(crate) use line::{Heard, Link, Lost};
 pub(crate) use news::news_of;
+pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_simulated, session_settings, station};
+pub(crate) use rhythm::Rhythm;
 pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use stream::StreamLink;

@@ -54,7 +54,11 @@ struct Listing {
 }
 
 impl Question {
-    pub(super) fn answer(
+    /// Writes the measurements behind the number.
+    ///
+    /// # Errors
+    /// Nothing was measured of it.
+    pub(in crate::commands) fn answer(
         &self,
         layout: &Layout,
         batch: &Batch,

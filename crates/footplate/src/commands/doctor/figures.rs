@@ -2,10 +2,9 @@
 
 use std::io::Write;
 
-use footplate_core::{TimeSpan, Timestamp};
-use footplate_wire::marklin_serial::{BYTE_TIME, Message};
+use footplate_core::TimeSpan;
 
-use crate::link::Passed;
+use crate::link::{Passed, Rhythm};
 
 /// Bars of the histogram are as wide as this at most.
 const BAR: usize = 40;
@@ -28,32 +27,17 @@ impl Figures {
     pub(super) fn of(passed: &[Passed], lost: usize) -> Self {
         let mut figures =
             Self { periods: Vec::new(), with_command: Vec::new(), first_bytes: Vec::new(), asked: 0, lost };
-        let mut said = Vec::new();
-        // The last request, and how many other messages went since.
-        let mut request: Option<(Timestamp, usize)> = None;
-        let mut answered = true;
+        let mut rhythm = Rhythm::default();
         for one in passed {
             match *one {
                 Passed::Written(at, byte) => {
-                    said.push(byte);
-                    let Some((message, _)) = Message::decode(&said) else { continue };
-                    if message.modules_read().is_empty() {
-                        request = request.map(|(asked, others)| (asked, others + 1));
-                    } else {
-                        figures.asked += 1;
-                        if let Some((before, others)) = request {
-                            figures.period(at - before, others);
-                        }
-                        request = Some((at, 0));
-                        answered = false;
+                    let Some(request) = rhythm.written(at, byte) else { continue };
+                    figures.asked += 1;
+                    if let Some((span, others)) = request.after {
+                        figures.period(span, others);
                     }
-                    said.clear();
                 }
-                Passed::Heard(at) if !answered => {
-                    answered = true;
-                    figures.first_bytes.extend(request.map(|(asked, _)| (at - (asked + BYTE_TIME)).as_ms()));
-                }
-                Passed::Heard(_) => {}
+                Passed::Heard(at) => figures.first_bytes.extend(rhythm.heard(at).map(TimeSpan::as_ms)),
             }
         }
         for figures in [&mut figures.periods, &mut figures.with_command, &mut figures.first_bytes] {

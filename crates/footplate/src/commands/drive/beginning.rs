@@ -35,6 +35,11 @@ impl DriveBeginning {
     /// The name of such a machine in a store.
     pub(crate) const KIND: &'static str = "drive";
 
+    /// The text of the layout.
+    pub(crate) fn layout(&self) -> &str {
+        &self.layout
+    }
+
     /// The conductor that begins so.
     ///
     /// # Errors

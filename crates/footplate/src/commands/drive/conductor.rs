@@ -369,7 +369,7 @@ impl Conductor {
     }
 
     /// Shows what there is to see now.
-    pub(super) fn show(&self, painter: &mut Painter, now: Timestamp) {
+    pub(crate) fn show(&self, painter: &mut Painter, now: Timestamp) {
         let task = |train: TrainId| {
             let busy = self.driver().busy(train);
             let order = busy.filter(|order| self.pending.contains_key(order));

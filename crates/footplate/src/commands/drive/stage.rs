@@ -111,6 +111,14 @@ impl Stage {
     pub(super) fn say(&self, text: &str, status: &str) {
         self.screen.say(text, status);
     }
+
+    /// Says what is not as it should be.
+    fn alarm(&self, now: Timestamp, text: &str) {
+        if let Some(watched) = &self.watched {
+            watched.painter.alarm(now, None, text);
+        }
+        self.screen.say(text, "");
+    }
 }
 
 impl Attendant<Witnessed<Conductor>> for Stage {
@@ -132,15 +140,15 @@ impl Attendant<Witnessed<Conductor>> for Stage {
         }
     }
 
-    fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
+    fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
         self.news.extend(news_of(notice));
         if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
-            self.screen.say(&notice.to_string(), "");
+            self.alarm(now, &notice.to_string());
         }
     }
 
-    fn hear_of_refusal(&mut self, _: Timestamp, command: Command, error: CommandError) {
-        self.screen.say(&format!("not sent: {command}: {error}"), "");
+    fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
+        self.alarm(now, &format!("not sent: {command}: {error}"));
     }
 
     fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) -> Wish {

@@ -6,7 +6,7 @@ use footplate_core::track::Layout;
 use footplate_core::{Length, TrainId};
 
 use super::spoken::{Ended, Target};
-use crate::link::{Link, SimulatedLink};
+use crate::link::{Link, ObservedLink, SimulatedLink};
 
 /// Knows where trains really are, if anybody does.
 pub(super) trait Referee {
@@ -26,6 +26,16 @@ impl Referee for SimulatedLink<'_> {
         let Target::Place(place) = target else { return None };
         let sensor = layout.sensor_at(place.node)?;
         Some(self.station().world().truth().past(train, sensor)? - place.offset)
+    }
+}
+
+impl<L: Link + Referee> Referee for ObservedLink<L> {
+    fn odometer(&self, train: TrainId) -> Option<Length> {
+        self.inner().odometer(train)
+    }
+
+    fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length> {
+        self.inner().beyond(layout, train, target)
     }
 }
 

@@ -46,6 +46,14 @@ struct RunForm {
 /// # Errors
 /// What the system said.
 pub(super) fn write(path: &Path, walked: &Walked) -> io::Result<()> {
+    write_whole(path, page(walked)?.as_bytes())
+}
+
+/// The page.
+///
+/// # Errors
+/// Its numbers cannot be written as JSON.
+pub(super) fn page(walked: &Walked) -> serde_json::Result<String> {
     let runs = || walked.recordings.iter().flat_map(|recording| recording.runs.iter());
     let charted = runs().filter(|run| run.series.is_some()).count();
     let most = MOST_POINTS * WHOLE_RUNS / charted.max(WHOLE_RUNS);
@@ -72,5 +80,5 @@ pub(super) fn write(path: &Path, walked: &Walked) -> io::Result<()> {
         style: STYLE,
         script: CHARTS,
     };
-    write_whole(path, page.html(&form)?.as_bytes())
+    page.html(&form)
 }

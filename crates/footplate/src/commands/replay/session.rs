@@ -51,7 +51,7 @@ pub(super) fn rehearse(
     }
 }
 
-fn read<B: DeserializeOwned>(stored: &StoredMachine) -> anyhow::Result<B> {
+pub(super) fn read<B: DeserializeOwned>(stored: &StoredMachine) -> anyhow::Result<B> {
     serde_json::from_str(&stored.body).with_context(|| {
         format!(
             "the machine of recording {} began as version {} of the program knew it, and this one ({}) misses something",

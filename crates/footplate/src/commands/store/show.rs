@@ -163,7 +163,8 @@ fn write_events(
     Ok(())
 }
 
-fn words(kind: EventKind, names: Option<&dyn SensorNames>) -> String {
+/// An event as people read it.
+pub(in crate::commands) fn words(kind: EventKind, names: Option<&dyn SensorNames>) -> String {
     match kind {
         EventKind::Sensor(report) => format!("sensor {}", sensor_name(report.sensor, names)),
         EventKind::Speed { train, step } => format!("train {train} to step {step}"),

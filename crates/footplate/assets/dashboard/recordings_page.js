@@ -1,0 +1,182 @@
+// Sessions that were written down: listed, walked again with a slider, and beside each other.
+
+import { colour, dots } from "./chart.js";
+import { LiveChart } from "./charts.js";
+import { make, put, shown, signed } from "./dom.js";
+import { get } from "./server.js";
+import { Track } from "./track.js";
+import { View } from "./view.js";
+import { say } from "./words.js";
+
+/** Lines around the shown moment. */
+const LINES = 8;
+/** Times real time at which a session is played. */
+const PLAYED = 4;
+
+/** One session on the page: its track, and what it was at a time. */
+class Walked {
+  #root; #track; #pictures; #lines; passed;
+
+  constructor(root, name, { layout, pictures, happened }) {
+    this.#root = root;
+    this.#pictures = pictures;
+    const of = (kind) => happened.filter((one) => one.kind === kind).map(({ what }) => what);
+    this.#lines = of("line");
+    this.passed = of("passed");
+    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    svg.setAttribute("class", "track-view");
+    svg.setAttribute("role", "img");
+    svg.setAttribute("tabindex", "0");
+    svg.setAttribute("aria-label", say("walked-track", name));
+    root.replaceChildren(make("h3", {}, name), svg, make("p", { class: "where" }), make("ol", { class: "said" }));
+    this.#track = new Track(svg, layout);
+    new View(svg, this.#track.whole, () => {});
+  }
+
+  /** The time from the first picture to the last (s). */
+  get lasts() {
+    return this.#pictures.at(-1).t_s - this.#pictures[0].t_s;
+  }
+
+  /** Shows a moment, so long after the first picture. */
+  show(time) {
+    const at = this.#pictures[0].t_s + time;
+    let [low, high] = [0, this.#pictures.length - 1];
+    while (low < high) {
+      const middle = Math.ceil((low + high) / 2);
+      if (this.#pictures[middle].t_s <= at) low = middle;
+      else high = middle - 1;
+    }
+    const picture = this.#pictures[low];
+    this.#track.show(picture);
+    const where = picture.trains.map((train) => `${say("train", train.train)}: ${train.at ? `${train.at} ± ${shown(train.half_mm)} mm, ${shown(train.speed_mm_per_s)} mm/s` : say("nowhere")}${train.doing ? ` (${train.doing})` : ""}`);
+    put(this.#root.querySelector(".where"), where.join("; "));
+    const said = this.#lines.filter(({ t_s }) => t_s <= at).slice(-LINES).map(({ text }) => make("li", {}, text));
+    this.#root.querySelector(".said").replaceChildren(...said);
+  }
+
+  /** Contacts by time since the first picture, with how far off each prediction was. */
+  errors() {
+    const begins = this.#pictures[0].t_s;
+    return this.passed.filter(({ short_mm }) => short_mm != null).map(({ t_s, short_mm, late_ms, late_half_ms }) => ({ at: t_s - begins, mm: -short_mm, inside: Math.abs(late_ms) <= late_half_ms }));
+  }
+}
+
+export function recordingsPage(root, live, number) {
+  const $ = (selector) => root.querySelector(selector);
+  const shownSessions = new Map();
+  let chart, playing, list = [];
+  const slider = $("#time");
+
+  function show() {
+    const time = Number(slider.value);
+    put($("#time-told"), `${shown(time, 1)} s`);
+    for (const walked of shownSessions.values()) walked.show(time);
+  }
+
+  function errors() {
+    chart?.close();
+    chart = undefined;
+    const all = [...shownSessions.entries()].map(([name, walked]) => [name, walked.errors()]);
+    $("#walked").hidden = all.length === 0;
+    if (all.length === 0) return;
+    chart = new LiveChart($("figure"), () => ({
+      name: say("chart-recorded"), x: { label: say("axis-session"), unit: "s", digits: 1 }, y: say("axis-sure"), zero: true, zooms: true,
+      series: all.map(([name], place) => dots(name, ["first", "second"][place], "mm", 1)),
+      below: [(u) => {
+        const at = u.valToPos(Number(slider.value), "x", true);
+        u.ctx.save();
+        u.ctx.strokeStyle = colour("quiet");
+        u.ctx.beginPath();
+        u.ctx.moveTo(at, u.bbox.top);
+        u.ctx.lineTo(at, u.bbox.top + u.bbox.height);
+        u.ctx.stroke();
+        u.ctx.restore();
+      }],
+    }), uPlot.join(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])));
+    $("#figures").replaceChildren(...all.map(([name, own]) => {
+      const rms = Math.sqrt(own.reduce((sum, { mm }) => sum + mm * mm, 0) / Math.max(own.length, 1));
+      const mean = own.reduce((sum, { mm }) => sum + mm, 0) / Math.max(own.length, 1);
+      const inside = own.filter((one) => one.inside).length;
+      return make("tr", {}, make("th", { scope: "row" }, name), make("td", { class: "number" }, String(own.length)),
+        make("td", { class: "number" }, own.length ? shown(rms, 1) : "–"), make("td", { class: "number" }, own.length ? signed(mean, 1) : "–"),
+        make("td", { class: "number" }, own.length ? `${shown((100 * inside) / own.length)} %` : "–"));
+    }));
+  }
+
+  async function open() {
+    stop();
+    const wanted = [...root.querySelectorAll("#recordings input:checked")].map(({ value }) => Number(value));
+    put($("#answer"), say("walking"));
+    shownSessions.clear();
+    $("#sessions").replaceChildren();
+    try {
+      for (const recording of wanted) {
+        const { name } = list.find((one) => one.recording === recording);
+        const walked = await get(`/api/recordings/${recording}/pictures`);
+        const place = make("article", { class: "session" });
+        $("#sessions").append(place);
+        shownSessions.set(name, new Walked(place, name, walked));
+      }
+      put($("#answer"), "");
+    } catch (error) {
+      put($("#answer"), error.message);
+    }
+    slider.max = String(Math.max(0, ...[...shownSessions.values()].map((walked) => walked.lasts)).toFixed(1));
+    slider.value = "0";
+    errors();
+    show();
+  }
+
+  function stop() {
+    clearInterval(playing);
+    playing = undefined;
+    put($("#play"), say("play"));
+  }
+
+  $("#play").addEventListener("click", () => {
+    if (playing) return stop();
+    put($("#play"), say("pause"));
+    let last = performance.now();
+    playing = setInterval(() => {
+      const now = performance.now();
+      slider.value = String(Number(slider.value) + PLAYED * (now - last) / 1000);
+      last = now;
+      show();
+      if (Number(slider.value) >= Number(slider.max)) stop();
+    }, 50);
+  });
+  slider.addEventListener("input", show);
+  slider.addEventListener("change", errors);
+
+  async function begin() {
+    try {
+      list = (await get("/api/recordings")).reverse();
+    } catch (error) {
+      put($("#answer"), error.message);
+      return;
+    }
+    $("#recordings").replaceChildren(...list.map((one) => {
+      const drives = one.machines.some((kind) => kind !== "calibrate");
+      const box = make("input", { type: "checkbox", value: String(one.recording), disabled: !drives, checked: String(one.recording) === number });
+      box.addEventListener("change", () => {
+        const checked = [...root.querySelectorAll("#recordings input:checked")];
+        // Two can be compared; a third takes the place of the one before.
+        if (checked.length > 2) checked.find((other) => other !== box).checked = false;
+        open();
+      });
+      return make("tr", {}, make("th", { scope: "row" }, make("label", {}, box, ` ${one.name}`)), make("td", {}, one.layout),
+        make("td", { class: "number" }, String(one.events)), make("td", { class: "number" }, String(one.excluded)), make("td", {}, one.machines.length ? one.machines.map((kind) => say(`machine-${kind}`)).join(", ") : "–"));
+    }));
+    put($("#answer"), list.length ? say("choose-two") : say("no-recordings"));
+    if (root.querySelector("#recordings input:checked")) open();
+  }
+
+  begin();
+  return {
+    close() {
+      stop();
+      chart?.close();
+    },
+  };
+}

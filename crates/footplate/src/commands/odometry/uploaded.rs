@@ -1,0 +1,64 @@
+//! A recording that somebody sent: walked as files are, and its page.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use anyhow::{Context, bail};
+use footplate_store::default_vehicle;
+use footplate_store::odometry::{Preset, RunContext};
+
+use super::recording::OpenRecording;
+use super::report;
+use super::walked::Walked;
+
+/// Recordings that were sent to this process, so that two of one name are two files.
+static SENT: AtomicU32 = AtomicU32::new(0);
+
+/// Charts of as many runs as there are in one page.
+const MOST_RUNS: usize = report::MOST_RUNS;
+
+/// A folder that is gone when nobody holds it any more.
+struct Passing(PathBuf);
+
+impl Drop for Passing {
+    fn drop(&mut self) {
+        // Whoever cleans the folder of passing files will find what is left.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The page of a recording: CSV or Parquet by the ending of its name, the vehicle as when none is named.
+///
+/// # Errors
+/// What is wrong with the recording, with its place.
+pub(crate) fn uploaded_page(name: &str, bytes: &[u8]) -> anyhow::Result<String> {
+    let name = Path::new(name).file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    if !(name.ends_with(".csv") || name.ends_with(".parquet")) {
+        bail!("`{name}` should be a recording whose name ends with .csv or .parquet");
+    }
+    // In a folder of its own, so that the file is called in messages as it was called where it came from.
+    let number = SENT.fetch_add(1, Ordering::Relaxed);
+    let folder = std::env::temp_dir().join(format!("footplate-{}-{number}", std::process::id()));
+    fs::create_dir(&folder).with_context(|| format!("making room for `{name}`"))?;
+    let folder = Passing(folder);
+    let file = folder.0.join(name);
+    fs::File::create_new(&file)?.write_all(bytes)?;
+    walked_page(&file).map_err(|error| {
+        // Where it passed through is nobody's concern.
+        let said = format!("{error:#}").replace(&file.display().to_string(), name);
+        anyhow::Error::msg(said)
+    })
+}
+
+fn walked_page(path: &Path) -> anyhow::Result<String> {
+    let vehicle = default_vehicle()?;
+    let preset = Preset::Recommended;
+    let recording = OpenRecording::open(path, false)?;
+    let context = RunContext { vehicle: vehicle.vehicle, preset, score: recording.has_truth() };
+    let mut charts_left = MOST_RUNS;
+    let recordings = vec![recording.walk(&context, None, &mut charts_left)?];
+    let walked = Walked { vehicle: vehicle.name, preset, recordings, is_scored: context.score };
+    Ok(report::page(&walked)?)
+}

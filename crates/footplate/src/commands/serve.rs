@@ -1,0 +1,40 @@
+//! `footplate serve`: drives trains without a prompt, for browsers and programs.
+
+mod archive;
+mod desk;
+mod odometry_desk;
+
+use std::io::Write;
+
+use clap::Args;
+
+use super::Outcome;
+use super::drive;
+use crate::dashboard::ServedAt;
+
+pub(crate) use archive::archive_routes;
+pub(crate) use odometry_desk::odometry_routes;
+
+/// Drive trains from browsers and programs: the dashboard and its HTTP interface, without a prompt.
+///
+/// The same as `footplate drive --serve` with nobody at the prompt: prints where to look, and drives until it is told to
+/// `quit` or interrupted. Then all trains are told to stand and the power is taken from the track.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  footplate serve --link sim:track-a?seed=7 --train 24 --store railway.db
+  FOOTPLATE_TOKEN=secret footplate serve 0.0.0.0:8417 --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db")]
+pub(crate) struct Arguments {
+    /// A port of this machine (0 for any that is free), or an address. Beyond this machine a token has to be set in the
+    /// environment as FOOTPLATE_TOKEN.
+    #[arg(value_name = "ADDRESS", default_value = "")]
+    at: ServedAt,
+    #[command(flatten)]
+    railway: drive::Railway,
+}
+
+impl Arguments {
+    pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        drive::Arguments::served(self.railway, self.at).run(output)
+    }
+}

@@ -1,0 +1,115 @@
+//! A link under observation: how the line and the loop around it keep time, for whoever looks, while neither waits for them.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::rhythm::Rhythm;
+use super::{Heard, Link, Lost};
+use crate::clock::Stopwatch;
+use crate::tally::Tally;
+
+/// How often what was counted is handed over.
+const HANDED_OVER_EVERY: Duration = Duration::from_millis(500);
+
+/// What was counted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LineTallies {
+    /// From one request for the sensors to the next with nothing between them.
+    pub(crate) periods: Tally,
+    /// From the last bit of a request to the first byte of its answer.
+    pub(crate) first_bytes: Tally,
+    /// For how long the loop was busy between two waits, by the clock on the wall.
+    pub(crate) turns: Tally,
+}
+
+/// Where it is left for others.
+pub(crate) type SharedTallies = Arc<Mutex<LineTallies>>;
+
+/// A link of which times are counted if somebody wants them.
+pub(crate) struct ObservedLink<L> {
+    link: L,
+    observed: Option<Observed>,
+}
+
+struct Observed {
+    shared: SharedTallies,
+    own: LineTallies,
+    rhythm: Rhythm,
+    turn: Option<Stopwatch>,
+    handed_over: Stopwatch,
+}
+
+impl<L: Link> ObservedLink<L> {
+    pub(crate) fn new(link: L, shared: Option<SharedTallies>) -> Self {
+        let observed = shared.map(|shared| Observed {
+            shared,
+            own: LineTallies::default(),
+            rhythm: Rhythm::default(),
+            turn: None,
+            handed_over: Stopwatch::start(),
+        });
+        Self { link, observed }
+    }
+
+    pub(crate) const fn inner(&self) -> &L {
+        &self.link
+    }
+}
+
+impl Observed {
+    fn turn_ends(&mut self) {
+        if let Some(turn) = self.turn.take() {
+            self.own.turns.add(1e3 * turn.elapsed().as_secs_f64());
+        }
+        if self.handed_over.elapsed() >= HANDED_OVER_EVERY
+            && let Ok(mut shared) = self.shared.try_lock()
+        {
+            shared.clone_from(&self.own);
+            self.handed_over = Stopwatch::start();
+        }
+    }
+}
+
+impl<L: Link> Link for ObservedLink<L> {
+    fn now(&self) -> Timestamp {
+        self.link.now()
+    }
+
+    fn write(&mut self, byte: u8) -> Result<(), Lost> {
+        if let Some(observed) = &mut self.observed {
+            let request = observed.rhythm.written(self.link.now(), byte);
+            // What has a command between it is no period of the polls alone.
+            if let Some((span, 0)) = request.and_then(|request| request.after) {
+                observed.own.periods.add(span.as_ms());
+            }
+        }
+        self.link.write(byte)
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        let Some(observed) = &mut self.observed else { return self.link.wait(until) };
+        observed.turn_ends();
+        let heard = self.link.wait(until);
+        observed.turn = Some(Stopwatch::start());
+        if matches!(heard, Heard::Byte(_))
+            && let Some(span) = observed.rhythm.heard(self.link.now())
+        {
+            observed.own.first_bytes.add(span.as_ms());
+        }
+        heard
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.link.cts()
+    }
+
+    fn patience(&self) -> TimeSpan {
+        self.link.patience()
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        self.link.reopen()
+    }
+}
