@@ -8,12 +8,14 @@
 //! board            where the control loop leaves all that, and finds what was asked; it never waits for anybody
 //! guard            who may ask: hosts, origins, a token beyond loopback
 //! server  stream   HTTP on a thread of its own; what one watcher is sent
+//! showing          what machines do that take no orders: calibrations, a demonstration
 //! routes           what can be asked for
 //! assets           the pages, inside the program
 //! ```
 
 mod assets;
 mod board;
+mod calibration_picture;
 mod guard;
 mod history;
 mod model_picture;
@@ -21,6 +23,7 @@ mod painter;
 mod picture;
 mod routes;
 mod server;
+mod showing;
 mod spans;
 mod stream;
 mod way_travelled;
@@ -31,3 +34,4 @@ pub(crate) use picture::LayoutPicture;
 pub(crate) use picture::TrainTask;
 pub(crate) use routes::Routes;
 pub(crate) use server::{Dashboard, ServedAt};
+pub(crate) use showing::Showing;

@@ -37,7 +37,8 @@ struct Footplate {
 }
 
 fn main() -> ExitCode {
-    let mut output = std::io::stdout().lock();
+    // Not locked: the live view of a terminal is drawn from a thread of its own.
+    let mut output = std::io::stdout();
     let result = Footplate::parse().command.unwrap_or_default().run(&mut output).and_then(|outcome| {
         output.flush()?;
         Ok(outcome)

@@ -228,8 +228,8 @@ export function calibrationPage(root, live, number) {
   function progress(now) {
     $("#progress").hidden = !now;
     if (!now) return;
-    put($("#about"), now.about);
-    put($("#because"), now.why ?? "–");
+    put($("#about"), now.experiment ?? say(`phase-${now.phase}`));
+    put($("#because"), !now.experiment ? "–" : now.gain == null ? say("because-untried") : say("because-most", shown(now.takes_s), shown(now.gain, 1)));
     put($("#left"), say("left-of", shown(now.left_s), shown(now.elapsed_s + now.left_s)));
     $("#elapsed").max = now.elapsed_s + now.left_s;
     $("#elapsed").value = now.elapsed_s;

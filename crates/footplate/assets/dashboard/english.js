@@ -6,6 +6,8 @@ export const ENGLISH = {
   "halt": "Emergency stop", "halt-hint": "or the space bar: all trains stand, power off",
   "halt-asked": "emergency stop asked for, not confirmed yet",
   "halt-taken": "all trains were told to stand, and the power goes off",
+  "halt-told": "the station was told to take the power off; nothing has been heard of it since: NOT CONFIRMED",
+  "halt-heard": "the station was told to take the power off and has answered since; a 6051 never says whether it did: NOT CONFIRMED, see that the trains stand",
   "halt-failed": "the emergency stop was NOT taken: {0}",
   "chart-keys": "Arrow keys move along the values.", "skip": "To the page",
 
@@ -60,6 +62,9 @@ export const ENGLISH = {
   "excluded": "excluded: event {0}; it stays in the store and can be restored", "restored": "restored: event {0}", "marked": "Excluded by a person",
   "under-way": "A calibration is under way", "about": "experiment", "because": "why", "time-left": "time left", "time-used": "Time used",
   "expected": "expected accuracy", "left-of": "{0} s of {1} s of track time", "expected-at": "at step {0}: stops within {1} mm, speed within {2} % (95 %)",
+  "phase-finding": "looking for the train", "phase-joining": "on the way to a circuit", "phase-experiment": "an experiment",
+  "phase-paused": "paused", "phase-ending": "coming to rest", "phase-finished": "done", "because-untried": "nothing is known of this step yet",
+  "because-most": "of all experiments it takes the most doubt away for its time: {1} scatters squared in {0} s",
   "chart-speeds": "Speed by step", "chart-stops-by-step": "Way to rest by step", "chart-stored": "Speed by step from recordings",
   "chart-law": "Change of speed", "chart-beyond": "Beyond the law", "axis-step": "step", "axis-since": "since the command (s)",
   "axis-beyond": "beyond (mm)", "beyond-law": "beyond the law", "from-below": "from below", "from-above": "from above", "from-unknown": "side not recorded",

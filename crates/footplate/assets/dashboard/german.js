@@ -6,6 +6,8 @@ export const GERMAN = {
   "halt": "Nothalt", "halt-hint": "oder die Leertaste: alle Züge stehen, Strom aus",
   "halt-asked": "Nothalt verlangt, noch nicht bestätigt",
   "halt-taken": "allen Zügen ist Halt befohlen, der Strom geht aus",
+  "halt-told": "der Zentrale ist befohlen, den Strom wegzunehmen; seither ist nichts von ihr gehört: NICHT BESTÄTIGT",
+  "halt-heard": "der Zentrale ist befohlen, den Strom wegzunehmen, und sie hat seither geantwortet; eine 6051 sagt nie, ob sie es tat: NICHT BESTÄTIGT, nachsehen, ob die Züge stehen",
   "halt-failed": "der Nothalt wurde NICHT angenommen: {0}",
   "chart-keys": "Pfeiltasten gehen die Werte entlang.", "skip": "Zur Seite",
 
@@ -60,6 +62,9 @@ export const GERMAN = {
   "excluded": "ausgeschlossen: Ereignis {0}; es bleibt im Speicher und kann zurückgeholt werden", "restored": "zurückgeholt: Ereignis {0}", "marked": "Von Menschen ausgeschlossen",
   "under-way": "Eine Kalibrierung läuft", "about": "Versuch", "because": "warum", "time-left": "Zeit übrig", "time-used": "Verbrauchte Zeit",
   "expected": "erwartete Genauigkeit", "left-of": "{0} s von {1} s Gleiszeit", "expected-at": "bei Stufe {0}: Halte auf {1} mm, Tempo auf {2} % (95 %)",
+  "phase-finding": "sucht den Zug", "phase-joining": "auf dem Weg zu einem Kreis", "phase-experiment": "ein Versuch",
+  "phase-paused": "angehalten", "phase-ending": "kommt zum Stehen", "phase-finished": "fertig", "because-untried": "von dieser Stufe ist noch nichts bekannt",
+  "because-most": "von allen Versuchen nimmt er am meisten Unsicherheit für seine Zeit: {1} Streuungen im Quadrat in {0} s",
   "chart-speeds": "Tempo je Stufe", "chart-stops-by-step": "Anhalteweg je Stufe", "chart-stored": "Tempo je Stufe aus Aufzeichnungen",
   "chart-law": "Tempowechsel", "chart-beyond": "Jenseits des Gesetzes", "axis-step": "Stufe", "axis-since": "seit dem Befehl (s)",
   "axis-beyond": "jenseits (mm)", "beyond-law": "jenseits des Gesetzes", "from-below": "von unten", "from-above": "von oben", "from-unknown": "Seite nicht aufgezeichnet",

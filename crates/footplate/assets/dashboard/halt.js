@@ -1,18 +1,46 @@
 // The emergency stop: always there, one key, and never shown as more certain than it is.
 
-import { ask } from "./server.js";
+import { ask, get } from "./server.js";
 import { say } from "./words.js";
 
+/** Between two looks at what the station was told (ms). */
+const LOOKED_EVERY_MS = 1000;
 const banner = document.getElementById("halted");
+/** An emergency stop of this page that the line has not been seen to carry yet. */
+let asked = false;
+
+function tell(word, ...blanks) {
+  const text = say(word, ...blanks);
+  banner.hidden = false;
+  if (banner.textContent !== text) banner.textContent = text;
+}
 
 export async function halt() {
-  banner.hidden = false;
-  banner.textContent = say("halt-asked");
+  asked = true;
+  tell("halt-asked");
   try {
     await ask("/api/emergency-stop", {});
-    banner.textContent = say("halt-taken");
+    tell("halt-taken");
   } catch (error) {
-    banner.textContent = say("halt-failed", error.message);
+    tell("halt-failed", error.message);
+  }
+  setTimeout(look, LOOKED_EVERY_MS / 2);
+}
+
+/** Whoever took the power: as long as it is off, every page says so, and how sure that is. */
+async function look() {
+  let power;
+  try {
+    ({ power } = await get("/api/line"));
+  } catch {
+    // The state of the connection says so; what the banner says stays.
+    return;
+  }
+  if (power && !power.is_on) {
+    asked = false;
+    tell(power.has_answered ? "halt-heard" : "halt-told");
+  } else if (!asked) {
+    banner.hidden = true;
   }
 }
 
@@ -25,3 +53,4 @@ document.addEventListener("keydown", (event) => {
     halt();
   }
 });
+setInterval(look, LOOKED_EVERY_MS);

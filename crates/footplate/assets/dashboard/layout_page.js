@@ -55,8 +55,9 @@ export function layoutPage(root, live) {
         make("label", { htmlFor: id }, say("step")), step,
         button("set", () => give(`speed ${train.train} ${step.value}`))));
     made.style.borderLeftColor = colourOf(nth);
+    if (cards.size === 0) $("#trains").replaceChildren();
     $("#trains").append(made);
-    const parts = { at, speed, busy, stopHere };
+    const parts = { made, at, speed, busy, stopHere };
     cards.set(train.train, parts);
     return parts;
   }
@@ -74,6 +75,11 @@ export function layoutPage(root, live) {
       parts.stopHere.disabled = !track.place;
       put(parts.stopHere, say("stop-here", track.place ?? "…"));
     });
+    for (const [train, { made }] of cards) {
+      if (picture.trains.some((one) => one.train === train)) continue;
+      made.remove();
+      cards.delete(train);
+    }
     if (picture.trains.length === 0) put($("#trains"), say("none"));
   }
 

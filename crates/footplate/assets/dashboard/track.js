@@ -101,6 +101,11 @@ export class Track {
     }
     for (const number of Object.keys(picture.passed)) this.#contacts.get(Number(number))?.classList.add("passed");
     picture.trains.forEach((train, place) => this.#train(train, place));
+    for (const [number, parts] of this.#trains) {
+      if (picture.trains.some(({ train }) => train === number)) continue;
+      Object.values(parts).forEach((part) => part.remove());
+      this.#trains.delete(number);
+    }
   }
 
   #train(train, place) {

@@ -20,6 +20,7 @@ use footplate_store::{
 use super::Outcome;
 use super::log_file::LogFile;
 use crate::clock::{Moment, now};
+use crate::dashboard::ServedAt;
 use crate::link::Address;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
@@ -34,6 +35,7 @@ pub(crate) use live::CalibrationBeginning;
 #[command(after_help = "\
 Examples:
   footplate calibrate --link sim:track-a?seed=7 --layout track-a --train 24 --store railway.db
+  footplate calibrate --link sim:track-a?seed=7&speed=5 --layout track-a --train 24 --serve
   footplate calibrate --link marklin-serial:/dev/ttyUSB0 --layout track-a --train 24 --budget 5m --store railway.db
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
   footplate calibrate --from session.csv --layout track-a --store railway.db
@@ -49,6 +51,10 @@ pub(crate) struct Arguments {
     /// Track time that driving may take, such as 5m or 90s.
     #[arg(long, value_name = "TIME", default_value = "5m", value_parser = live::budget)]
     budget: TimeSpan,
+    /// Show it live in a browser: at a port of this machine (8417 unless named, 0 for any that is free), or at an address.
+    /// Then a simulated layout keeps real time.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "", requires = "link")]
+    serve: Option<ServedAt>,
     /// Begin from nothing, even if the store knows the train already.
     #[arg(long, requires = "link")]
     afresh: bool,
@@ -85,6 +91,7 @@ impl Arguments {
                 train: TrainId(train),
                 budget: self.budget,
                 is_afresh: self.afresh,
+                serve: self.serve.as_ref(),
                 store: self.store.as_deref(),
                 out: self.out.as_deref(),
                 is_json: self.json,

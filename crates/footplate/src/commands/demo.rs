@@ -19,8 +19,10 @@ use footplate_store::{Journal, MotionFile, Store, TrainAtStart};
 use serde_json::json;
 
 use super::Outcome;
+use super::serve::open_dashboard;
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
+use crate::dashboard::{ServedAt, Showing};
 use crate::link::Speed;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
 pub(crate) use beginning::TourBeginning;
@@ -58,6 +60,10 @@ pub(crate) struct Arguments {
     /// Write the session down in this store, as a real one would be.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
+    /// Show it live in a browser: at a port of this machine (8417 unless named, 0 for any that is free), or at an address.
+    /// At a terminal it is shown anyway.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
+    serve: Option<ServedAt>,
     /// Write a line of JSON for whatever is learnt, stopped and kept.
     #[arg(long)]
     json: bool,
@@ -71,7 +77,7 @@ fn speed(text: &str) -> Result<f64, String> {
 impl Default for Arguments {
     /// What somebody sees who says nothing at all.
     fn default() -> Self {
-        Self { seed: 1, speed: None, store: None, json: false }
+        Self { seed: 1, speed: None, store: None, serve: None, json: false }
     }
 }
 
@@ -80,13 +86,24 @@ impl Arguments {
         let on = WrittenLayout::named("track-a")?;
         let layout = &on.layout;
         let screen = Screen::new(output, if self.json { Manner::Json } else { Manner::Text });
-        let watched = screen.is_watched().then_some(WATCHED_SPEED);
+        let is_watched = screen.is_watched();
+        let dashboard = match &self.serve {
+            Some(at) => Some(open_dashboard(at, &on, self.store.clone())?),
+            // Somebody else may sit at the usual port.
+            None if is_watched => open_dashboard(&ServedAt::USUAL, &on, self.store.clone())
+                .or_else(|_| open_dashboard(&ServedAt::ANY, &on, self.store.clone()))
+                .ok(),
+            None => None,
+        };
+        let watched = (is_watched || dashboard.is_some()).then_some(WATCHED_SPEED);
         let speed = self.speed.or(watched).map_or(Speed::Unpaced, Speed::Times);
         let record = SharedRecord::default();
         let mut recorder = record.clone();
         let railway = Railway::new(layout, self.seed, &TRAINS, speed, &mut recorder)?;
         record.0.borrow_mut().journal = self.journal(layout, railway.now())?;
+        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, railway.now()));
         let mut stage = Stage::new(railway, screen, speed, record, &TRAINS);
+        stage.showing = showing;
         self.greet(&mut stage)?;
         let mut dice = Dice::new(self.seed);
         let mut turnouts = TurnoutStates::unknown();

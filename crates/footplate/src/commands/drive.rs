@@ -10,6 +10,7 @@ mod result_line;
 mod script;
 mod spoken;
 mod stage;
+mod terminal;
 mod told;
 mod trains;
 mod truth;
@@ -36,14 +37,15 @@ use self::result_line::ResultLine;
 use self::script::read_script;
 pub(crate) use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
+use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;
 use super::predict::turnout_state;
-use super::serve::{archive_routes, odometry_routes};
+use super::serve::open_dashboard;
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
-use crate::dashboard::{Dashboard, ServedAt};
+use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
@@ -73,6 +75,9 @@ pub(crate) struct Arguments {
     /// that is free), or at an address. Beyond this machine a token has to be set in the environment as FOOTPLATE_TOKEN.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
     serve: Option<ServedAt>,
+    /// Lines of text instead of the live view, at a terminal, too.
+    #[arg(long)]
+    plain: bool,
     /// Nobody sits here, whatever standard input is.
     #[arg(skip)]
     is_headless: bool,
@@ -104,7 +109,7 @@ pub(crate) struct Railway {
 impl Arguments {
     /// Drives for browsers and programs alone.
     pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
-        Self { railway, script: None, json: false, serve: Some(at), is_headless: true }
+        Self { railway, script: None, json: false, serve: Some(at), plain: true, is_headless: true }
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -182,19 +187,22 @@ impl Arguments {
         })
     }
 
+    /// Whether somebody sits at a terminal that can be drawn on.
+    fn is_drawn(&self) -> bool {
+        let can = std::io::stdin().is_terminal()
+            && std::io::stdout().is_terminal()
+            && std::env::var_os("TERM").is_some_and(|term| term != "dumb");
+        can && !self.plain && !self.json && self.script.is_none() && !self.is_headless()
+    }
+
     /// Whether nobody sits here, and people are elsewhere.
     fn is_headless(&self) -> bool {
         self.is_headless || self.serve.is_some() && !std::io::stdin().is_terminal()
     }
 
     fn dashboard(&self, written: &WrittenLayout) -> anyhow::Result<Option<Dashboard>> {
-        let Some(at) = &self.serve else { return Ok(None) };
-        let token = std::env::var("FOOTPLATE_TOKEN").ok();
-        let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
-        let more = archive_routes(self.railway.store.clone(), &written.layout).and(odometry_routes());
-        let dashboard = Dashboard::open(at, token, &layout, more)?;
-        eprintln!("the dashboard is at {}", dashboard.url);
-        Ok(Some(dashboard))
+        let store = || self.railway.store.clone();
+        self.serve.as_ref().map(|at| open_dashboard(at, written, store())).transpose()
     }
 
     /// What writes the session down; the line's clock stands at `at`.
@@ -232,8 +240,21 @@ impl Arguments {
         let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
         let settings = session_settings(&self.railway.link, &link, layout);
         let session = Interface::new(link.now(), settings)?;
-        let lines = (self.script.is_none() && !self.is_headless()).then(lines_of_stdin);
-        let mut stage = Stage::new(lines, self.json, dashboard);
+        let sits_at_terminal = self.is_drawn();
+        let drawn = || Board::new(now().as_ns());
+        let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));
+        let board = board.or_else(|| sits_at_terminal.then(drawn));
+        let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
+        let mut stage = Stage::new(asks.then(lines_of_stdin), self.json, board.as_ref());
+        let mut terminal = None;
+        if let Some(board) = board.filter(|_| sits_at_terminal) {
+            if let Some(dashboard) = dashboard {
+                board.say(0.0, &format!("the dashboard is at {}", dashboard.url));
+            }
+            stage.be_silent();
+            let file = parse_layout(layout.name(), beginning.layout().as_bytes())?;
+            terminal = Some(Terminal::open(&board, &LayoutPicture::of(&file))?);
+        }
         let mut journal = self.journal(layout, link.now(), &beginning)?;
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let conductor = beginning.conductor()?;
@@ -266,6 +287,9 @@ impl Arguments {
                 break ending;
             }
         };
+        if terminal.take().is_some() {
+            eprintln!("stopping all trains and taking the power from the track");
+        }
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);

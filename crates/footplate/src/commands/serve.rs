@@ -5,12 +5,15 @@ mod desk;
 mod odometry_desk;
 
 use std::io::Write;
+use std::path::PathBuf;
 
 use clap::Args;
+use footplate_store::parse_layout;
 
 use super::Outcome;
 use super::drive;
-use crate::dashboard::ServedAt;
+use super::written_layout::WrittenLayout;
+use crate::dashboard::{Dashboard, ServedAt};
 
 pub(crate) use archive::archive_routes;
 pub(crate) use odometry_desk::odometry_routes;
@@ -31,6 +34,23 @@ pub(crate) struct Arguments {
     at: ServedAt,
     #[command(flatten)]
     railway: drive::Railway,
+}
+
+/// Opens a dashboard for a session on a layout, and says where.
+///
+/// # Errors
+/// It cannot be served there.
+pub(super) fn open_dashboard(
+    at: &ServedAt,
+    written: &WrittenLayout,
+    store: Option<PathBuf>,
+) -> anyhow::Result<Dashboard> {
+    let token = std::env::var("FOOTPLATE_TOKEN").ok();
+    let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
+    let more = archive_routes(store, &written.layout).and(odometry_routes());
+    let dashboard = Dashboard::open(at, token, &layout, more)?;
+    eprintln!("the dashboard is at {}", dashboard.url);
+    Ok(dashboard)
 }
 
 impl Arguments {

@@ -1,7 +1,9 @@
 //! Between the control loop and those who watch it: the loop leaves things here and never waits.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use footplate_core::TrainId;
 use footplate_core::calibration::motion::MotionModel;
@@ -13,6 +15,12 @@ use super::history::{History, Sample};
 
 /// Happenings that are kept for watchers who were away: a quarter of an hour of a busy railway.
 const MOST_KEPT: usize = 4_000;
+/// No browser draws more often than this: fifty pictures a second.
+const BETWEEN_PICTURES: Duration = Duration::from_millis(20);
+/// Pictures that are sent in a second to all watchers together: a few hundredths of a core.
+const MOST_PICTURES_A_SECOND: u32 = 400;
+/// More watchers than this are sent away: a lecture hall has fewer seats, and a process some thousand sockets.
+const MOST_WATCHERS: usize = 2_000;
 /// Orders that can wait for the loop, which looks every few hundredths of a second: more come from no person.
 const MOST_WAITING: usize = 64;
 
@@ -20,7 +28,7 @@ const MOST_WAITING: usize = 64;
 #[derive(Debug, Clone)]
 pub(crate) struct Happening {
     /// One more than that of the one before.
-    pub(super) number: u64,
+    pub(crate) number: u64,
     /// What kind it is of: `line`, `passed`, `ended`, `alarm`.
     pub(crate) kind: &'static str,
     /// As JSON.
@@ -53,7 +61,7 @@ impl Asked {
 
 /// Orders cannot be taken: more wait than the loop has looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct TooMany;
+pub(crate) struct TooMany;
 
 #[derive(Debug, Default)]
 struct Log {
@@ -77,6 +85,8 @@ pub(crate) struct Board {
     histories: Mutex<BTreeMap<TrainId, History>>,
     models: Mutex<BTreeMap<TrainId, Arc<MotionModel>>>,
     waiting: Mutex<VecDeque<Asked>>,
+    /// Those who are sent events now.
+    watchers: AtomicUsize,
 }
 
 impl Board {
@@ -89,6 +99,7 @@ impl Board {
             histories: Mutex::default(),
             models: Mutex::default(),
             waiting: Mutex::default(),
+            watchers: AtomicUsize::new(0),
         })
     }
 
@@ -148,7 +159,7 @@ impl Board {
     }
 
     /// Asks for something. What is urgent goes before everything else and always finds room.
-    pub(super) fn ask(&self, line: String, is_urgent: bool) -> Result<oneshot::Receiver<Answer>, TooMany> {
+    pub(crate) fn ask(&self, line: String, is_urgent: bool) -> Result<oneshot::Receiver<Answer>, TooMany> {
         let (answer, answered) = oneshot::channel();
         let mut waiting = lock(&self.waiting);
         if is_urgent {
@@ -167,6 +178,13 @@ impl Board {
 
     pub(super) fn written(&self) -> watch::Receiver<u64> {
         self.written.subscribe()
+    }
+
+    /// Somebody begins to watch, unless too many do.
+    pub(super) fn watch(self: &Arc<Self>) -> Option<Watching> {
+        let before = self.watchers.fetch_add(1, Ordering::Relaxed);
+        let watching = Watching(Arc::clone(self));
+        (before < MOST_WATCHERS).then_some(watching)
     }
 
     /// What a happening is called, so that a browser that was away can say up to where it has heard.
@@ -192,6 +210,25 @@ impl Board {
     }
 }
 
+/// One who is sent events, until it is dropped.
+#[derive(Debug)]
+pub(super) struct Watching(Arc<Board>);
+
+impl Watching {
+    /// Between two pictures: fifty a second for a few watchers, and fewer for each of many, so that all of them together
+    /// take no more of a small machine.
+    pub(super) fn pace(&self) -> Duration {
+        let watchers = u32::try_from(self.0.watchers.load(Ordering::Relaxed)).unwrap_or(u32::MAX);
+        BETWEEN_PICTURES.max(Duration::from_secs(1) / MOST_PICTURES_A_SECOND * watchers)
+    }
+}
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        self.0.watchers.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 /// A thread that panicked while it held a lock left whole lines: they are moved in and out only.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -214,6 +251,20 @@ mod tests {
         assert_eq!(board.number_after(&board.name_of(12)), Some(13));
         assert_eq!(board.number_after("8-12"), None, "of another session");
         assert_eq!(*board.written().borrow(), MOST_KEPT as u64 + 10);
+    }
+
+    #[test]
+    fn many_watchers_share_the_pictures_and_too_many_are_sent_away() {
+        let board = Board::new(7);
+        let mut watching: Vec<Watching> = (0..8).filter_map(|_| board.watch()).collect();
+        assert_eq!(watching[0].pace(), Duration::from_millis(20), "eight see fifty a second");
+        watching.extend((8..MOST_WATCHERS).filter_map(|_| board.watch()));
+        assert_eq!(watching.len(), MOST_WATCHERS);
+        assert_eq!(watching[0].pace(), Duration::from_secs(5), "two thousand see one in five seconds");
+        assert!(board.watch().is_none());
+        watching.truncate(3);
+        assert_eq!(watching[0].pace(), Duration::from_millis(20));
+        assert!(board.watch().is_some());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use footplate_core::calibration::motion::MotionModel;
 use footplate_core::calibration::{Drift, DriftTest};
+use footplate_core::control::calibrate::CalibrationNotice;
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
@@ -12,6 +13,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::board::Board;
+use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
 use super::picture::{PROMISED, Picture, TrainTask, millis, paint_train, tenths};
 use super::spans::{Span, held_spans};
@@ -50,6 +52,9 @@ pub(crate) struct Painter {
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
     looked_at_models: Option<Timestamp>,
+    /// Somebody else tells the trains what to do: what a train was told is what has left for it.
+    follows: bool,
+    calibration: Option<CalibrationPicture>,
 }
 
 /// A passed contact as the browser gets it.
@@ -96,7 +101,24 @@ impl Painter {
             began: None,
             models: BTreeMap::new(),
             looked_at_models: None,
+            follows: false,
+            calibration: None,
         }
+    }
+
+    /// Of trains that somebody else drives.
+    pub(crate) fn following(board: &Arc<Board>) -> Self {
+        Self { follows: true, ..Self::new(board) }
+    }
+
+    /// Takes in what a calibration says.
+    pub(super) fn hear_calibration(&mut self, notice: &CalibrationNotice) {
+        self.calibration.get_or_insert_default().hear(notice);
+    }
+
+    /// The calibration is over.
+    pub(super) fn calibrates_no_more(&mut self) {
+        self.calibration = None;
     }
 
     /// A train passed a contact.
@@ -146,9 +168,10 @@ impl Painter {
         for train in driver.trains() {
             let located = driver.locate(train, now);
             let way = located.map(|located| self.way(driver, train, located.at));
-            trains.push(paint_train(driver, train, tasks.get(&train), now, way, held(train)));
+            let told = located.filter(|_| self.follows).map_or_else(|| driver.told(train), |at| at.step);
+            trains.push(paint_train(driver, train, tasks.get(&train), now, told, way, held(train)));
             if is_sampled {
-                let sample = Sample::of((now - began).as_s(), driver.told(train), located.as_ref(), way);
+                let sample = Sample::of((now - began).as_s(), told, located.as_ref(), way);
                 self.samples.push((train, sample));
             }
         }
@@ -173,6 +196,7 @@ impl Painter {
                     (turnout.0, leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }))
                 })
                 .collect(),
+            calibration: self.calibration.clone(),
             passed: self.flashes.iter().map(|(sensor, at)| (sensor.0, millis(seconds_since(*at)))).collect(),
         });
     }

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use footplate_core::control::Driver;
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, NodeKind};
-use footplate_core::{Length, Timestamp, TrainId};
+use footplate_core::{Length, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
 
+use super::calibration_picture::CalibrationPicture;
 use super::spans::{Span, spans};
 
 /// 95 % of a normal distribution lie within so many standard deviations.
@@ -36,6 +37,9 @@ pub(super) struct Picture {
     pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
     /// Contacts passed a moment ago, by the seconds since.
     pub(super) passed: BTreeMap<u16, f64>,
+    /// What a calibration is about, while one is under way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) calibration: Option<CalibrationPicture>,
 }
 
 /// One train at that moment.
@@ -79,12 +83,13 @@ struct Spot {
     offset_mm: f64,
 }
 
-/// The picture of a train; `way` is how far it has come, `held` the track that it holds.
+/// The picture of a train that was told a step; `way` is how far it has come, `held` the track that it holds.
 pub(super) fn paint_train(
     driver: &Driver,
     train: TrainId,
     task: Option<&TrainTask>,
     now: Timestamp,
+    told: SpeedStep,
     way: Option<Length>,
     held: Vec<Span>,
 ) -> TrainPicture {
@@ -103,7 +108,7 @@ pub(super) fn paint_train(
     });
     TrainPicture {
         train: train.0,
-        step: driver.told(train).get(),
+        step: told.get(),
         speed_mm_per_s: located.map_or(0.0, |located| tenths(located.speed.as_mm_per_s())),
         speed_half_mm_per_s: located
             .map_or(0.0, |located| tenths(PROMISED * located.speed_uncertainty.as_mm_per_s())),

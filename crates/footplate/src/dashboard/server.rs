@@ -13,7 +13,7 @@
 //! POST /api/emergency-stop   {}: all trains stop, power off
 //! ```
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::str::FromStr;
 use std::sync::{Arc, PoisonError};
 use std::thread;
@@ -60,13 +60,20 @@ const HALT: &str = "halt";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ServedAt(SocketAddr);
 
+impl ServedAt {
+    /// The usual port of this machine.
+    pub(crate) const USUAL: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), USUAL_PORT));
+    /// Any port of this machine that is free.
+    pub(crate) const ANY: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0));
+}
+
 impl FromStr for ServedAt {
     type Err = anyhow::Error;
 
     fn from_str(text: &str) -> anyhow::Result<Self> {
         let loopback = |port| SocketAddr::from(([127, 0, 0, 1], port));
         let address = match text {
-            "" => loopback(USUAL_PORT),
+            "" => Self::USUAL.0,
             _ => match text.parse::<u16>() {
                 Ok(port) => loopback(port),
                 Err(_) => text.parse().with_context(|| {
@@ -202,19 +209,24 @@ async fn picture(State(shared): State<Shared>) -> Response {
 }
 
 async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    let Some(watching) = shared.board.watch() else {
+        let says = "too many watch already: /api/picture can be asked for";
+        return (StatusCode::SERVICE_UNAVAILABLE, Json(json!({ "error": says }))).into_response();
+    };
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
     let from = last.and_then(|last| shared.board.number_after(last)).unwrap_or(0);
-    Sse::new(events(shared.board, from)).keep_alive(KeepAlive::default()).into_response()
+    Sse::new(events(shared.board, watching, from)).keep_alive(KeepAlive::default()).into_response()
 }
 
 /// How the line and the loop keep time, as counted until a moment ago.
 async fn line(State(shared): State<Shared>) -> Response {
     let tallies = shared.line.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let LineTallies { periods, first_bytes, turns } = tallies;
+    let LineTallies { periods, first_bytes, turns, power } = tallies;
     Json(json!({
         "poll_period": periods.picture(),
         "first_byte": first_bytes.picture(),
         "loop_turn": turns.picture(),
+        "power": power,
     }))
     .into_response()
 }

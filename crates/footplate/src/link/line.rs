@@ -2,6 +2,10 @@
 
 use footplate_core::{TimeSpan, Timestamp};
 
+/// How often people are asked for what they want while nothing else happens (ms): twice as often as a browser is shown a
+/// picture, so that fifty a second come out.
+pub(super) const PERSON_MS: f64 = 10.0;
+
 /// A line to a command station and the clock beside it.
 pub(crate) trait Link {
     /// The time, since the line was opened. On a simulated station it is the station's time.

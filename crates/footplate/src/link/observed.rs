@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
 
-use super::rhythm::Rhythm;
+use super::rhythm::{PowerTold, Rhythm};
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 use crate::tally::Tally;
@@ -22,6 +22,8 @@ pub(crate) struct LineTallies {
     pub(crate) first_bytes: Tally,
     /// For how long the loop was busy between two waits, by the clock on the wall.
     pub(crate) turns: Tally,
+    /// What the station was told of the power.
+    pub(crate) power: Option<PowerTold>,
 }
 
 /// Where it is left for others.
@@ -63,11 +65,17 @@ impl Observed {
         if let Some(turn) = self.turn.take() {
             self.own.turns.add(1e3 * turn.elapsed().as_secs_f64());
         }
-        if self.handed_over.elapsed() >= HANDED_OVER_EVERY
+        let power = self.rhythm.power();
+        let is_news = power != self.own.power;
+        self.own.power = power;
+        if (is_news || self.handed_over.elapsed() >= HANDED_OVER_EVERY)
             && let Ok(mut shared) = self.shared.try_lock()
         {
             shared.clone_from(&self.own);
             self.handed_over = Stopwatch::start();
+        } else if is_news {
+            // Whoever looks at this moment is not waited for: it is news again at the next turn.
+            self.own.power = None;
         }
     }
 }

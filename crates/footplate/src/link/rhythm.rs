@@ -2,6 +2,7 @@
 
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
+use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
 #[derive(Debug, Default)]
@@ -10,6 +11,18 @@ pub(crate) struct Rhythm {
     /// The last request, and how many other messages went since.
     request: Option<(Timestamp, usize)>,
     is_awaited: bool,
+    power: Option<PowerTold>,
+    /// Sensors were asked for after that.
+    asked_since: bool,
+}
+
+/// What the station was told last of the power, and whether anything was heard of it since.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(crate) struct PowerTold {
+    /// On, or off.
+    is_on: bool,
+    /// The station has answered a request since, so that it hears; whether it did what it was told no 6051 says.
+    has_answered: bool,
 }
 
 /// Sensors were asked for.
@@ -25,6 +38,10 @@ impl Rhythm {
         self.said.push(byte);
         let (message, _) = Message::decode(&self.said)?;
         let is_request = !message.modules_read().is_empty();
+        if let Message::Stop | Message::Go = message {
+            self.power = Some(PowerTold { is_on: message == Message::Go, has_answered: false });
+            self.asked_since = false;
+        }
         self.said.clear();
         if !is_request {
             self.request = self.request.map(|(asked, others)| (asked, others + 1));
@@ -32,12 +49,48 @@ impl Rhythm {
         }
         let before = self.request.replace((at, 0));
         self.is_awaited = true;
+        self.asked_since = true;
         Some(Request { after: before.map(|(asked, others)| (at - asked, others)) })
+    }
+
+    /// What the station was told of the power.
+    pub(crate) const fn power(&self) -> Option<PowerTold> {
+        self.power
     }
 
     /// A byte was heard; if it is the first of an answer, how long after the last bit of its request.
     pub(crate) fn heard(&mut self, at: Timestamp) -> Option<TimeSpan> {
         let (asked, _) = self.request.filter(|_| std::mem::take(&mut self.is_awaited))?;
+        if let Some(power) = &mut self.power
+            && self.asked_since
+        {
+            power.has_answered = true;
+        }
         Some(at - (asked + BYTE_TIME))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_power_counts_as_heard_of_only_when_a_later_request_is_answered() {
+        let at = |ms| Timestamp::ZERO + TimeSpan::from_ms(ms);
+        let mut rhythm = Rhythm::default();
+        // 128 + 5 asks five modules, 97 takes the power, 96 gives it (6051 manual).
+        assert_eq!(rhythm.written(at(0), 133), Some(Request { after: None }));
+        assert_eq!(rhythm.written(at(5), 97), None);
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: false }));
+        // The answer to what was asked before says nothing of it.
+        assert!(rhythm.heard(at(12)).is_some());
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: false }));
+        let request = rhythm.written(at(70), 133).expect("a request");
+        assert_eq!(request.after, Some((TimeSpan::from_ms(70), 1)));
+        assert_eq!(rhythm.heard(at(80)), Some(at(80) - (at(70) + BYTE_TIME)));
+        assert_eq!(rhythm.heard(at(84)), None, "only the first byte of an answer");
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: true }));
+        rhythm.written(at(90), 96);
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
     }
 }

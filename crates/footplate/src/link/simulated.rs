@@ -6,14 +6,12 @@ use footplate_core::{TimeSpan, Timestamp};
 use footplate_sim::living::{FromStation, VirtualStation};
 
 use super::address::Speed;
+use super::line::PERSON_MS;
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
 /// While nobody paces it, a virtual clock makes steps of this size at most, so that orders are looked for.
 const VIRTUAL_PATIENCE: TimeSpan = TimeSpan::from_ms(1_000);
-
-/// As long as a person who waits does not notice.
-const PERSON_MS: f64 = 30.0;
 
 /// A link into a simulated world.
 pub(crate) struct SimulatedLink<'l> {

@@ -12,6 +12,7 @@ use footplate_core::{TimeSpan, Timestamp};
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
 use super::address::{Port, SerialAddress};
+use super::line::PERSON_MS;
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
@@ -23,9 +24,6 @@ const CTS_EVERY: Duration = Duration::from_micros(500);
 const CONNECT_WITHIN: Duration = Duration::from_secs(2);
 /// A line that can not even be written to for so long is taken for lost.
 const WRITE_WITHIN: Duration = Duration::from_secs(1);
-/// As long as a person who waits does not notice.
-const PERSON_MS: f64 = 30.0;
-
 /// A line outside this process.
 pub(crate) struct StreamLink {
     address: SerialAddress,

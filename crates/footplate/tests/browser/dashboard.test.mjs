@@ -74,6 +74,11 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.waitForFunction(() => /told to stand/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
   const { trains } = await picture();
   assert.equal(trains[0].step, 0);
+  // The station was told, and is heard; that it did what it was told is never claimed.
+  await page.waitForFunction(() => /NOT CONFIRMED, see that the trains stand/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
+  await page.fill("#line", "power on");
+  await page.click("#order button");
+  await page.waitForFunction(() => document.querySelector("#halted").hidden, null, { timeout: PATIENCE });
   assert.deepEqual(complaints, []);
   await page.close();
 });

@@ -16,9 +16,9 @@ export function calibratedStore(name) {
   return store;
 }
 
-/** Starts the program at a port, 0 for any, four times as fast as real; resolves with the address that it prints. */
-export function serve(store, port) {
-  const child = spawn(process.env.FOOTPLATE, ["drive", "--link", `${LINK}&speed=4`, "--train", "24", "--store", store, "--serve", String(port)], { stdio: ["ignore", "ignore", "pipe"] });
+/** Starts the program at a port, 0 for any, so many times as fast as real; resolves with the address that it prints. */
+export function serve(store, port, { speed = 4, more = [] } = {}) {
+  const child = spawn(process.env.FOOTPLATE, ["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], { stdio: ["ignore", "ignore", "pipe"] });
   return new Promise((resolve, reject) => {
     let said = "";
     child.stderr.on("data", (text) => {

@@ -11,6 +11,7 @@ mod watcher;
 
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use footplate_core::calibration::SectionIndex;
@@ -27,8 +28,10 @@ use self::watcher::Watcher;
 use super::write_calibration;
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
-use crate::link::{Address, Link, Speed, open, open_simulated, session_settings};
+use crate::dashboard::{ServedAt, Showing};
+use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
 use crate::witness::Witnessed;
@@ -65,6 +68,7 @@ pub(super) struct Session<'a> {
     pub(super) train: TrainId,
     pub(super) budget: TimeSpan,
     pub(super) is_afresh: bool,
+    pub(super) serve: Option<&'a ServedAt>,
     pub(super) store: Option<&'a Path>,
     pub(super) out: Option<&'a Path>,
     pub(super) is_json: bool,
@@ -100,9 +104,11 @@ impl Session<'_> {
                 self.train
             );
         }
+        // Who watches lives in real time, unless the address says otherwise.
+        let pace = if self.serve.is_some() { Speed::Times(1.0) } else { Speed::Unpaced };
         match self.link {
             Address::Simulated(simulated) => {
-                let mut link = open_simulated(simulated, &real, Speed::Unpaced)?;
+                let mut link = open_simulated(simulated, &real, pace)?;
                 // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
                 for other in simulated.trains.iter().filter(|other| **other != self.train) {
                     eprintln!("train {other} is taken off the simulated rails meanwhile");
@@ -110,12 +116,16 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) => self.drive(&written, open(self.link, &real, Speed::Unpaced)?, output),
+            Address::Serial(_) => self.drive(&written, open(self.link, &real, pace)?, output),
         }
     }
 
     fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = &on.layout;
+        let store = || self.store.map(Path::to_path_buf);
+        let dashboard = self.serve.map(|at| open_dashboard(at, on, store())).transpose()?;
+        let link = ObservedLink::new(link, dashboard.as_ref().map(|dashboard| Arc::clone(&dashboard.line)));
+        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
         let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
         let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
@@ -128,7 +138,7 @@ impl Session<'_> {
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
-        let mut watcher = Watcher::new(layout, self.train, self.budget);
+        let mut watcher = Watcher::new(layout, self.train, self.budget).seen_by(showing);
         let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let ended = runtime.run(&mut calibrator, &mut watcher);
         let at = runtime.link().now();

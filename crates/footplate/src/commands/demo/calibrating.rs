@@ -44,7 +44,14 @@ pub(super) fn calibrate(
     stage.works(train, "learns", "");
     while calibrator.machine().ending().is_none() {
         for notice in stage.go_on(&mut calibrator)? {
+            if let Some(showing) = &mut stage.showing {
+                showing.hear(&notice);
+            }
             tell(stage, layout, train, budget, &notice)?;
+        }
+        let now = stage.now();
+        if let Some(showing) = &mut stage.showing {
+            showing.calibrator(calibrator.machine(), now);
         }
         if stage.is_broken() {
             return Ok(None);

@@ -14,6 +14,7 @@ use super::outcome::{MadeStop, signed};
 use super::stage::Stage;
 use super::targets::{Dice, steps_to_stop_from, target_ahead};
 use crate::commands::written_layout::WrittenLayout;
+use crate::dashboard::TrainPassed;
 use crate::witness::{Input, Witnessed};
 
 /// Targets that may be refused before no more are tried.
@@ -150,7 +151,12 @@ impl<'l> Tour<'l> {
                         return Ok(None);
                     }
                     DriveNotice::Planned(planned) => self.planned = Some(planned),
-                    DriveNotice::Passed { passed, next, .. } => self.pass(passed, next),
+                    DriveNotice::Passed { train, passed, next } => {
+                        if let Some(showing) = &mut stage.showing {
+                            showing.passed(TrainPassed { train, passed, next });
+                        }
+                        self.pass(passed, next);
+                    }
                     DriveNotice::Overshoots { by, .. } => {
                         stage.screen.mishap(
                             self.train,
@@ -165,6 +171,10 @@ impl<'l> Tour<'l> {
                     }
                     _ => {}
                 }
+            }
+            let now = stage.now();
+            if let Some(showing) = &mut stage.showing {
+                showing.driver(self.driver.machine(), now);
             }
             let detail = self.detail(stage.now(), target, step, finished.is_some());
             stage.shows(self.train, &detail, None);

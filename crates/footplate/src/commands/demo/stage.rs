@@ -13,6 +13,7 @@ use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
 use crate::clock::{Stopwatch, now};
+use crate::dashboard::Showing;
 use crate::link::Speed;
 use crate::session_journal::{Scribe, SessionJournal};
 
@@ -31,7 +32,12 @@ pub(super) struct Stage<'r, 'l, 'o> {
     /// Models to be kept with the session.
     pub(super) models: Vec<MotionFile>,
     pub(super) stops: Vec<MadeStop>,
+    /// Those who watch in a browser.
+    pub(super) showing: Option<Showing>,
 }
+
+/// What a browser is told that wants to drive.
+const DRIVES_ITSELF: &str = "the demonstration drives by itself: `footplate serve` takes orders";
 
 impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
     pub(super) fn new(
@@ -56,6 +62,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
             learnt,
             models: Vec::new(),
             stops,
+            showing: None,
         }
     }
 
@@ -76,6 +83,11 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
     /// One turn; returns what was said.
     pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
         let notices = self.railway.go_on(machine)?;
+        if self.showing.as_ref().is_some_and(|showing| showing.is_halted(DRIVES_ITSELF)) {
+            anyhow::bail!(
+                "emergency stop from the dashboard: all trains are told to stand, the power goes off"
+            );
+        }
         self.look_for_mishaps()?;
         let acknowledged = self.record.0.borrow().journal.as_ref().map(SessionJournal::acknowledged);
         if let Some(acknowledged) = acknowledged {
@@ -120,6 +132,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
     /// A train is calibrated.
     pub(super) fn learnt(&mut self, learnt: Learnt) -> io::Result<()> {
         self.shows(learnt.train, "", Some(learnt.steps.clone()));
+        self.tell(&learnt.sentence());
         self.screen.learnt(&learnt)?;
         self.learnt.push(learnt);
         Ok(())
@@ -127,9 +140,17 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
 
     /// A train stands where it was told to stop.
     pub(super) fn stopped(&mut self, stop: MadeStop) -> io::Result<()> {
+        self.tell(&stop.sentence());
         self.screen.stopped(&stop)?;
         self.stops.push(stop);
         Ok(())
+    }
+
+    /// Says something to those who watch in a browser.
+    fn tell(&self, text: &str) {
+        if let Some(showing) = &self.showing {
+            showing.say(self.now(), text);
+        }
     }
 
     /// This train takes part from here on, and no other: a run of the journal of its own.

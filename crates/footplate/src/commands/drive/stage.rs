@@ -13,7 +13,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::conductor::Conductor;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
-use crate::dashboard::{Answer, Board, Dashboard, Painter};
+use crate::dashboard::{Answer, Board, Painter};
 use crate::link::news_of;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
@@ -77,12 +77,16 @@ impl Watched {
 struct Screen {
     to_errors: bool,
     prompts: bool,
+    /// Something else is drawn where they would go.
+    is_silent: bool,
 }
 
 impl Screen {
     fn say(&self, text: &str, status: &str) {
         // Whoever closed the output has seen enough; trains are driven all the same.
-        let _ = if self.to_errors {
+        let _ = if self.is_silent {
+            Ok(())
+        } else if self.to_errors {
             writeln!(std::io::stderr(), "{text}")
         } else if self.prompts {
             let mut output = std::io::stdout();
@@ -95,21 +99,26 @@ impl Screen {
 
 impl Stage {
     /// `lines`: what a person writes. `json`: the output is for results, and people look at standard error.
-    pub(super) fn new(lines: Option<Receiver<String>>, json: bool, dashboard: Option<&Dashboard>) -> Self {
-        let watched = dashboard.map(|dashboard| Watched {
-            board: Arc::clone(&dashboard.board),
-            painter: Painter::new(&dashboard.board),
+    pub(super) fn new(lines: Option<Receiver<String>>, json: bool, board: Option<&Arc<Board>>) -> Self {
+        let watched = board.map(|board| Watched {
+            board: Arc::clone(board),
+            painter: Painter::new(board),
             stopwatch: Stopwatch::start(),
             painted: Duration::ZERO,
         });
         let prompts =
             lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
-        let screen = Screen { to_errors: json, prompts };
+        let screen = Screen { to_errors: json, prompts, is_silent: false };
         Self { lines, screen, watched, news: Vec::new(), for_referee: Vec::new(), is_over: false }
     }
 
     pub(super) fn say(&self, text: &str, status: &str) {
         self.screen.say(text, status);
+    }
+
+    /// From now on something else is drawn where lines would go.
+    pub(super) const fn be_silent(&mut self) {
+        self.screen.is_silent = true;
     }
 
     /// Says what is not as it should be.

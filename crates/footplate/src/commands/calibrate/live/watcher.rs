@@ -9,11 +9,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
 use super::told;
+use crate::dashboard::Showing;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::Witnessed;
 
 /// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
 const EXPLAINED: Length = Length::from_mm(40.0);
+
+/// What a browser is told that wants to drive.
+const DRIVES_ITSELF: &str = "a calibration drives by itself: `footplate serve` takes orders";
 
 /// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
 const FEWEST_EXPLAINED: usize = 2;
@@ -28,6 +32,8 @@ pub(super) struct Watcher<'l> {
     pub(super) mishaps: u32,
     /// The layout that the reports fit better, by name.
     pub(super) other_layout: Option<&'static str>,
+    showing: Option<Showing>,
+    is_halted: bool,
 }
 
 impl<'l> Watcher<'l> {
@@ -37,7 +43,21 @@ impl<'l> Watcher<'l> {
         let bar = ProgressBar::new(budget.as_s().max(1.0) as u64);
         let style = ProgressStyle::with_template("{bar:24} {pos:>4} of {len} s  {msg}");
         let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
-        Self { layout, bar, budget, began: None, mishaps: 0, other_layout: None }
+        Self {
+            layout,
+            bar,
+            budget,
+            began: None,
+            mishaps: 0,
+            other_layout: None,
+            showing: None,
+            is_halted: false,
+        }
+    }
+
+    /// Those who watch in a browser see it, too.
+    pub(super) fn seen_by(self, showing: Option<Showing>) -> Self {
+        Self { showing, ..self }
     }
 
     /// The bar is taken away.
@@ -48,6 +68,9 @@ impl<'l> Watcher<'l> {
     fn say(&self, now: Timestamp, text: &str) {
         let at = minutes(self.began.map_or(TimeSpan::ZERO, |began| now - began));
         self.bar.suspend(|| eprintln!("{at:>5}  {text}"));
+        if let Some(showing) = &self.showing {
+            showing.say(now, text);
+        }
     }
 
     /// Another built-in layout with the lengths that are felt.
@@ -72,6 +95,9 @@ impl<'l> Watcher<'l> {
 
 impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
     fn hear(&mut self, now: Timestamp, notice: CalibrationNotice) {
+        if let Some(showing) = &mut self.showing {
+            showing.hear(&notice);
+        }
         if let CalibrationNotice::Progress(progress) = &notice {
             self.began = self.began.or(Some(now + (TimeSpan::ZERO - progress.elapsed)));
             self.bar.set_position(progress.elapsed.as_s().min(self.budget.as_s()) as u64);
@@ -96,8 +122,12 @@ impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
         self.say(now, &format!("{command:?} was not taken: {error}"));
     }
 
-    fn attend(&mut self, _: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {
-        let is_over = machine.machine().ending().is_some() || self.other_layout.is_some();
+    fn attend(&mut self, now: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {
+        if let Some(showing) = &mut self.showing {
+            showing.calibrator(machine.machine(), now);
+            self.is_halted |= showing.is_halted(DRIVES_ITSELF);
+        }
+        let is_over = machine.machine().ending().is_some() || self.other_layout.is_some() || self.is_halted;
         if is_over { Wish::Finish } else { Wish::GoOn }
     }
 }

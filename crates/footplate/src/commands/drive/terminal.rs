@@ -1,0 +1,125 @@
+//! The live view in a terminal: where trains are, what they said, and a line to write orders in. It looks at the same board as
+//! the dashboard, from a thread of its own, so that a slow terminal delays no train.
+
+mod prompt;
+mod seen;
+mod view;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use anyhow::Context;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use tokio::sync::oneshot;
+
+use self::prompt::Prompt;
+use self::seen::Seen;
+use crate::dashboard::{Answer, Board, LayoutPicture};
+
+/// Fifteen frames a second look smooth, and a line of 9600 baud can carry what changes.
+const FRAME: Duration = Duration::from_millis(66);
+
+/// A live view until it is dropped.
+pub(super) struct Terminal {
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Terminal {
+    /// Takes the terminal.
+    ///
+    /// # Errors
+    /// What the terminal said against it.
+    pub(super) fn open(board: &Arc<Board>, layout: &LayoutPicture) -> anyhow::Result<Self> {
+        let terminal = ratatui::try_init().context("the terminal cannot be drawn on: try --plain")?;
+        let is_over = Arc::new(AtomicBool::new(false));
+        let sitting = Sitting {
+            board: Arc::clone(board),
+            seen: Seen::of(layout)?,
+            prompt: Prompt::default(),
+            asked: Vec::new(),
+        };
+        let over = Arc::clone(&is_over);
+        let thread = std::thread::Builder::new().name("terminal".to_owned()).spawn(move || {
+            // Whatever a terminal says, trains are driven on; the program still ends by a signal.
+            let _ = sitting.sit(terminal, &over);
+        })?;
+        Ok(Self { is_over, thread: Some(thread) })
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        ratatui::restore();
+    }
+}
+
+/// Somebody sits there.
+struct Sitting {
+    board: Arc<Board>,
+    seen: Seen,
+    prompt: Prompt,
+    /// Orders that wait to be taken.
+    asked: Vec<oneshot::Receiver<Answer>>,
+}
+
+impl Sitting {
+    fn sit(mut self, mut terminal: DefaultTerminal, is_over: &AtomicBool) -> std::io::Result<()> {
+        while !is_over.load(Ordering::Relaxed) {
+            self.seen.look(&self.board);
+            self.hear_answers();
+            terminal.draw(|frame| view::draw(frame, &self.seen, &self.prompt))?;
+            if event::poll(FRAME)?
+                && let Event::Key(key) = event::read()?
+                && key.kind == KeyEventKind::Press
+            {
+                self.press(key);
+            }
+        }
+        Ok(())
+    }
+
+    fn press(&mut self, key: KeyEvent) {
+        let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
+        match key.code {
+            KeyCode::Char('c' | 'd') if with_control => self.ask("quit".to_owned(), false),
+            KeyCode::Char(' ') if self.prompt.text().is_empty() => self.ask("halt".to_owned(), true),
+            KeyCode::Char(letter) if !with_control => self.prompt.insert(letter),
+            KeyCode::Enter => {
+                if let Some(line) = self.prompt.take() {
+                    self.ask(line, false);
+                }
+            }
+            KeyCode::PageUp => self.seen.scroll(1),
+            KeyCode::PageDown => self.seen.scroll(-1),
+            other => self.prompt.press(other),
+        }
+    }
+
+    fn ask(&mut self, line: String, is_urgent: bool) {
+        self.seen.say(format!("> {line}"));
+        match self.board.ask(line, is_urgent) {
+            Ok(answer) => self.asked.push(answer),
+            Err(_) => self.seen.say("! too many orders wait: say it again in a moment".to_owned()),
+        }
+    }
+
+    fn hear_answers(&mut self) {
+        let seen = &mut self.seen;
+        self.asked.retain_mut(|asked| match asked.try_recv() {
+            Ok(Answer::Refused(why)) => {
+                seen.say(format!("! {why}"));
+                false
+            }
+            Err(oneshot::error::TryRecvError::Empty) => true,
+            _ => false,
+        });
+    }
+}

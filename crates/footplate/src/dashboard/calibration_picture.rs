@@ -1,0 +1,71 @@
+//! What a calibration is about: the experiment and why it, the time that is left, and how well stops are known by now.
+
+use footplate_core::control::calibrate::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
+use serde::Serialize;
+
+use super::picture::tenths;
+
+/// A calibration that is under way.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct CalibrationPicture {
+    /// `finding`, `joining`, `experiment`, `paused`, `ending` or `finished`.
+    phase: &'static str,
+    /// The experiment in words, while there is one.
+    experiment: Option<String>,
+    /// What it was expected to gain (variances relative to the scatter of stops) and to take; none where a step was
+    /// never tried.
+    gain: Option<f64>,
+    takes_s: Option<f64>,
+    elapsed_s: f64,
+    left_s: f64,
+    expected: Option<ExpectedPicture>,
+}
+
+/// How well the middle one of the steps is known, 95 %.
+#[derive(Debug, Clone, Serialize)]
+struct ExpectedPicture {
+    step: u8,
+    stop_within_mm: f64,
+    speed_within_percent: f64,
+}
+
+impl CalibrationPicture {
+    /// Takes in what is said of it.
+    pub(super) fn hear(&mut self, notice: &CalibrationNotice) {
+        match notice {
+            CalibrationNotice::Begins { experiment, why } => self.begins(*experiment, *why),
+            CalibrationNotice::Progress(progress) => self.goes_on(progress),
+            _ => {}
+        }
+    }
+
+    fn begins(&mut self, experiment: Experiment, why: Why) {
+        self.experiment = Some(experiment.to_string());
+        (self.gain, self.takes_s) = match why {
+            Why::NeverTried => (None, None),
+            Why::MostPerSecond { gain, takes } => (Some(tenths(gain)), Some(tenths(takes.as_s()))),
+        };
+    }
+
+    fn goes_on(&mut self, progress: &Progress) {
+        self.phase = match progress.phase {
+            Phase::Finding => "finding",
+            Phase::Joining => "joining",
+            Phase::Experiment(_) => "experiment",
+            Phase::Paused => "paused",
+            Phase::Ending => "ending",
+            Phase::Finished => "finished",
+        };
+        if !matches!(progress.phase, Phase::Experiment(_)) {
+            self.experiment = None;
+        }
+        self.elapsed_s = tenths(progress.elapsed.as_s());
+        self.left_s = tenths(progress.left.as_s());
+        let middle = progress.accuracy.get(progress.accuracy.len() / 2);
+        self.expected = middle.map(|line: &StepAccuracy| ExpectedPicture {
+            step: line.step.get(),
+            stop_within_mm: tenths(line.stop_within().as_mm()),
+            speed_within_percent: tenths(line.speed_within().as_parts() * 100.0),
+        });
+    }
+}

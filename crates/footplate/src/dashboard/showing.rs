@@ -1,0 +1,105 @@
+//! Shows on the dashboard what machines do that take no orders: a train that is being calibrated, or a demonstration.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use footplate_core::Timestamp;
+use footplate_core::control::Driver;
+use footplate_core::control::calibrate::{CalibrationNotice, Calibrator};
+use footplate_core::track::{Layout, TurnoutStates};
+
+use super::board::{Answer, Board};
+use super::painter::{Painter, TrainPassed};
+use super::server::Dashboard;
+use crate::clock::Stopwatch;
+
+/// A calibration is watched, not driven: twenty pictures a second are enough.
+const BETWEEN_PICTURES: Duration = Duration::from_millis(50);
+
+/// Somebody else's trains on a board.
+pub(crate) struct Showing {
+    board: Arc<Board>,
+    painter: Painter,
+    stopwatch: Stopwatch,
+    painted: Duration,
+    began: Timestamp,
+    layout: Layout,
+    /// A driver that drives nothing: it knows where the train of a calibration is.
+    shadow: Option<(TurnoutStates, Driver)>,
+}
+
+impl Showing {
+    /// On a dashboard, of a session that begins at a time of the line's clock.
+    pub(crate) fn new(dashboard: &Dashboard, layout: &Layout, began: Timestamp) -> Self {
+        Self {
+            board: Arc::clone(&dashboard.board),
+            painter: Painter::following(&dashboard.board),
+            stopwatch: Stopwatch::start(),
+            painted: Duration::ZERO,
+            began,
+            layout: layout.clone(),
+            shadow: None,
+        }
+    }
+
+    /// Whether somebody asks for an emergency stop. Everything else is refused: `why` says what would be right.
+    pub(crate) fn is_halted(&self, why: &str) -> bool {
+        let mut is_halted = false;
+        while let Some(asked) = self.board.next_asked() {
+            let halts = asked.line.trim() == "halt";
+            is_halted |= halts;
+            asked.answer(if halts { Answer::Taken } else { Answer::Refused(why.to_owned()) });
+        }
+        is_halted
+    }
+
+    /// Says a line.
+    pub(crate) fn say(&self, now: Timestamp, text: &str) {
+        self.board.say((now - self.began).as_s(), text);
+    }
+
+    /// A train passed a contact.
+    pub(crate) fn passed(&mut self, passed: TrainPassed) {
+        self.painter.passed(passed);
+    }
+
+    /// Takes in what a calibration says.
+    pub(crate) fn hear(&mut self, notice: &CalibrationNotice) {
+        self.painter.hear_calibration(notice);
+    }
+
+    /// Shows the trains of a driver, if it is time to.
+    pub(crate) fn driver(&mut self, driver: &Driver, now: Timestamp) {
+        if self.is_due() {
+            self.painter.calibrates_no_more();
+            self.painter.paint_alone(driver, now, self.began);
+        }
+    }
+
+    /// Shows the train of a calibration, if it is time to.
+    pub(crate) fn calibrator(&mut self, calibrator: &Calibrator<'_>, now: Timestamp) {
+        if !self.is_due() {
+            return;
+        }
+        let (turnouts, train) = (calibrator.turnouts(), calibrator.locator().train());
+        // Of a train that was calibrated before nobody knows any more where it is.
+        let is_other = |driver: &Driver| driver.trains().any(|other| other != train);
+        if self.shadow.as_ref().is_none_or(|(known, driver)| known != turnouts || is_other(driver)) {
+            let driver = Driver::new(self.layout.clone(), turnouts.clone());
+            self.shadow = Some((turnouts.clone(), driver));
+        }
+        if let Some((_, driver)) = &mut self.shadow {
+            driver.add_located(calibrator.fit().model().clone(), calibrator.locator().clone());
+            self.painter.paint_alone(driver, now, self.began);
+        }
+    }
+
+    fn is_due(&mut self) -> bool {
+        let elapsed = self.stopwatch.elapsed();
+        let is_due = elapsed >= self.painted + BETWEEN_PICTURES;
+        if is_due {
+            self.painted = elapsed;
+        }
+        is_due
+    }
+}
