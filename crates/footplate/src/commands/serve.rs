@@ -18,9 +18,9 @@ use crate::dashboard::{Dashboard, ServedAt};
 pub(crate) use archive::archive_routes;
 pub(crate) use odometry_desk::odometry_routes;
 
-/// Drive trains from browsers and programs: the dashboard and its HTTP interface, without a prompt.
+/// Drive trains from browsers and programs, without a prompt.
 ///
-/// The same as `footplate drive --serve` with nobody at the prompt: prints where to look, and drives until it is told to
+/// The dashboard and its HTTP interface, the same as `footplate drive --serve` with nobody at the prompt: prints where to look, and drives until it is told to
 /// `quit` or interrupted. Then all trains are told to stand and the power is taken from the track.
 #[derive(Args)]
 #[command(after_help = "\

@@ -181,7 +181,8 @@ async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Re
     // Streams of events cannot send headers of their own: they show the token in the address.
     let query = request.uri().query().unwrap_or_default();
     let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-    match guard.check(request.method(), request.headers(), token) {
+    let is_page = !request.uri().path().starts_with("/api/");
+    match guard.check(request.method(), request.headers(), token, is_page) {
         Ok(()) => next.run(request).await,
         Err(denied) => (denied.status(), Json(json!({ "error": denied.says() }))).into_response(),
     }

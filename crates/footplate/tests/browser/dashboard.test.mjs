@@ -97,6 +97,24 @@ test("pages from elsewhere, other names and forms are turned away, and mistakes 
   assert.equal(await ask("/nothing", own), 404);
 });
 
+test("beyond this machine the token is asked for, and the page works with it", async () => {
+  const refused = await serve(store, "0.0.0.0:0").catch((error) => error);
+  assert.match(String(refused), /FOOTPLATE_TOKEN/);
+  const open = await serve(store, "0.0.0.0:0", { token: "s3cret" });
+  const url = `http://127.0.0.1:${open.port}/`;
+  assert.equal((await fetch(`${url}api/picture`)).status, 401);
+  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: "Bearer s3cre" } })).status, 401);
+  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: "Bearer s3cret" } })).status, 200);
+  const { page, complaints } = await openQuietly(browser, `${url}?token=s3cret`);
+  await page.waitForSelector(".train");
+  await page.fill("#line", "where");
+  await page.click("#order button");
+  await page.waitForFunction(() => /train 24/.test(document.querySelector("#said").textContent), null, { timeout: PATIENCE });
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(open);
+});
+
 test("it fits a phone, in the dark and in German, and finds a server that comes back", async () => {
   const page = await browser.newPage({ viewport: { width: 390, height: 800 }, colorScheme: "dark", locale: "de-DE", hasTouch: true });
   await page.goto(running.url);

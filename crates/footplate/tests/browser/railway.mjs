@@ -17,8 +17,9 @@ export function calibratedStore(name) {
 }
 
 /** Starts the program at a port, 0 for any, so many times as fast as real; resolves with the address that it prints. */
-export function serve(store, port, { speed = 4, more = [] } = {}) {
-  const child = spawn(process.env.FOOTPLATE, ["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], { stdio: ["ignore", "ignore", "pipe"] });
+export function serve(store, port, { speed = 4, more = [], token } = {}) {
+  const env = { ...process.env, ...(token && { FOOTPLATE_TOKEN: token }) };
+  const child = spawn(process.env.FOOTPLATE, ["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], { stdio: ["ignore", "ignore", "pipe"], env });
   return new Promise((resolve, reject) => {
     let said = "";
     child.stderr.on("data", (text) => {
