@@ -135,6 +135,7 @@ each_table() {
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
+  "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" odometry simulate line --score --seeds 1..100 --teeth 80,100,200 --markdown
 }
 

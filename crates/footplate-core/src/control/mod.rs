@@ -16,8 +16,8 @@ mod watch;
 pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Footprint, Journey, Span, TrainLengths};
 pub use drive::{
-    Achieved, Aim, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine, PlannedStop, Promise,
-    Refusal, StopOrder,
+    Achieved, Aim, ArrivalProfile, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine,
+    PlannedArrival, PlannedStop, Promise, Refusal, StopOrder,
 };
 pub use machine::{Machine, Output};
 pub use watch::{Alarm, LinkNews, Outcome, Watchdog, WatchdogNotice};

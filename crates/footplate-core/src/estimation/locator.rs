@@ -22,6 +22,8 @@ const ANYWHERE_M: f64 = 30.0;
 const MISSED_BEYOND: f64 = 4.0;
 /// A report this unlikely (ln of a density in 1/s) is of another train, or of none.
 const LEAST_LIKELIHOOD: f64 = -40.0;
+/// A report that is off by more standard deviations contradicts what is believed of the train or of the way.
+pub(super) const BELIEVED: f64 = 3.0;
 /// A moment (s) in which a train at rest could have come a little further than is known.
 pub(super) const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
@@ -125,6 +127,11 @@ impl Locator {
         self.node.is_some()
     }
 
+    /// The contact from which its way is counted; `None` while it is lost.
+    pub(super) const fn node(&self) -> Option<NodeId> {
+        self.node
+    }
+
     fn seconds(&self, time: Timestamp) -> f64 {
         (time - self.epoch).as_s()
     }
@@ -168,7 +175,7 @@ impl Locator {
     }
 
     /// The way to a contact that fits best, and how far the train was short of it when it reported.
-    fn best_reach(
+    pub(super) fn best_reach(
         &self,
         ground: Ground<'_>,
         model: &MotionModel,
@@ -222,7 +229,7 @@ impl Locator {
         let Some((reach, short, _)) = self.best_reach(ground, model, sensor, window) else {
             // Lost until now, or no way leads here: it is here all the same, as fast as it was.
             self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
-            self.following.shift(-self.following.place(model, time).mean);
+            self.following.shift(-self.following.place(model, time).mean, 0.0);
             let here = Guess { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
             self.following.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
@@ -230,9 +237,18 @@ impl Locator {
         };
         let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
-        let place = Guess { variance: reach.length.variance + scatter, ..reach.length };
-        self.following.pass(model, time, window.variance_s2(), place);
-        self.following.shift(-reach.length.mean);
+        if short.mean * short.mean <= BELIEVED * BELIEVED * short.variance {
+            // The contact says where the train is past it, however little is known of the way there.
+            self.following.shift(-reach.length.mean, reach.length.variance);
+            let here = Guess { mean: 0.0, variance: scatter };
+            self.following.pass(model, time, window.variance_s2(), here);
+        } else {
+            // Something is not as it is believed to be. What the way may be wrong by is not laid to the train's speed, so
+            // that the next contacts go on saying it.
+            let place = Guess { variance: reach.length.variance + scatter, ..reach.length };
+            self.following.pass(model, time, window.variance_s2(), place);
+            self.following.shift(-reach.length.mean, 0.0);
+        }
         self.node = Some(node);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
         PassedContact {

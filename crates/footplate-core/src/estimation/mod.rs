@@ -21,6 +21,7 @@ pub mod odometry;
 mod outlook;
 mod polls;
 mod predictor;
+mod shown_length;
 mod speed_watch;
 mod train_model;
 mod transition;

@@ -2,6 +2,7 @@
 //!
 //! - [`Motion`] is what can be asked of all of it: the state at a time, and the time at a distance.
 //! - [`Trapezoid`] and [`SCurve`] are planned: built from the current state, the target and the [`Limits`].
+//! - [`MinimumJerk`] and [`Transit`] cover a given way in a given time.
 //! - [`SpeedChange`] is what a decoder makes of a new throttle step.
 //! - [`RampedLag`] is one shape for all of them, where a fit has to be quick and none is known to be the right one.
 //! - [`TwoSensorRun`] is how an acceleration is measured.
@@ -11,6 +12,7 @@
 mod ahead;
 mod bracket;
 mod limits;
+mod minimum_jerk;
 mod motion;
 mod phase;
 mod ramped_lag;
@@ -21,10 +23,12 @@ mod speed_change;
 mod stopping_distance;
 mod stopping_law;
 mod stretch;
+mod transit;
 mod trapezoid;
 mod two_sensor;
 
 pub use limits::{Limits, ProfileError};
+pub use minimum_jerk::MinimumJerk;
 pub use motion::{Motion, MotionState};
 pub use ramped_lag::RampedLag;
 pub use s_curve::{Playback, SCurve};
@@ -36,5 +40,6 @@ pub use speed_change::{
 pub use stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDistance};
 pub use stopping_law::{Braking, StoppingError, StoppingLaw};
 pub use stretch::{Running, Stretch};
+pub use transit::Transit;
 pub use trapezoid::Trapezoid;
 pub use two_sensor::{TwoSensorError, TwoSensorRun, TwoSensorVerdict};

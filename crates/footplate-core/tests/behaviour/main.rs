@@ -1,5 +1,6 @@
 //! What core promises, a file a promise.
 
+mod arriving;
 mod attribution;
 mod counted_run;
 mod dispatching;
@@ -7,6 +8,7 @@ mod draw;
 mod driving;
 mod driving_any_orders;
 mod federated_filters;
+mod following;
 mod inertial;
 mod motion_checks;
 mod motion_models;

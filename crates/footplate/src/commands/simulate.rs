@@ -5,6 +5,7 @@ mod disasters;
 mod driving;
 mod layout;
 mod line;
+mod pacing;
 mod recording;
 mod rehearsal;
 mod seeds;
@@ -39,6 +40,7 @@ enum World {
     Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
+    Pacing(pacing::Arguments),
     Traffic(traffic::Arguments),
 }
 
@@ -49,6 +51,7 @@ impl Arguments {
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
+            Some(World::Pacing(arguments)) => arguments.run(output),
             Some(World::Traffic(arguments)) => arguments.run(output),
             None => {
                 if self.list {

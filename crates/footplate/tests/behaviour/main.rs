@@ -24,6 +24,7 @@ mod seeds_that_failed;
 mod simulate;
 mod simulate_driving;
 mod simulate_line;
+mod simulate_pacing;
 mod simulated;
 mod station;
 mod store;

@@ -275,9 +275,10 @@ impl Following {
         self.p[Z][B] = 0.0;
     }
 
-    /// All ways are counted from elsewhere from now on.
-    pub(crate) fn shift(&mut self, by: f64) {
+    /// All ways are counted from elsewhere from now on, which is so far (m), with its variance.
+    pub(crate) fn shift(&mut self, by: f64, variance: f64) {
         self.course.x[B] += by;
+        self.p[B][B] += variance;
     }
 
     /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.

@@ -209,6 +209,11 @@ impl MotionModel {
         [Length::from_m(length), Length::from_m(libm::sqrt(variance.max(0.0)))]
     }
 
+    /// Another estimate of by how much a section is longer than surveyed (m), with the variance.
+    pub(crate) fn set_section(&mut self, section: usize, longer: f64, variance: f64) {
+        self.sections.insert(section, (longer, variance));
+    }
+
     /// By how much a section is longer than surveyed (m), with the variance.
     pub(super) fn section(&self, section: usize) -> Option<(f64, f64)> {
         self.sections.get(&section).copied()

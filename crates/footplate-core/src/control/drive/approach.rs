@@ -121,6 +121,21 @@ impl DrivenTrain {
         })
     }
 
+    /// Of some steps, those from which it stops about as surely as from any and which nobody would call a crawl; all of
+    /// them if there is none.
+    pub(super) fn sure_steps(&self, steps: &[SpeedStep]) -> Vec<SpeedStep> {
+        let surest = steps.iter().map(|step| self.stop_spread(*step)).reduce(Length::min);
+        let sure_enough = (surest.unwrap_or(Length::ZERO) * AS_SURE).max(SURE);
+        let is_lively = |step: SpeedStep| self.model.steady_speed(step, Approach::Below) >= FINDING_SPEED;
+        let sure = steps.iter().copied().filter(|step| self.stop_spread(*step) <= sure_enough);
+        let lively: Vec<SpeedStep> = sure.filter(|step| is_lively(*step)).collect();
+        if !lively.is_empty() {
+            return lively;
+        }
+        let lively: Vec<SpeedStep> = steps.iter().copied().filter(|step| is_lively(*step)).take(1).collect();
+        if lively.is_empty() { steps.to_vec() } else { lively }
+    }
+
     /// One standard deviation of stops from a settled step.
     fn stop_spread(&self, step: SpeedStep) -> Length {
         let stop = self.model.stop(step, Approach::Below);
@@ -138,7 +153,7 @@ impl DrivenTrain {
             && contacts_until(ground, &self.model, at.node, last).any(|(_, way)| way > settled)
     }
 
-    fn short_run(
+    pub(super) fn short_run(
         &self,
         ground: Ground<'_>,
         now: Timestamp,

@@ -12,7 +12,7 @@ use super::felt_way::{contacts_until, counted_from};
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
-use super::pacing::Pacing;
+use super::pacing::{Pacing, Passages};
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
@@ -53,6 +53,8 @@ pub(super) struct DrivenTrain {
     pub(super) reach: [Length; 2],
     /// What it is paced for, while that is its goal.
     pub(super) pacing: Option<Pacing>,
+    /// When it came by the contacts behind it, for who follows it.
+    pub(super) passages: Passages,
 }
 
 impl DrivenTrain {
@@ -68,6 +70,7 @@ impl DrivenTrain {
             limit: None,
             reach: [TRAIN_REACH; 2],
             pacing: None,
+            passages: Passages::default(),
         }
     }
 
@@ -103,6 +106,7 @@ impl DrivenTrain {
     /// A person says where it is.
     pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
         self.locator.place(now, at, uncertainty);
+        self.passages.forget();
         self.seen();
         self.limit_here(ground, now);
         self.expect_next(ground, now);
@@ -191,6 +195,7 @@ impl DrivenTrain {
                     Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
                     None => self.locator.lose(),
                 }
+                self.passages.forget();
                 self.limit_here(ground, now);
                 self.expect_next(ground, now);
                 if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
@@ -253,10 +258,11 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.seen();
+        self.note_passage(ground, node, passed.window.middle());
         self.count_limit_from(ground, node);
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
-        self.paced_passed(ground, now, out);
+        self.paced_passed(ground, now, node, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
@@ -275,6 +281,15 @@ impl DrivenTrain {
             }
             _ => {}
         }
+    }
+
+    /// The report says when within a poll, and where it was expected just then says it better.
+    fn note_passage(&mut self, ground: Ground<'_>, node: NodeId, middle: Timestamp) {
+        let located =
+            self.located(ground, middle).filter(|located| located.at.node == node && !located.at_rest);
+        let since = located.filter(|located| located.speed.as_m_per_s() > 0.0);
+        let since = since.map_or(TimeSpan::ZERO, |located| located.at.way / located.speed);
+        self.passages.note(node, middle - since);
     }
 
     /// When it wants to look at the clock.

@@ -156,6 +156,14 @@ impl Driver {
         let id = OrderId(self.orders);
         let ground = self.track.ground();
         let out = &mut self.outputs;
+        if let Order::Follow { train, leader, gap } = order {
+            // Whoever follows looks at the others.
+            if let Some(mut follower) = self.trains.remove(&train) {
+                let taken = follower.follow(ground, now, id, (leader, gap), &self.trains, out);
+                self.trains.insert(train, follower);
+                taken?;
+            }
+        }
         let train = order.train().and_then(|train| self.trains.get_mut(&train));
         match (order, train) {
             (Order::Speed { step, .. }, Some(train)) => train.run(now, id, step, out),
@@ -163,6 +171,9 @@ impl Driver {
             (Order::Stop(stop), Some(train)) => train.stop_at(ground, now, id, &stop, out)?,
             (Order::Move { distance, .. }, Some(train)) => train.move_on(ground, now, id, distance, out)?,
             (Order::Hold { speed, .. }, Some(train)) => train.hold(now, id, speed, out)?,
+            (Order::Arrive { target, within, .. }, Some(train)) => {
+                train.arrive(ground, now, id, target, within, out)?;
+            }
             (Order::Turnout { turnout, curved }, _) => self.throw(now, id, turnout, curved)?,
             _ => {}
         }
@@ -198,8 +209,11 @@ impl Driver {
             Order::Move { distance, .. } if !(distance > Length::ZERO && distance <= LONGEST_MOVE) => {
                 Err(Refusal::IllegalDistance { found: distance })
             }
-            Order::Follow { train, .. } | Order::Arrive { train, .. } => Err(Refusal::NotPaced { train }),
-            Order::Move { .. } | Order::Turnout { .. } | Order::Hold { .. } => Ok(()),
+            Order::Move { .. }
+            | Order::Turnout { .. }
+            | Order::Hold { .. }
+            | Order::Arrive { .. }
+            | Order::Follow { .. } => Ok(()),
         }
     }
 
@@ -300,7 +314,9 @@ impl Driver {
         {
             if matches!(explanation, Explanation::Strayed(_)) {
                 train.locator.lose();
+                train.passages.forget();
             }
+            train.learn_length(ground, closure.sensor, closure.window);
             let passed = train.locator.pass(ground, &train.model, closure.sensor, closure.window);
             train.passed(ground, now, node, passed, &mut self.outputs);
         }
@@ -358,7 +374,9 @@ impl Driver {
             .find(|sensor| triggers().any(|trigger| trigger == *sensor));
         let guard = self.trains.values().filter_map(DrivenTrain::guard);
         let hold = next.map(|plan| plan.leaves - LINE_TIME).into_iter().chain(guard).min();
-        let watched = watched.or_else(|| self.due_of_paced(now));
+        // Asked in any case: it also says when to look again, and a time that stays behind would be waited for for ever.
+        let paced = self.due_of_paced(now);
+        let watched = watched.or(paced);
         self.outputs.hold_line(hold);
         self.outputs.watch(watched);
     }

@@ -141,6 +141,7 @@ impl DrivenTrain {
     /// Nobody knows any more where the train is.
     fn lose(&mut self, now: Timestamp, out: &mut Outputs) {
         self.locator.lose();
+        self.passages.forget();
         self.expected = Expectation { since: now, ..Expectation::default() };
         let train = self.id();
         out.say(DriveNotice::Lost { train });
@@ -194,7 +195,12 @@ impl DrivenTrain {
     /// The latest time at which a command to stop may leave so that the train comes to rest before a point, but for one
     /// time in [`NEARER`]; the earliest that can still be kept where even that is too late; `None` while it does not
     /// come so far.
-    fn last_stop_before(&self, ground: Ground<'_>, now: Timestamp, at: WayPoint) -> Option<Timestamp> {
+    pub(super) fn last_stop_before(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        at: WayPoint,
+    ) -> Option<Timestamp> {
         if self.told == SpeedStep::STAND {
             return None;
         }

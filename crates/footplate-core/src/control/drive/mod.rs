@@ -27,6 +27,7 @@ mod turnout_guard;
 mod watched;
 
 pub use driver::Driver;
-pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedStop, Promise};
+pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedArrival, PlannedStop, Promise};
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
+pub use pacing::ArrivalProfile;
 pub use refusal::Refusal;

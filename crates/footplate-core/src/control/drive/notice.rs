@@ -2,12 +2,13 @@
 
 use crate::estimation::{DueContact, PassedContact};
 use crate::event::Command;
-use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
 use crate::units::{Length, Speed};
 
 use super::order::OrderId;
+use super::pacing::ArrivalProfile;
 use super::refusal::Refusal;
 
 /// What happened, and what is going to.
@@ -35,6 +36,18 @@ pub enum DriveNotice {
     },
     /// From now on a train that was told to hold a speed keeps to a line.
     Paced(PacedLine),
+    /// How a train that shall be somewhere in time is going to do that.
+    Arrives(PlannedArrival),
+    /// A follower has been told to stand, because it would have come too near to its leader or nobody knows where that is.
+    /// It goes on by itself.
+    HeldBack {
+        /// The order.
+        order: OrderId,
+        /// The follower.
+        train: TrainId,
+        /// The one ahead.
+        leader: TrainId,
+    },
     /// An order has been carried out.
     Done(Finished),
     /// An order was given up on the way; the train has been told to stop.
@@ -165,6 +178,21 @@ pub struct PacedLine {
     pub time: Timestamp,
     /// ... at this speed.
     pub speed: Speed,
+}
+
+/// How a train comes to rest at a place in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedArrival {
+    /// The order.
+    pub order: OrderId,
+    /// The train.
+    pub train: TrainId,
+    /// When it shall stand there.
+    pub by: Timestamp,
+    /// For a train at rest: when it starts, and at which step.
+    pub starts: Option<(Timestamp, SpeedStep)>,
+    /// How it runs until it stops; `None` for a start and a stop with nothing in between.
+    pub profile: Option<ArrivalProfile>,
 }
 
 /// Where a train comes to rest, counted from the target, negative short of it.

@@ -8,6 +8,8 @@ use crate::time::TimeSpan;
 use crate::track::WayError;
 use crate::units::{Length, Ratio, Speed};
 
+use super::order::Gap;
+
 /// Why an order was refused, or given up on the way. Places are named so that `Layout::landmark` reads them.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -144,10 +146,33 @@ pub enum Refusal {
         /// The train on that.
         train: TrainId,
     },
-    /// Nobody here can pace a train yet.
-    NotPaced {
-        /// The train.
+    /// The train cannot stand there so soon.
+    TooSoon {
+        /// The target.
+        target: String,
+        /// The shortest time in which it can.
+        earliest: TimeSpan,
+    },
+    /// The train cannot be as slow as that.
+    TooSlow {
+        /// The target.
+        target: String,
+        /// The longest time that it can take.
+        latest: TimeSpan,
+    },
+    /// The leader follows this train, directly or behind others.
+    FollowsInCircle {
+        /// The train that was asked to follow.
         train: TrainId,
+        /// The one that it should follow.
+        leader: TrainId,
+    },
+    /// The train could not stop in time behind its leader.
+    GapTooShort {
+        /// The leader.
+        leader: TrainId,
+        /// The shortest gap that can be kept safely, in the same form.
+        shortest: Gap,
     },
     /// No steps of the train bracket the speed.
     SpeedOutOfRange {
@@ -262,9 +287,29 @@ impl fmt::Display for Refusal {
                 "turnout {turnout} may lie curved only while turnout {partner} lies straight, and train {train} \
                  is on that: wait, or stop it first"
             ),
-            Self::NotPaced { train } => {
-                write!(f, "train {train} cannot be held at a speed: name a step, as with `speed {train} 6`")
+            Self::TooSoon { target, earliest } => write!(
+                f,
+                "`{target}` cannot be reached so soon: allow {:.1} s at least",
+                libm::ceil(10.0 * earliest.as_s()) / 10.0
+            ),
+            Self::TooSlow { target, latest } => write!(
+                f,
+                "a train that runs cannot take so long to `{target}`: allow {:.1} s at most, or stop it first",
+                libm::floor(10.0 * latest.as_s()) / 10.0
+            ),
+            Self::FollowsInCircle { train, leader } => {
+                write!(f, "train {leader} follows train {train}: give that one something else to do first")
             }
+            Self::GapTooShort { leader, shortest: Gap::Time(shortest) } => write!(
+                f,
+                "so near behind train {leader} no stop would be in time: allow {:.1} s at least",
+                libm::ceil(10.0 * shortest.as_s()) / 10.0
+            ),
+            Self::GapTooShort { leader, shortest: Gap::Way(shortest) } => write!(
+                f,
+                "so near behind train {leader} no stop would be in time: allow {:.0} mm at least",
+                libm::ceil(shortest.as_mm())
+            ),
             Self::SpeedOutOfRange { found, lowest, highest } => write!(
                 f,
                 "{:.0} mm/s cannot be held: name {:.0} to {:.0} mm/s",

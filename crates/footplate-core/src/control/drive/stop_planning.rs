@@ -153,7 +153,7 @@ impl DrivenTrain {
     }
 
     /// The target on the way of a train, the first time it comes there and can rest there.
-    fn waypoint(
+    pub(super) fn waypoint(
         &self,
         ground: Ground<'_>,
         now: Timestamp,
@@ -360,7 +360,8 @@ impl DrivenTrain {
     }
 }
 
-fn name(ground: Ground<'_>, destination: &Destination) -> String {
+/// What people call a target.
+pub(super) fn name(ground: Ground<'_>, destination: &Destination) -> String {
     destination
         .named
         .map_or_else(|| "the end of the move".into(), |named| ground.layout.display(named).to_string())

@@ -15,6 +15,7 @@ impl Driver {
         let ground = self.track.ground();
         if let Some(train) = self.trains.get_mut(&train) {
             train.locator.lose();
+            train.passages.forget();
             train.seen();
             train.expect_next(ground, now);
         }

@@ -1,6 +1,8 @@
 //! Notices of the driver and the dispatcher as people read them.
 
-use footplate_core::control::{DispatchNotice, DriveNotice, Driver, Finished, Order, PlannedStop, Refusal};
+use footplate_core::control::{
+    DispatchNotice, DriveNotice, Driver, Finished, Order, PlannedArrival, PlannedStop, Refusal,
+};
 use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
 use footplate_core::{SensorId, Timestamp, TrainId};
@@ -97,6 +99,12 @@ impl Tongue<'_> {
                 line.train,
                 line.speed.as_mm_per_s()
             ),
+            DriveNotice::Arrives(plan) => self.arrives(plan),
+            DriveNotice::HeldBack { train, leader, .. } => {
+                format!(
+                    "train {train} is held back: it would come too near to train {leader}, or nobody knows where that is"
+                )
+            }
             DriveNotice::Done(finished) => self.done(finished)?,
             DriveNotice::Thrown { turnout, curved, .. } => {
                 format!("turnout {turnout} told to lie {}", leg(*curved))
@@ -221,6 +229,25 @@ impl Tongue<'_> {
         }
         let promise = plan.promise;
         line + &format!("; rests at {:+.0} mm to {:+.0} mm (95 %)", promise.low.as_mm(), promise.high.as_mm())
+    }
+
+    fn arrives(&self, plan: &PlannedArrival) -> String {
+        let mut line = format!("{}  train {} will stand there", self.at(plan.by), plan.train);
+        if let Some((at, step)) = plan.starts {
+            line += &format!("; starts at step {step} at {:.1} s", (at - self.began).as_s());
+        }
+        if let Some(profile) = plan.profile {
+            let how =
+                if profile.has_least_jerk() { "with the least jerk" } else { "by way of a steady speed" };
+            let (from, to) = (profile.at(profile.begins()).1, profile.at(profile.ends()).1);
+            line += &format!(
+                ", {how} from {:.0} to {:.0} mm/s, and stops from step {}",
+                from.as_mm_per_s(),
+                to.as_mm_per_s(),
+                profile.last_step()
+            );
+        }
+        line
     }
 
     fn done(&self, finished: &Finished) -> Option<String> {

@@ -5,7 +5,6 @@ mod figures;
 mod kind;
 mod page;
 mod scene;
-mod way;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -22,9 +21,8 @@ use self::attributed::{Attributed, attributed};
 use self::kind::Kind;
 use self::page::Page;
 use self::scene::{OTHER, Outcomes, Scene, TRAIN};
-use self::way::Way;
 use super::super::Outcome;
-use super::rehearsal::Rehearsal;
+use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
 use crate::progress::with_progress;
 use crate::spread::{all_cores, spread};

@@ -4,12 +4,20 @@
 //! [`StepSearch`] finds the commands that bring its most likely course nearest to that, within a budget of commands; the
 //! first of them is given, and everything is looked at again when something was learnt.
 
+mod arrival_plan;
+mod arrive;
+mod command_budget;
+mod follow;
 mod hold;
 mod ideal_line;
+mod lead_line;
 mod pacer;
+mod passages;
 mod reference;
 mod step_search;
 mod surveyed_way;
 mod task;
 
+pub use arrival_plan::ArrivalProfile;
+pub(super) use passages::Passages;
 pub(super) use task::Pacing;

@@ -1,16 +1,25 @@
 //! What a driver does for the trains that keep to a pace.
 
+use alloc::vec::Vec;
+
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
-use crate::ids::SensorId;
+use crate::ids::{SensorId, TrainId};
 use crate::time::Timestamp;
 
 impl Driver {
     /// Looks at the trains whose time has come.
     pub(in crate::control::drive) fn pace(&mut self, now: Timestamp) {
+        let due = |train: &DrivenTrain| train.next_look().is_some_and(|at| at <= now);
+        let due: Vec<TrainId> =
+            self.trains.values().filter(|train| due(train)).map(DrivenTrain::id).collect();
         let ground = self.track.ground();
-        for train in self.trains.values_mut().filter(|train| train.next_look().is_some_and(|at| at <= now)) {
-            train.pace(ground, now, &mut self.outputs);
+        for id in due {
+            // Whoever follows looks at the others.
+            if let Some(mut train) = self.trains.remove(&id) {
+                train.pace(ground, now, &self.trains, &mut self.outputs);
+                self.trains.insert(id, train);
+            }
         }
     }
 

@@ -15,9 +15,18 @@ pub(in crate::control::drive) struct Reference {
 }
 
 impl Reference {
+    /// From now to the last moment (s).
+    pub(super) const SPAN: f64 = GRID * LOOKS as f64;
+
     /// From places at times from now (s).
     pub(super) fn of(place_at: impl Fn(f64) -> f64, speeds: [f64; 2]) -> Self {
         Self { places: core::array::from_fn(|look| place_at(GRID * (look + 1) as f64)), speeds }
+    }
+
+    /// Where it should be now, by where it should be soon.
+    pub(super) fn now(&self) -> f64 {
+        let [first, second, ..] = self.places;
+        first + first - second
     }
 
     pub(super) fn last(&self) -> f64 {

@@ -11,6 +11,7 @@
 //!
 //! Sequences that already cost more than the best one found are not followed further (branch and bound).
 
+use super::command_budget::CommandBudget;
 use super::reference::{GRID, LOOKS, Reference};
 use super::surveyed_way::SurveyedWay;
 use crate::calibration::motion::MotionModel;
@@ -18,10 +19,10 @@ use crate::estimation::Outlook;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 
-/// Grid times from one command to the next.
-const SPACING: usize = 1;
 /// Commands in one plan: what the budget leaves for its time, and few enough to look at all of them.
 const MOST_COMMANDS: usize = 3;
+/// Times nearer than this (s) are one.
+const SAME_TIME: f64 = 1e-6;
 /// Weight of where the course leads at the end, as time (s) for which that error would last.
 const END_WEIGHT: f64 = 0.8;
 /// Weight of a speed at the end that is not the ideal's (s³): a tenth of it over two seconds counts little.
@@ -30,6 +31,11 @@ const SPEED_WEIGHT: f64 = 0.02;
 const COMMAND_COST: f64 = 1e-6;
 /// Steps tried: those about the ideal speed, and one more on either side to catch up or fall back with.
 const STEPS: usize = 4;
+
+/// A train that is far off is brought back over about this time (s), by no more than so much speed (m/s): nobody wants to
+/// see it race.
+const CATCHES_UP: f64 = 3.0;
+const FASTEST_CATCH: f64 = 0.12;
 
 /// What to do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +48,7 @@ pub(super) struct Choice {
 /// The commands up to a grid time.
 #[derive(Debug, Clone, Copy)]
 struct Sequence {
-    /// The grid time before which the next may not be given.
-    soonest: usize,
+    budget: CommandBudget,
     first: Option<(usize, SpeedStep)>,
     commands: usize,
     cost: f64,
@@ -63,17 +68,18 @@ pub(super) struct StepSearch<'a> {
 }
 
 impl<'a> StepSearch<'a> {
-    /// With the steps about the speed that is wanted in the middle of the time looked at.
+    /// With the steps about the speed that is wanted in the middle of the time looked at, for a train that is so far (m)
+    /// behind its reference. Times as in the fields of those names.
     pub(super) fn new(
         model: &'a MotionModel,
         way: &'a SurveyedWay,
         reference: &'a Reference,
         usable: &[SpeedStep],
-        now: f64,
-        leaves_after: f64,
+        [now, leaves_after]: [f64; 2],
+        behind: f64,
     ) -> Self {
         let [first, last] = reference.speeds;
-        let wanted = 0.5 * (first + last);
+        let wanted = 0.5 * (first + last) + (behind / CATCHES_UP).clamp(-FASTEST_CATCH, FASTEST_CATCH);
         let below = |step: &SpeedStep| model.steady_speed(*step, Approach::Below).as_m_per_s() <= wanted;
         let under = usable.iter().take_while(|step| below(step)).count();
         let from = under.saturating_sub(2).min(usable.len().saturating_sub(STEPS));
@@ -82,9 +88,9 @@ impl<'a> StepSearch<'a> {
         Self { model, way, reference, now, leaves_after, steps, best }
     }
 
-    /// The best of all sequences whose first command comes no sooner than at a grid time.
-    pub(super) fn best(mut self, outlook: Outlook, soonest: usize) -> Choice {
-        self.go_on(0, &outlook, Sequence { soonest, first: None, commands: 0, cost: 0.0 });
+    /// The best of all sequences that stay within what is left of a budget.
+    pub(super) fn best(mut self, outlook: Outlook, budget: CommandBudget) -> Choice {
+        self.go_on(0, &outlook, Sequence { budget, first: None, commands: 0, cost: 0.0 });
         self.best
     }
 
@@ -95,24 +101,27 @@ impl<'a> StepSearch<'a> {
         let Some(ideal) = self.reference.places.get(at).copied() else {
             return self.end(outlook, sequence);
         };
-        let Sequence { soonest, first, commands, .. } = sequence;
+        let Sequence { budget, first, commands, .. } = sequence;
         let time = self.now + GRID * at as f64;
+        let leaves = time + self.leaves_after;
         let told = outlook.step();
         let steps = self.steps;
-        let may = at >= soonest && commands < MOST_COMMANDS;
+        let may = commands < MOST_COMMANDS && budget.free() <= time + SAME_TIME;
         let others = steps.iter().flatten().filter(|step| may && step.get() != told);
         for command in core::iter::once(None).chain(others.map(Some)) {
             let mut next = *outlook;
             let mut paid = 0.0;
+            let mut left = budget;
             if let Some(step) = command {
-                let doubt = next.doubt_of_interruption(self.model, time + self.leaves_after);
+                let doubt = next.doubt_of_interruption(self.model, leaves);
                 paid = COMMAND_COST + END_WEIGHT * doubt * doubt;
-                next.tell(self.model, time + self.leaves_after, *step);
+                next.tell(self.model, leaves, *step);
+                left.take(time);
             }
             let place = self.way.of_felt(next.place(self.model, time + GRID));
             let off = place - ideal;
             let so_far = Sequence {
-                soonest: if command.is_some() { at + SPACING } else { soonest },
+                budget: left,
                 first: first.or(command.map(|step| (at, *step))),
                 commands: commands + usize::from(command.is_some()),
                 cost: sequence.cost + paid + off * off * GRID,

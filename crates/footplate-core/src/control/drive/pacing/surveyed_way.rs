@@ -29,6 +29,11 @@ impl SurveyedWay {
         way
     }
 
+    /// The way as the train feels it, for what is planned in its own measure.
+    pub(super) const fn felt() -> Self {
+        Self { ends: [[0.0; 2]; MOST_HOPS], count: 0 }
+    }
+
     /// The surveyed way to where the train feels it has come so far: in proportion within a hop, and beyond the hops that
     /// are known as within the last.
     pub(super) fn of_felt(&self, way: f64) -> f64 {

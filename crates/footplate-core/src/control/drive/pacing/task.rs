@@ -6,23 +6,20 @@ use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::Goal;
 use crate::estimation::Ground;
-use crate::ids::{SensorId, SpeedStep};
+use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::latency::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
 
+use super::arrive::Arriving;
+use super::command_budget::{CommandBudget, SPACING, seconds};
+use super::follow::{Following, Others};
 use super::hold::Holding;
 use super::reference::GRID;
 use super::step_search::StepSearch;
 use super::surveyed_way::SurveyedWay;
 
-/// From one command to a train to its next: decoders hear every command, but a change of speed that has not begun to be
-/// felt is not worth another.
-const SPACING: TimeSpan = TimeSpan::from_ms(200);
-/// Within this time a train is paced with no more than [`IN_A_ROW`] commands: four trains then take 6 % of a 2400-baud
-/// line.
-const BUDGET: TimeSpan = TimeSpan::from_s(2.0);
-const IN_A_ROW: usize = 3;
 /// A command waits for the poll that is on the line: half of the longest, 58 ms.
-const POLL_WAIT: TimeSpan = TimeSpan::from_ms(29);
+pub(super) const POLL_WAIT: TimeSpan = TimeSpan::from_ms(29);
 /// The module of a contact is watched from this long before the contact is due: three standard deviations of an
 /// expectation, and the poll of all modules that may be on the line then.
 const WATCHED_BEFORE: TimeSpan = TimeSpan::from_ms(180);
@@ -38,6 +35,10 @@ const AGAIN: f64 = 1.0;
 pub(in crate::control::drive) enum Pace {
     /// To run at a speed.
     Hold(Holding),
+    /// To come to rest in time.
+    Arrive(Arriving),
+    /// To keep a gap to another train.
+    Follow(Following),
 }
 
 /// A train that is paced.
@@ -46,17 +47,14 @@ pub(in crate::control::drive) struct Pacing {
     pub(super) pace: Pace,
     /// The steps that may be commanded, slowest first.
     pub(super) usable: Vec<SpeedStep>,
-    /// When it may be told something next.
-    free: Timestamp,
-    /// When the last commands left, oldest first.
-    sent: [Option<Timestamp>; IN_A_ROW],
+    pub(super) budget: CommandBudget,
     /// When it is looked at next.
     pub(super) look: Option<Timestamp>,
 }
 
 impl Pacing {
     pub(super) fn new(pace: Pace, usable: Vec<SpeedStep>, now: Timestamp) -> Self {
-        Self { pace, usable, free: now, sent: [None; IN_A_ROW], look: Some(now) }
+        Self { pace, usable, budget: CommandBudget::UNUSED, look: Some(now) }
     }
 }
 
@@ -80,13 +78,24 @@ impl DrivenTrain {
     /// A step has left the line.
     pub(in crate::control::drive) fn paced_step_left(&mut self, sent: Timestamp) {
         if let Some(pacing) = &mut self.pacing {
-            pacing.sent.rotate_left(1);
-            if let Some(last) = pacing.sent.last_mut() {
-                *last = Some(sent);
-            }
-            let oldest = pacing.sent.first().copied().flatten();
-            pacing.free = (sent + SPACING).max(oldest.map_or(sent, |oldest| oldest + BUDGET));
-            pacing.look = Some(pacing.free);
+            pacing.budget.take(seconds(sent));
+            pacing.look = Some(sent + SPACING);
+        }
+    }
+
+    /// It is about to be judged to have closed a contact. Who keeps to a pace goes round and round: what the hop is like is
+    /// kept in mind for the next time.
+    pub(in crate::control::drive) fn learn_length(
+        &mut self,
+        ground: Ground<'_>,
+        sensor: SensorId,
+        window: ContactWindow,
+    ) {
+        if self.paced().is_none() {
+            return;
+        }
+        if let Some((section, longer)) = self.locator.shown_length(ground, &self.model, sensor, window) {
+            self.model.set_section(section, longer.mean, longer.variance);
         }
     }
 
@@ -95,44 +104,75 @@ impl DrivenTrain {
         &mut self,
         ground: Ground<'_>,
         now: Timestamp,
+        node: NodeId,
         out: &mut Outputs,
     ) {
         let (Some(task), Some(mut pacing)) = (self.task, self.pacing.take()) else { return };
-        if task.goal == Goal::Pace {
-            match &mut pacing.pace {
-                Pace::Hold(holding) => self.begin_line(ground, now, task.order, holding, out),
-            }
-            pacing.look = Some(now);
-            self.pacing = Some(pacing);
+        if task.goal != Goal::Pace {
+            return;
         }
+        if let Pace::Hold(holding) = &mut pacing.pace {
+            self.begin_line(ground, now, task.order, holding, out);
+        }
+        pacing.look = Some(now);
+        self.pacing = Some(pacing);
+        self.count_target_from(ground, now, node, out);
     }
 
     /// Looks at what it does against what it should do, and commands what is due.
-    pub(in crate::control::drive) fn pace(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
-        let Some(pacing) = &mut self.pacing else { return };
-        pacing.look = None;
+    pub(in crate::control::drive) fn pace(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        others: &Others,
+        out: &mut Outputs,
+    ) {
+        if !self.goes_by_plan(ground, now, out) || !self.may_follow(ground, now, others, out) {
+            return;
+        }
         let Some(outlook) = self.locator.outlook() else { return };
-        let reference = match &mut pacing.pace {
-            Pace::Hold(holding) => holding.reference(ground, now, outlook.node()),
+        let (node, model) = (outlook.node(), &self.model);
+        let followed = match self.pacing.as_ref().map(|pacing| &pacing.pace) {
+            Some(Pace::Follow(following)) => self.follow_reference(ground, now, *following, node, others),
+            _ => None,
         };
-        let Some(reference) = reference else { return };
-        let way = SurveyedWay::ahead(ground, &self.model, outlook.node());
+        let Some(pacing) = &mut self.pacing else { return };
+        let guard = pacing.look.take().filter(|_| matches!(pacing.pace, Pace::Follow(_)));
+        let (reference, way) = match &mut pacing.pace {
+            Pace::Hold(holding) => {
+                (holding.reference(ground, now, node), SurveyedWay::ahead(ground, model, node))
+            }
+            Pace::Arrive(arriving) => {
+                pacing.look = Some(now + TimeSpan::from_s(AGAIN));
+                (arriving.reference(ground, model, now, node), SurveyedWay::felt())
+            }
+            Pace::Follow(_) => (followed, SurveyedWay::ahead(ground, model, node)),
+        };
+        let Some(reference) = reference else {
+            pacing.look = guard.or(pacing.look);
+            return;
+        };
         let leaves = (LINE_TIME + POLL_WAIT).as_s();
         let at = outlook.seconds(now);
-        let free = (pacing.free - now).as_s().max(0.0);
-        let soonest = libm::ceil((free - 1e-9) / GRID) as usize;
-        let search = StepSearch::new(&self.model, &way, &reference, &pacing.usable, at, leaves);
-        let choice = search.best(outlook, soonest);
+        let mut here = outlook;
+        let behind = reference.now() - way.of_felt(here.place(&self.model, at));
+        let search = StepSearch::new(&self.model, &way, &reference, &pacing.usable, [at, leaves], behind);
+        let choice = search.best(outlook, pacing.budget.later(at - seconds(now)));
         match choice.first {
             Some((0, step)) => {
                 pacing.look = Some(now + SPACING);
-                self.tell_step(now, step, out);
+                if self.could_still_stop(ground, now, step) {
+                    self.tell_step(now, step, out);
+                }
             }
             Some((grid, _)) => {
                 let wait = (GRID * grid as f64 - FINE).clamp(FINE, AGAIN);
                 pacing.look = Some(now + TimeSpan::from_s(wait));
             }
             None => pacing.look = Some(now + TimeSpan::from_s(AGAIN)),
+        }
+        if let Some(pacing) = &mut self.pacing {
+            pacing.look = pacing.look.into_iter().chain(guard).min();
         }
     }
 }

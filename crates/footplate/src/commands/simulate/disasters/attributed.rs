@@ -4,8 +4,7 @@ use footplate_core::control::{DriveNotice, Order};
 use footplate_core::{Approach, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::Cause;
 
-use super::way::Way;
-use crate::commands::simulate::rehearsal::Rehearsal;
+use crate::commands::simulate::rehearsal::{Rehearsal, Way};
 
 /// About how fast all of them run (mm/s).
 const RUN_AT: f64 = 260.0;

@@ -7,9 +7,8 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::kind::{Kind, places_along};
-use super::way::Way;
 use crate::commands::simulate::driving::choice::Choice;
-use crate::commands::simulate::rehearsal::Rehearsal;
+use crate::commands::simulate::rehearsal::{Rehearsal, Way};
 use crate::link::news_of;
 
 /// The train that something happens to.

@@ -11,17 +11,17 @@ const BESIDE: [Length; 2] = [Length::from_mm(500.0), Length::from_mm(300.0)];
 const MOST_CONTACTS: usize = 60;
 
 /// A way round.
-pub(super) struct Way {
+pub(crate) struct Way {
     /// Its contacts in the order of travel.
-    pub(super) nodes: Vec<NodeId>,
-    pub(super) edges: Vec<EdgeId>,
+    pub(crate) nodes: Vec<NodeId>,
+    pub(crate) edges: Vec<EdgeId>,
     /// Contacts with places behind them that are not on it.
-    pub(super) beside: Vec<(NodeId, Length)>,
+    pub(crate) beside: Vec<(NodeId, Length)>,
 }
 
 impl Way {
     /// The longest that there is.
-    pub(super) fn round(layout: &Layout) -> Self {
+    pub(crate) fn round(layout: &Layout) -> Self {
         let turnouts: TurnoutStates =
             layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
         let from = |start: NodeId| {

@@ -1,0 +1,228 @@
+//! How a train comes to rest at a place at a time: from which step it stops, and how it runs until then.
+//!
+//! Letters: `D` the way to the target, `T` the time until it shall stand there, `k` the step from which it stops, whose
+//! stopping way `d` and time `t` are known well, `s` the time for which it runs steadily at that step before. From its state
+//! now the train is brought to `D − d − v s` in `T − t − s`, so that it is there at the speed `v` of the step: by the motion
+//! with the least jerk if that asks for no speed that it cannot hold, else by two changes of speed and a steady run between
+//! them.
+
+use alloc::vec::Vec;
+
+use crate::control::drive::driven_train::DrivenTrain;
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+use crate::kinematics::{MinimumJerk, Motion, SpeedLaw, Transit};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Speed};
+
+/// A stop is as sure as the model says when it is made from a speed that has settled.
+pub(super) const STEADY: TimeSpan = TimeSpan::from_ms(2000);
+/// A change of speed on the way takes this part of it, ...
+const CHANGE_PART: f64 = 0.3;
+/// ... at least as long as a train needs for some steps, and no longer than what anybody would call smooth (s).
+const CHANGE: [f64; 2] = [2.0, 6.0];
+/// Who runs as fast, or as slowly, as it can has nothing left to catch up with, or to fall back.
+const RESERVE: f64 = 0.03;
+/// Times that are tried one after the other are longer by this part: nobody cares for less.
+const NEXT_TIME: f64 = 1.01;
+/// Nobody plans for longer (s).
+const LONGEST: f64 = 900.0;
+
+/// Where a train begins to follow a plan: when (s from now), where (m before the target) and how fast (m/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beginning {
+    pub(super) after: f64,
+    pub(super) left: f64,
+    pub(super) speed: f64,
+}
+
+/// A step to stop from, in plain numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FinalStep {
+    pub(super) step: SpeedStep,
+    speed: f64,
+    stop_way: f64,
+    stop_time: f64,
+}
+
+/// The motion on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Profile {
+    LeastJerk(MinimumJerk),
+    Kept(Transit),
+}
+
+impl Profile {
+    pub(super) const fn motion(&self) -> &dyn Motion {
+        match self {
+            Self::LeastJerk(motion) => motion,
+            Self::Kept(motion) => motion,
+        }
+    }
+}
+
+/// A plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ArrivalPlan {
+    pub(super) begins: Beginning,
+    pub(super) profile: Profile,
+    pub(super) last: FinalStep,
+}
+
+/// How a train that shall be somewhere in time should run until it stops, for whoever compares it with how it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrivalProfile {
+    plan: ArrivalPlan,
+    begins: Timestamp,
+}
+
+impl ArrivalProfile {
+    pub(super) const fn new(plan: ArrivalPlan, begins: Timestamp) -> Self {
+        Self { plan, begins }
+    }
+
+    /// From when it is followed; before, the train starts.
+    #[must_use]
+    pub const fn begins(&self) -> Timestamp {
+        self.begins
+    }
+
+    /// When the train is steady at the step from which it will stop.
+    #[must_use]
+    pub fn ends(&self) -> Timestamp {
+        self.begins + self.plan.profile.motion().duration()
+    }
+
+    /// The step from which it will stop.
+    #[must_use]
+    pub const fn last_step(&self) -> SpeedStep {
+        self.plan.last.step
+    }
+
+    /// Whether it is the motion with the least jerk; otherwise a speed is kept between two changes.
+    #[must_use]
+    pub const fn has_least_jerk(&self) -> bool {
+        matches!(self.plan.profile, Profile::LeastJerk(_))
+    }
+
+    /// How far before the target the train should be at a time (in lengths as it feels them), and how fast.
+    #[must_use]
+    pub fn at(&self, time: Timestamp) -> (Length, Speed) {
+        let state = self.plan.profile.motion().state_at(time - self.begins);
+        (Length::from_m(self.plan.begins.left) - state.distance, state.speed)
+    }
+}
+
+/// The speeds that a train can be held at (m/s) and the steps that it may stop from.
+#[derive(Debug, Clone)]
+pub(super) struct Means {
+    pub(super) speeds: [f64; 2],
+    pub(super) last: Vec<FinalStep>,
+}
+
+impl Means {
+    /// The plan that stands at the target after a time (s from now).
+    pub(super) fn plan(&self, begins: Beginning, within: f64) -> Option<ArrivalPlan> {
+        let plans = self.last.iter().filter_map(|last| self.plan_from(begins, within, *last));
+        // The least change of speed on the way is the smoothest.
+        let change = |plan: &ArrivalPlan| {
+            let mean = plan.profile.motion().distance() / plan.profile.motion().duration();
+            (mean.as_m_per_s() - plan.last.speed).abs()
+        };
+        plans.min_by(|one, other| change(one).total_cmp(&change(other)))
+    }
+
+    fn plan_from(&self, begins: Beginning, within: f64, last: FinalStep) -> Option<ArrivalPlan> {
+        let way = begins.left - last.stop_way - last.speed * STEADY.as_s();
+        let time = within - begins.after - last.stop_time - STEADY.as_s();
+        if way <= 0.0 || time <= 0.0 {
+            return None;
+        }
+        let [slowest, fastest] = [self.speeds[0].min(begins.speed), self.speeds[1].max(begins.speed)];
+        let is_held = |speed: Speed| (slowest..=fastest).contains(&speed.as_m_per_s());
+        let (length, span) = (Length::from_m(way), TimeSpan::from_s(time));
+        let [from, to] = [begins.speed, last.speed].map(Speed::from_m_per_s);
+        let smooth = MinimumJerk::new(length, from, to, span);
+        if smooth.speeds().into_iter().all(is_held) {
+            return Some(ArrivalPlan { begins, profile: Profile::LeastJerk(smooth), last });
+        }
+        let change = (CHANGE_PART * time).clamp(CHANGE[0], CHANGE[1]).min(0.5 * time);
+        let law = SpeedLaw::Smooth;
+        let kept = Transit::new(length, [from, to], span, law, TimeSpan::from_s(change))?;
+        is_held(kept.kept()).then_some(ArrivalPlan { begins, profile: Profile::Kept(kept), last })
+    }
+
+    /// The shortest time (s) for which there is a plan; `None` if there is none at all.
+    pub(super) fn soonest(&self, begins: impl Fn(f64) -> Option<Beginning>) -> Option<f64> {
+        times(1.0).find(|within| begins(*within).and_then(|begins| self.plan(begins, *within)).is_some())
+    }
+
+    /// The longest time (s) for which there is a plan, if there is one for a time.
+    pub(super) fn latest(&self, from: f64, begins: impl Fn(f64) -> Option<Beginning>) -> f64 {
+        let fits = |within: f64| begins(within).and_then(|begins| self.plan(begins, within)).is_some();
+        times(from).take_while(|within| fits(*within)).last().unwrap_or(from)
+    }
+}
+
+fn times(from: f64) -> impl Iterator<Item = f64> {
+    core::iter::successors(Some(from), |within| Some(within * NEXT_TIME))
+        .take_while(|within| *within < LONGEST)
+}
+
+impl DrivenTrain {
+    /// What can be planned with: the steps from which it stops surely, and speeds between its slowest and its fastest.
+    pub(super) fn means(&self, usable: &[SpeedStep], slowest: Speed) -> Means {
+        let speed = |step: &SpeedStep| self.model.steady_speed(*step, Approach::Below).as_m_per_s();
+        let ends = [usable.first(), usable.last()].map(|step| step.map_or(0.0, speed));
+        let last = self.sure_steps(usable).into_iter().map(|step| {
+            let stop = self.model.stop(step, Approach::Below);
+            FinalStep {
+                step,
+                speed: speed(&step),
+                stop_way: stop.distance.as_m(),
+                stop_time: stop.time.as_s(),
+            }
+        });
+        let [low, high] = ends;
+        Means {
+            speeds: [(low * (1.0 + RESERVE)).max(slowest.as_m_per_s()), high * (1.0 - RESERVE)],
+            last: last.collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn means() -> Means {
+        let step = SpeedStep::new(6).expect("a step");
+        let last = FinalStep { step, speed: 0.25, stop_way: 0.15, stop_time: 1.2 };
+        Means { speeds: [0.05, 0.5], last: alloc::vec![last] }
+    }
+
+    #[test]
+    fn a_plan_ends_where_the_stop_begins() {
+        let begins = Beginning { after: 0.5, left: 4.0, speed: 0.2 };
+        let plan = means().plan(begins, 15.0).expect("0.28 m/s on the way");
+        let end = plan.profile.motion().state_at(plan.profile.motion().duration());
+        // 4 m less the stop and two seconds of 0.25 m/s; 15 s less 0.5, 1.2 and 2.
+        assert!((end.distance.as_m() - (4.0 - 0.15 - 0.5)).abs() < 1e-9);
+        assert!((plan.profile.motion().duration().as_s() - 11.3).abs() < 1e-9);
+        assert!((end.speed.as_m_per_s() - 0.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_cannot_be_is_not_planned_and_the_bounds_of_what_can_are_known() {
+        let begins = |_: f64| Some(Beginning { after: 0.0, left: 4.0, speed: 0.2 });
+        let (means, now) = (means(), begins(0.0).expect("a state"));
+        assert!(means.plan(now, 8.0).is_none(), "4 m in 8 s are 0.5 m/s from end to end");
+        let soonest = means.soonest(begins).expect("some time");
+        assert!(soonest > 9.0 && soonest < 14.0, "{soonest}");
+        assert!(means.plan(now, soonest).is_some() && means.plan(now, soonest * 0.98).is_none());
+        let latest = means.latest(soonest, begins);
+        // At 0.05 m/s nearly all the way that is 70 s.
+        assert!(latest > 30.0 && latest < 75.0, "{latest}");
+        assert!(means.plan(now, latest * 1.03).is_none());
+    }
+}

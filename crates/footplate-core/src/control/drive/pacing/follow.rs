@@ -1,0 +1,260 @@
+//! A train that runs behind another and keeps the gap to it.
+//!
+//! A gap in time `g` asks the follower to be at `t` where the leader was at `t − g`. Mostly that is past, and known from
+//! when the leader came by the contacts about that place (see [`LeadLine`]). Who follows a follower does not run after what
+//! that one does to make up for its own errors: it follows the first train of all, by the sum of the gaps, so that errors do
+//! not grow from train to train.
+//!
+//! Whatever the gap, the follower can come to rest before the rear of its leader, should that be told to stand now, but for
+//! one time in about a thousand. Of a leader that is in doubt only the contact counts at which it was seen last.
+
+use alloc::collections::BTreeMap;
+
+use crate::control::drive::command_time::spread;
+use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::felt_way::way_between;
+use crate::control::drive::notice::DriveNotice;
+use crate::control::drive::order::{Aim, Gap, OrderId};
+use crate::control::drive::outputs::Outputs;
+use crate::control::drive::refusal::Refusal;
+use crate::control::drive::task::{Goal, Phase, Task};
+use crate::estimation::{Ground, WayPoint};
+use crate::event::Approach;
+use crate::ids::{NodeId, SpeedStep, TrainId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Ratio, Speed};
+
+use super::lead_line::LeadLine;
+use super::reference::Reference;
+use super::task::{POLL_WAIT, Pace, Pacing};
+
+/// From the rear of one train to the front of the next there is never less: a hand's breadth.
+pub(in crate::control) const SAFE: Length = Length::from_mm(50.0);
+/// How often a follower may come to rest beyond the place where it should, ...
+const NEARER: Ratio = Ratio::from_percent(0.1);
+/// ... and its leader short of where it is thought to. Where both scatter alike, both together are as far off as one time in
+/// a thousand: 3.09 + 1.28 standard deviations of one are 3.09 of the root of the sum of both squares.
+const SHORTER: Ratio = Ratio::from_percent(10.0);
+/// One standard deviation of where a train is believed to be between contacts.
+const BELIEVED: Length = Length::from_mm(10.0);
+/// A leader may slow down to what is left of its speed without this part, and its follower need not be held back for it.
+const SLOWS: f64 = 0.35;
+/// So far a train strays from where it should be.
+const STRAYS: Length = Length::from_mm(25.0);
+/// A step that was told is followed by a stop no sooner than this: the next look, and a poll.
+const UNDONE: TimeSpan = TimeSpan::from_ms(300);
+/// A leader is looked at this often (s), whatever is reported.
+const LOOK_AGAIN: f64 = 0.4;
+/// A train that was held back starts again when it can run so far before it would have to stop: no train should start for
+/// less.
+const WORTH_STARTING: Length = Length::from_mm(150.0);
+/// More trains in a row are on no layout.
+const MOST_IN_A_ROW: usize = 12;
+/// The least speed for which a gap is judged: a leader that stands, or crawls, will not do so for ever.
+const USUAL_SPEED: Speed = Speed::from_mm_per_s(250.0);
+
+/// Whom it follows, and how.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::control::drive) struct Following {
+    leader: TrainId,
+    gap: Gap,
+    /// It has been told to stand because it would come too near.
+    is_held: bool,
+    /// What it shall not pass, as of the last look.
+    rear: Option<WayPoint>,
+}
+
+/// The other trains.
+pub(super) type Others = BTreeMap<TrainId, DrivenTrain>;
+
+impl DrivenTrain {
+    /// Takes an order to follow.
+    pub(in crate::control::drive) fn follow(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        (leader, gap): (TrainId, Gap),
+        others: &Others,
+        out: &mut Outputs,
+    ) -> Result<(), Refusal> {
+        let ahead = others.get(&leader).ok_or(Refusal::UnknownTrain { train: leader })?;
+        for train in [&*self, ahead] {
+            if train.located(ground, now).is_none() {
+                return Err(Refusal::Lost { train: train.id() });
+            }
+        }
+        if self.leads(leader, others) {
+            return Err(Refusal::FollowsInCircle { train: self.id(), leader });
+        }
+        let shortest = self.shortest_gap(ahead, gap);
+        let is_short = match (gap, shortest) {
+            (Gap::Time(gap), Gap::Time(shortest)) => gap < shortest,
+            (Gap::Way(gap), Gap::Way(shortest)) => gap < shortest,
+            _ => true,
+        };
+        if is_short {
+            return Err(Refusal::GapTooShort { leader, shortest });
+        }
+        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        let following = Following { leader, gap, is_held: self.told == SpeedStep::STAND, rear: None };
+        self.pacing = Some(Pacing::new(Pace::Follow(following), self.usable_steps(), now));
+        Ok(())
+    }
+
+    fn followed(&self) -> Option<&Following> {
+        match &self.paced()?.pace {
+            Pace::Follow(following) => Some(following),
+            _ => None,
+        }
+    }
+
+    /// Whether a train follows this one, directly or behind others.
+    fn leads(&self, other: TrainId, others: &Others) -> bool {
+        let mut at = other;
+        for _ in 0..MOST_IN_A_ROW {
+            if at == self.id() {
+                return true;
+            }
+            match others.get(&at).and_then(Self::followed) {
+                Some(following) => at = following.leader,
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// The shortest gap at which it could still stop behind a leader that is told to stand, both at the speed of the leader's
+    /// step; that one may be on its way there.
+    fn shortest_gap(&self, leader: &Self, gap: Gap) -> Gap {
+        let speed = leader.model.steady_speed(leader.told, Approach::Below).max(USUAL_SPEED);
+        let stop = |train: &Self, speed: Speed, margins: f64| {
+            let off = |step: &SpeedStep| (train.model.steady_speed(*step, Approach::Below) - speed).abs();
+            let steps = train.usable_steps();
+            let step = steps
+                .into_iter()
+                .min_by(|one, other| off(one).as_m_per_s().total_cmp(&off(other).as_m_per_s()));
+            step.map_or(Length::ZERO, |step| {
+                let stop = train.model.stop(step, Approach::Below);
+                // Steps are coarse: what a stop from just this speed takes.
+                let faster = speed - train.model.steady_speed(step, Approach::Below);
+                let doubts = [stop.doubt, stop.scatter, BELIEVED].map(Length::as_m);
+                let doubt = Length::from_m(libm::sqrt(doubts.iter().map(|doubt| doubt * doubt).sum()));
+                stop.distance + faster * stop.time + doubt * margins
+            })
+        };
+        let own = stop(self, speed * (1.0 + SLOWS), Aim::NotBeyond(NEARER).margin());
+        let ahead = stop(leader, speed, -Aim::NotBeyond(SHORTER).margin());
+        let bumpers = own - ahead + speed * (LINE_TIME + POLL_WAIT) + STRAYS + SAFE;
+        let bumpers = bumpers.max(SAFE);
+        match gap {
+            Gap::Way(_) => Gap::Way(bumpers),
+            Gap::Time(_) => Gap::Time((bumpers + leader.reach[1] + self.reach[0]) / speed),
+        }
+    }
+
+    /// Where a follower should be; `None` while nobody knows where its leader is.
+    pub(super) fn follow_reference(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        following: Following,
+        node: NodeId,
+        others: &Others,
+    ) -> Option<Reference> {
+        let mut leader = others.get(&following.leader)?;
+        let mut late = match following.gap {
+            Gap::Time(gap) => gap.as_s(),
+            Gap::Way(way) => {
+                let line = LeadLine::of(ground, leader, now, node)?;
+                let behind = (way + leader.reach[1] + self.reach[0]).as_m();
+                let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead));
+                return Some(Reference::of(|ahead| line.place(ahead) - behind, speeds));
+            }
+        };
+        // The first of all.
+        while let Some(Following { leader: next, gap: Gap::Time(gap), .. }) = leader.followed() {
+            late += gap.as_s();
+            leader = others.get(next)?;
+        }
+        let line = LeadLine::of(ground, leader, now, node)?;
+        let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead - late));
+        Some(Reference::of(|ahead| line.place(ahead - late), speeds))
+    }
+
+    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is told to stand now, on the
+    /// follower's way. `None` if no way leads there.
+    fn rear_of(&self, ground: Ground<'_>, now: Timestamp, leader: &Self) -> Option<WayPoint> {
+        let node = self.locator.outlook()?.node();
+        let seen = leader
+            .passages
+            .iter()
+            .next_back()
+            .map(|(node, _)| node)
+            .or(leader.locator.outlook().map(|outlook| outlook.node()))?;
+        let doubtful = leader.unseen().is_some() || leader.located(ground, now).is_none();
+        let rest = leader.locator.rest_if_stopped(ground, &leader.model, now).filter(|_| !doubtful);
+        let past = rest.map_or(Length::ZERO, |rest| {
+            let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(SHORTER).margin();
+            surely.max(Length::ZERO)
+        });
+        let from = rest.map_or(seen, |rest| rest.at.node);
+        let between = way_between(ground, &self.model, node, from)?;
+        Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE })
+    }
+
+    /// Looks after the distance to the leader. Says whether the train may be paced now.
+    pub(super) fn may_follow(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        others: &Others,
+        out: &mut Outputs,
+    ) -> bool {
+        let Some(following) = self.followed().copied() else { return true };
+        let Some(task) = self.task else { return false };
+        let leader = following.leader;
+        let Some(ahead) = others.get(&leader) else {
+            self.give_up(now, Refusal::UnknownTrain { train: leader }, out);
+            return false;
+        };
+        let rear = self.rear_of(ground, now, ahead);
+        let soon = now + LINE_TIME + TimeSpan::from_s(LOOK_AGAIN);
+        let stop_by = rear.and_then(|rear| self.last_stop_before(ground, now, rear));
+        let is_free = rear.is_some_and(|rear| {
+            if self.told > SpeedStep::STAND {
+                return stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
+            }
+            let rest = self.locator.rest_if_stopped(ground, &self.model, now);
+            let beyond = rest.and_then(|rest| self.beyond(ground, rest.at, rear));
+            ahead.told > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
+        });
+        let told = self.told;
+        let Some(Pacing { pace: Pace::Follow(following), look, .. }) = &mut self.pacing else { return true };
+        *look = Some(stop_by.map_or(soon, |by| (by - LINE_TIME).clamp(now + LINE_TIME, soon)));
+        following.rear = rear;
+        if is_free {
+            following.is_held = false;
+            return true;
+        }
+        if told > SpeedStep::STAND {
+            if !following.is_held {
+                following.is_held = true;
+                out.say(DriveNotice::HeldBack { order: task.order, train: self.id(), leader });
+            }
+            self.tell_step(now, SpeedStep::STAND, out);
+        }
+        false
+    }
+
+    /// Whether a step may be told now: whether a stop that is told as soon as the line is free again would still end before
+    /// the leader. Who gets slower always may.
+    pub(super) fn could_still_stop(&self, ground: Ground<'_>, now: Timestamp, step: SpeedStep) -> bool {
+        let Some(following) = self.followed().filter(|_| step > self.told) else { return true };
+        let Some(rear) = following.rear else { return false };
+        let start = now + LINE_TIME + POLL_WAIT;
+        let rest = self.locator.rest_after_move(ground, &self.model, start, step, start + UNDONE);
+        let beyond = rest.and_then(|rest| self.aimed_beyond(ground, &rest, rear, Aim::NotBeyond(NEARER)));
+        beyond.is_some_and(|beyond| beyond <= Length::ZERO)
+    }
+}

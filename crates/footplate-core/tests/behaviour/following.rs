@@ -1,0 +1,120 @@
+//! A train keeps its gap to the one ahead, never comes too near to it, and refuses what could not be safe.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
+use footplate_core::control::{Driver, Gap, Order, Refusal};
+use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
+use proptest::prelude::{ProptestConfig, prop_assert, proptest};
+
+use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
+
+/// The one behind, and the one ahead.
+const FOLLOWER: TrainId = TrainId(24);
+const LEADER: TrainId = TrainId(58);
+/// Reach ahead of and behind the pickup's leading end.
+const REACH: [Length; 2] = [Length::from_mm(25.0), Length::from_mm(125.0)];
+
+fn two_trains() -> (ToyRailway, Driver) {
+    let mut world = ToyRailway::new(24, "D1", 100.0);
+    world.put(58, "D1", 800.0);
+    let mut driver = driver_of(&world, "D1", 100.0);
+    add_train(&mut driver, &world, 58, Some(("D1", 800.0)));
+    for train in [FOLLOWER, LEADER] {
+        driver.set_reach(train, REACH[0], REACH[1]);
+    }
+    (world, driver)
+}
+
+fn follow(gap: Gap) -> Order {
+    Order::Follow { train: FOLLOWER, leader: LEADER, gap }
+}
+
+fn seconds(seconds: f64) -> Gap {
+    Gap::Time(TimeSpan::from_s(seconds))
+}
+
+fn run_leader(world: &ToyRailway, driver: &mut Driver, at: u8) {
+    driver.order(world.now, Order::Speed { train: LEADER, step: step(at) }).expect("a step");
+}
+
+/// From bumper to bumper (mm), as the trains really stand.
+fn between(world: &ToyRailway) -> f64 {
+    let at = |id: TrainId| world.trains.iter().find(|train| train.id == id).expect("a train").at;
+    let way = world.layout.distance_ahead(at(FOLLOWER), at(LEADER), &world.turnouts);
+    (way.expect("one oval") - REACH[0] - REACH[1]).as_mm()
+}
+
+/// True gaps (s) since a time.
+fn gaps(world: &ToyRailway, since: Timestamp) -> Vec<f64> {
+    let led = |at: Timestamp, sensor: SensorId| {
+        let passes = world.passes.iter().rev();
+        passes.filter(|(_, _, who)| *who == LEADER).find(|(led, of, _)| *of == sensor && *led <= at)
+    };
+    let own = world.passes.iter().filter(|(at, _, who)| *who == FOLLOWER && *at >= since);
+    own.filter_map(|(at, sensor, _)| Some((*at - led(*at, *sensor)?.0).as_s())).collect()
+}
+
+#[test]
+fn a_gap_in_time_is_kept_while_the_leader_changes_its_speed() {
+    let (mut world, mut driver) = two_trains();
+    run_leader(&world, &mut driver, 7);
+    world.run(&mut driver, 2.0);
+    driver.order(world.now, follow(seconds(3.0))).expect("a safe gap");
+    world.run(&mut driver, 40.0);
+    let since = world.now;
+    for at in [8, 6, 9, 7] {
+        run_leader(&world, &mut driver, at);
+        world.run(&mut driver, 20.0);
+    }
+    let gaps = gaps(&world, since);
+    assert!(gaps.len() > 20, "{gaps:?}");
+    let off = gaps.iter().map(|gap| (gap - 3.0).abs()).fold(0.0, f64::max);
+    assert!(off < 0.3, "{gaps:?}");
+}
+
+#[test]
+fn a_gap_that_no_stop_could_keep_is_refused_with_the_shortest_that_could() {
+    let (mut world, mut driver) = two_trains();
+    run_leader(&world, &mut driver, 8);
+    world.run(&mut driver, 3.0);
+    let refused = driver.order(world.now, follow(seconds(0.3))).expect_err("less than its own length");
+    let Refusal::GapTooShort { shortest: Gap::Time(shortest), .. } = refused else { panic!("{refused}") };
+    assert!((0.5..4.0).contains(&shortest.as_s()), "{shortest:?}");
+    driver.order(world.now, follow(Gap::Time(shortest + TimeSpan::from_ms(1)))).expect("what was offered");
+    let own = Order::Follow { train: LEADER, leader: FOLLOWER, gap: seconds(5.0) };
+    assert!(matches!(driver.order(world.now, own), Err(Refusal::FollowsInCircle { .. })));
+    let nobody = Order::Follow { train: FOLLOWER, leader: TrainId(99), gap: seconds(5.0) };
+    assert!(matches!(driver.order(world.now, nobody), Err(Refusal::UnknownTrain { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn no_follower_touches_its_leader_whatever_that_one_is_told(
+        told in proptest::collection::vec((0_u8..11, 2.0..9.0_f64), 4..9),
+        more in 0.0..1.5_f64,
+        dead in proptest::option::of(0_u16..8),
+    ) {
+        let (mut world, mut driver) = two_trains();
+        world.dead = dead.into_iter().map(SensorId).collect();
+        run_leader(&world, &mut driver, 7);
+        world.run(&mut driver, 2.0);
+        let shortest = match driver.order(world.now, follow(seconds(0.1))) {
+            Err(Refusal::GapTooShort { shortest: Gap::Time(shortest), .. }) => shortest.as_s(),
+            other => panic!("{other:?}"),
+        };
+        driver.order(world.now, follow(seconds(shortest + 0.05 + more))).expect("a safe gap");
+        for (at, lasts) in told {
+            run_leader(&world, &mut driver, at);
+            let until = world.now + TimeSpan::from_s(lasts);
+            while world.now < until {
+                world.run(&mut driver, 0.1);
+                // A leader that has nearly gone round comes upon a follower that was held back from behind.
+                if between(&world) > 1_500.0 {
+                    return Ok(());
+                }
+                prop_assert!(between(&world) > 0.0, "{} mm at {:?}", between(&world), world.now);
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! `footplate simulate pacing`: trains hold speeds, arrive in time and follow each other, and are scored by the simulator's truth.
+
+mod arrive;
+mod counted;
+mod figures;
+mod follow;
+mod hold;
+mod page;
+mod tracked;
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::sync::atomic::Ordering;
+
+use anyhow::ensure;
+use clap::Args;
+use footplate_core::track::Layout;
+use footplate_core::{TimeSpan, TrainId};
+use footplate_sim::LivingSwitches;
+use footplate_store::layout_named;
+
+use self::arrive::{Arrived, arrive};
+use self::follow::{Followed, follow};
+use self::hold::{Held, hold};
+use self::page::Page;
+use super::super::Outcome;
+use super::again::{FailedRun, name_failed};
+use super::driving::choice::Choice;
+use super::rehearsal::{Rehearsal, Way};
+use super::seeds::Seeds;
+use crate::progress::with_progress;
+use crate::spread::{all_cores, spread};
+
+/// Let calibrated trains hold speeds that none of their steps has, arrive in time and follow each other, and score them by the truth.
+///
+/// Each seed is a layout with three trains. What is asked of them is asked of a simpler driver in the same world, too.
+#[derive(Args)]
+#[command(after_help = "Example: footplate simulate pacing --seeds 1..4 --markdown")]
+pub(super) struct Arguments {
+    /// The layout: the name of a built-in one or a layout file.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// The seed of the trains, or of many: 1..30.
+    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
+    seeds: Seeds,
+    /// Track time that each calibration may take, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
+    budget: u16,
+    /// Write the scores as a page of the documentation.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: bool,
+    /// How many seeds at once; without it, as many as there are cores. The result is the same.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// Three trains, in the order in which they would follow each other.
+const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
+
+/// Gaps between them (s), and for how long each is kept (s).
+const GAPS: [f64; 2] = [1.5, 3.0];
+const FOLLOWED_FOR: f64 = 600.0;
+
+/// All of one seed.
+struct Scored {
+    seed: u64,
+    held: Vec<Held>,
+    arrived: Vec<Arrived>,
+    followed: Vec<Followed>,
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let seeds: Vec<u64> = self.seeds.iter().collect();
+        let budget = TimeSpan::from_s(f64::from(self.budget));
+        let threads = self.threads.unwrap_or_else(all_cores);
+        let scored = with_progress("pacing", seeds.len(), |done| {
+            spread(seeds.len(), threads, |at| {
+                let scored = score(&layout, seeds[at], budget);
+                done.fetch_add(1, Ordering::Relaxed);
+                scored
+            })
+        })?;
+        let page = Page { scored: &scored, asked: self.asked() };
+        if self.json {
+            page.write_json(output)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
+        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    /// What the driver did not carry out, or trains came to grief over: how others drive them is no check of ours.
+    fn failure(&self, scored: &Scored) -> Option<FailedRun> {
+        let (train, trouble) = scored.troubles().next()?;
+        let again = format!("simulate pacing --seed {}{}", scored.seed, self.settings());
+        Some(FailedRun { what: format!("seed {}, train {train}: {trouble}", scored.seed), again })
+    }
+
+    /// What was asked for, as on the command line.
+    fn asked(&self) -> String {
+        format!("--seeds {}{} --markdown", self.seeds.written(), self.settings())
+    }
+
+    fn settings(&self) -> String {
+        let mut settings = String::new();
+        if self.layout != "track-a" {
+            settings += &format!(" --layout {}", self.layout);
+        }
+        if self.budget != 300 {
+            settings += &format!(" --budget {}", self.budget);
+        }
+        settings
+    }
+}
+
+impl Scored {
+    /// What went wrong with trains that we drove.
+    fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {
+        let held = self.held.iter().filter(|held| held.by == hold::By::Driver);
+        let held = held.filter_map(|held| Some((held.train, held.trouble.as_deref()?)));
+        let arrived = self.arrived.iter().filter(|arrived| arrived.by == arrive::By::Driver);
+        let arrived = arrived.filter_map(|arrived| Some((arrived.train, arrived.trouble.as_deref()?)));
+        let followed = self.followed.iter().filter(|followed| followed.by == follow::By::Driver);
+        let followed = followed.filter_map(|followed| Some((followed.train, followed.trouble.as_deref()?)));
+        held.chain(arrived).chain(followed)
+    }
+}
+
+/// Everything that is asked of the trains of one seed.
+fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
+    let way = Way::round(layout);
+    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
+    let stage = Rehearsal::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let mut choice = Choice::new(seed);
+    let (mut held, mut arrived) = (Vec::new(), Vec::new());
+    for train in TRAINS {
+        held.extend(hold(layout, &stage, &way, train, &mut choice)?);
+        arrived.extend(arrive(layout, &stage, &way, train, &mut choice)?);
+    }
+    let followed = follow(&stage, &way, &TRAINS, (&GAPS, FOLLOWED_FOR), &mut choice)?;
+    Ok(Scored { seed, held, arrived, followed })
+}

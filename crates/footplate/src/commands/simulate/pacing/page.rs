@@ -1,0 +1,270 @@
+//! The table of how well trains keep to a pace: for people, for the documentation, and for machines.
+
+use std::io::{self, Write};
+use std::ops::Range;
+
+use serde_json::{Value, json};
+
+use super::Scored;
+use super::arrive::{self, Arrived};
+use super::figures::{quantile, root_mean_square, shown, within_pct};
+use super::follow::{self, Followed};
+use super::hold::{By, Held};
+
+const HEAD: &str = "\
+# How well trains keep to a pace
+
+Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. Contacts
+fail now and then. The simulator shares no formula with what drives, and its truth is used for these figures alone.
+";
+
+const HOLD: &str = "\
+## A speed held
+
+Speeds of 200 to 450 mm/s, each held for two minutes, on a way round of which the calibration has seen what it chose to. *Mean speed* is over every 3 m (asked: within 0.5 %), *position* is that
+of a train that had always run at the speed, from the contact at which the driver says it begins (asked: within 15 mm in
+95 % of the time). Both are counted on the map, on which a contact is where it was surveyed, and a train between two of them
+as far along as it truly is. The *nearest step* is what there was before.
+";
+
+const ARRIVE: &str = "\
+## In time at a place
+
+Places 1.8 to 6 m ahead, each to be stood at after a time that asks for 170 to 320 mm/s on the way; every other train runs
+when it is asked. Who cannot be in time is asked again for the time that it offers. True times and places of rest (asked:
+0.3 s and 25 mm at the 95th percentile), median / 95th percentile. The *step of the mean speed* stops at the same place.
+";
+
+const FOLLOW: &str = "\
+## Behind each other
+
+Three trains in a row for ten minutes, behind one that runs at 200 to 320 mm/s and changes its speed every 15 to 40 s. The
+*gap* is the true time from the train ahead at a contact to the follower there; *off* is what it differs from the one asked
+for, root mean square (asked: 60 ms), mean, and 95th percentile. A gap that would not be safe is refused, and the shortest
+safe one and 5 % kept instead. *Nearest* is truly from bumper to bumper (never less than 50 mm is promised). The follower
+beside it runs at the step nearest to its leader's speed, and one up or down while it is off by more than 100 ms.
+";
+
+/// What is asked of a mean speed (%), ...
+const MEAN_WITHIN: f64 = 0.5;
+/// ... and of a position (mm).
+const PLACE_WITHIN: f64 = 15.0;
+
+/// Parts of a run that are told apart: on the first round lengths are as good as their survey, or as a calibration elsewhere
+/// left them.
+const MINUTES: [(&str, Range<f64>); 2] = [("first", 0.0..60.0), ("second", 60.0..f64::INFINITY)];
+
+/// All that was scored.
+pub(super) struct Page<'r> {
+    pub(super) scored: &'r [Scored],
+    pub(super) asked: String,
+}
+
+impl Page<'_> {
+    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(output, "{HEAD}\nMade by `footplate simulate pacing {}`.\n", self.asked)?;
+        self.write_text(output)
+    }
+
+    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(output, "{HOLD}")?;
+        self.write_held(output)?;
+        writeln!(output, "\n{ARRIVE}")?;
+        self.write_arrived(output)?;
+        writeln!(output, "\n{FOLLOW}")?;
+        self.write_followed(output)
+    }
+
+    fn write_followed(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| driven by | asked s | follower | runs | kept s | off ms | mean ms | 95th percentile ms | nearest mm | held \
+             back | failed | commands a second |\n\
+             | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+        )?;
+        let rows = super::GAPS.into_iter().flat_map(|gap| follow::By::ALL.map(|by| (gap, by)));
+        for (gap, by, place) in rows.flat_map(|(gap, by)| [(gap, by, 1), (gap, by, 2)]) {
+            let all = self.scored.iter().flat_map(|scored| &scored.followed);
+            let all =
+                all.filter(|run| run.by == by && run.place == place && (run.gaps[0] - gap).abs() < 1e-9);
+            let all: Vec<&Followed> = all.collect();
+            let late = || all.iter().flat_map(|run| &run.late).map(|late| 1e3 * late);
+            let count = late().count().max(1) as f64;
+            let kept = all.iter().map(|run| run.gaps[1]);
+            let [least, most] = [kept.clone().fold(f64::INFINITY, f64::min), kept.fold(0.0, f64::max)];
+            let commands: usize = all.iter().map(|run| run.commands).sum();
+            let seconds: f64 = all.iter().map(|run| run.seconds).sum();
+            writeln!(
+                output,
+                "| {} | {gap} | {} | {} | {least:.1} to {most:.1} | {} | {} | {} | {} | {} | {} | {:.2} |",
+                by.key(),
+                ["first", "second"][place - 1],
+                all.len(),
+                shown(root_mean_square(late()), 0),
+                shown(Some(late().sum::<f64>() / count), 0),
+                shown(quantile(late().map(f64::abs), 0.95), 0),
+                shown(quantile(all.iter().map(|run| run.nearest), 0.0), 0),
+                all.iter().map(|run| run.held_back).sum::<usize>(),
+                all.iter().filter(|run| run.trouble.is_some()).count(),
+                commands as f64 / seconds.max(1.0),
+            )?;
+        }
+        Ok(())
+    }
+
+    fn arrived(&self, by: arrive::By, from_rest: bool) -> impl Iterator<Item = &Arrived> {
+        let all = self.scored.iter().flat_map(|scored| &scored.arrived);
+        all.filter(move |arrived| arrived.by == by && arrived.from_rest == from_rest)
+    }
+
+    fn write_arrived(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| driven by | asked | orders | other time offered | failed | late or early s | off mm | commands each |\n\
+             | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+        )?;
+        for (by, from_rest) in arrive::By::ALL.into_iter().flat_map(|by| [(by, true), (by, false)]) {
+            let all: Vec<&Arrived> = self.arrived(by, from_rest).collect();
+            let off = |which: usize| {
+                let values = all.iter().filter_map(|arrived| arrived.late_and_beyond);
+                let values: Vec<f64> = values.map(|off| off[which].abs()).collect();
+                [0.5, 0.95].map(|part| quantile(values.iter().copied(), part))
+            };
+            let ([late, latest], [beyond, farthest]) = (off(0), off(1));
+            let commands: usize = all.iter().map(|arrived| arrived.commands).sum();
+            writeln!(
+                output,
+                "| {} | {} | {} | {} | {} | {} / {} | {} / {} | {:.1} |",
+                by.key(),
+                if from_rest { "at rest" } else { "on the run" },
+                all.len(),
+                all.iter().filter(|arrived| arrived.refused).count(),
+                all.iter().filter(|arrived| arrived.trouble.is_some()).count(),
+                shown(late, 2),
+                shown(latest, 2),
+                shown(beyond, 1),
+                shown(farthest, 1),
+                commands as f64 / all.len().max(1) as f64,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn held(&self, by: By) -> impl Iterator<Item = &Held> {
+        self.scored.iter().flat_map(|scored| &scored.held).filter(move |held| held.by == by)
+    }
+
+    fn write_held(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| driven by | minute | runs | mean speed within 0.5 % | off % (95th percentile) | position within 15 mm | off mm (95th \
+             percentile) | most mm | commands a second |\n\
+             | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+        )?;
+        for (by, minute, span) in
+            By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)))
+        {
+            let figures = Figures::of(self.held(by), span);
+            writeln!(
+                output,
+                "| {} | {minute} | {} | {} % | {} | {} % | {} | {} | {:.2} |",
+                by.key(),
+                figures.runs,
+                shown(figures.means_within_pct, 1),
+                shown(figures.mean_off, 2),
+                shown(figures.places_within_pct, 1),
+                shown(figures.place_off, 1),
+                shown(figures.farthest, 0),
+                figures.commands_per_s,
+            )?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+        let parts = By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)));
+        let hold = parts.map(|(by, minute, span)| {
+            let figures = Figures::of(self.held(by), span);
+            json!({
+                "by": by.key(), "minute": minute, "runs": figures.runs, "means_within_0_5_pct": figures.means_within_pct,
+                "mean_off_pct_p95": figures.mean_off, "places_within_15_mm_pct": figures.places_within_pct,
+                "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
+                "commands_per_s": figures.commands_per_s,
+            })
+        });
+        let runs = self.scored.iter().flat_map(|scored| {
+            scored.held.iter().map(move |held| {
+                let figures = Figures::of(core::iter::once(held), 0.0..f64::INFINITY);
+                json!({
+                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
+                    "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
+                    "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
+                    "commands_per_s": figures.commands_per_s, "trouble": held.trouble,
+                })
+            })
+        });
+        let arrived = self.scored.iter().flat_map(|scored| {
+            scored.arrived.iter().map(move |arrived| {
+                json!({
+                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from_rest": arrived.from_rest,
+                    "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
+                    "late_s": arrived.late_and_beyond.map(|[late, _]| late),
+                    "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
+                    "commands": arrived.commands, "trouble": arrived.trouble,
+                })
+            })
+        });
+        let followed = self.scored.iter().flat_map(|scored| {
+            scored.followed.iter().map(move |run| {
+                json!({
+                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_s": run.gaps[0],
+                    "kept_s": run.gaps[1], "rms_ms": root_mean_square(run.late.iter().map(|late| 1e3 * late)),
+                    "mean_ms": 1e3 * run.late.iter().sum::<f64>() / run.late.len().max(1) as f64,
+                    "contacts": run.late.len(), "nearest_mm": run.nearest, "held_back": run.held_back,
+                    "commands_per_s": run.commands as f64 / run.seconds.max(1.0), "trouble": run.trouble,
+                })
+            })
+        });
+        let all = json!({ "hold": hold.collect::<Vec<Value>>(), "held": runs.collect::<Vec<Value>>(), "arrived": arrived.collect::<Vec<Value>>(),
+            "followed": followed.collect::<Vec<Value>>(),
+        });
+        writeln!(output, "{all}")
+    }
+}
+
+/// What several runs come to.
+struct Figures {
+    runs: usize,
+    means_within_pct: Option<f64>,
+    /// 95 % of mean speeds were off by no more (%).
+    mean_off: Option<f64>,
+    places_within_pct: Option<f64>,
+    /// 95 % of positions were off by no more (mm), ...
+    place_off: Option<f64>,
+    /// ... and none by more than this.
+    farthest: Option<f64>,
+    commands_per_s: f64,
+}
+
+impl Figures {
+    fn of<'h>(runs: impl Iterator<Item = &'h Held>, span: Range<f64>) -> Self {
+        let runs: Vec<&Held> = runs.collect();
+        let within = |looks: &[[f64; 2]]| {
+            let looks = looks.iter().filter(|[since, _]| span.contains(since));
+            looks.map(|[_, off]| *off).collect::<Vec<f64>>()
+        };
+        let off = || runs.iter().flat_map(|held| within(&held.off));
+        let ahead = || runs.iter().flat_map(|held| within(&held.ahead));
+        let seconds: f64 = runs.iter().map(|held| held.seconds).sum();
+        let commands: usize = runs.iter().map(|held| held.commands).sum();
+        Self {
+            runs: runs.len(),
+            means_within_pct: within_pct(off(), MEAN_WITHIN),
+            mean_off: quantile(off().map(f64::abs), 0.95),
+            places_within_pct: within_pct(ahead(), PLACE_WITHIN),
+            place_off: quantile(ahead().map(f64::abs), 0.95),
+            farthest: quantile(ahead().map(f64::abs), 1.0),
+            commands_per_s: if seconds > 0.0 { commands as f64 / seconds } else { 0.0 },
+        }
+    }
+}
