@@ -81,6 +81,8 @@ pub(super) struct DispatchedTrain {
     pub(super) looked_at: Timestamp,
     /// Nothing is granted to it before this.
     pub(super) not_before: Timestamp,
+    /// How many times in a row what was granted to it could not be begun.
+    pub(super) withdrawn: u8,
     /// Whether it was said that it waits.
     pub(super) waits_said: bool,
 }
@@ -104,6 +106,7 @@ impl DispatchedTrain {
             caution: 1.0,
             looked_at: Timestamp::ZERO,
             not_before: Timestamp::ZERO,
+            withdrawn: 0,
             waits_said: false,
         }
     }

@@ -215,6 +215,7 @@ impl Dispatcher {
 
     /// What a train takes that has just come to rest at a known place: itself, and turnouts that decide where it is.
     pub(super) fn stand(&mut self, now: Timestamp, id: TrainId) {
+        self.free_anchors(now, id);
         let Some(train) = self.trains.get(&id) else { return };
         let Some(place) = self.driver.position(id, now) else { return };
         let room = self.room(now, train);
@@ -234,18 +235,35 @@ impl Dispatcher {
     /// not thrown.
     pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Footprint) {
         let layout = self.driver.layout();
-        let Some(mut node) = self.driver.locate(id, now).map(|located| located.at.node) else { return };
+        self.anchors(now, id, place).into_iter().for_each(|turnout| held.take_turnout(layout, turnout));
+    }
+
+    /// A train at rest that was seen needs no turnouts behind it but the one whose leg it stands on.
+    pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
+        let Some(place) = self.driver.position(id, now) else { return };
+        let own = self.driver.layout().needs_of(place.edge).filter(|need| need.facing).count();
+        if self.driver.unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+            self.driver.count_from_behind(now, id);
+        }
+    }
+
+    /// The turnouts from whose toes the way leads on to a train at a place, from where it is counted.
+    pub(super) fn anchors(&self, now: Timestamp, id: TrainId, place: Position) -> BTreeSet<TurnoutId> {
+        let layout = self.driver.layout();
+        let mut anchors = BTreeSet::new();
+        let Some(mut node) = self.driver.locate(id, now).map(|located| located.at.node) else {
+            return anchors;
+        };
         for _ in 0..layout.edges().len() {
             let ahead = super::way::edge_from(layout, self.driver.turnouts(), node);
-            let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { return };
-            for need in layout.needs_of(edge).filter(|need| need.facing) {
-                held.take_turnout(layout, need.turnout);
-            }
+            let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { break };
+            anchors.extend(layout.needs_of(edge).filter(|need| need.facing).map(|need| need.turnout));
             if edge == place.edge {
-                return;
+                break;
             }
             node = known.to;
         }
+        anchors
     }
 
     pub(super) fn say(&mut self, notice: DispatchNotice) {

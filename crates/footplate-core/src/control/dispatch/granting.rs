@@ -37,6 +37,8 @@ const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
 const TURN_S: f64 = 1.5;
 /// Stops from faster than this scatter too much to be worth it (20 mm at 600 mm/s).
 const FASTEST: Speed = Speed::from_mm_per_s(450.0);
+/// Slower trains stall on dirty rails, and are where nobody knows; and they keep everybody waiting.
+const CRAWL: Speed = Speed::from_mm_per_s(120.0);
 /// No model train is taken to run slower than this on the way.
 const SLOWEST: Speed = Speed::from_mm_per_s(60.0);
 /// How often a stop may end beyond what is held, as standard deviations: one in a thousand, and a little room so that
@@ -67,9 +69,11 @@ pub(super) struct Start {
     pub(super) place: Position,
     pub(super) room: Room,
     pub(super) pace: Pace,
-    pub(super) pickup: Length,
-    /// Turnouts that it is too near to for them to be thrown, as they lie.
+    /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
     pub(super) frozen: Vec<TurnoutNeed>,
+    /// Who was not seen where it should have been is looked for ahead: it may have come less far, and what is behind it
+    /// then is not what was planned.
+    pub(super) may_turn: bool,
 }
 
 impl Dispatcher {
@@ -95,7 +99,10 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                self.cannot_go(now, id, self.no_way(id));
+                match self.driver.unseen(id, now) {
+                    Some(_) => self.lose(now, id),
+                    None => self.cannot_go(now, id, self.no_way(id)),
+                }
                 continue;
             };
             let free = self.free_way(id, &start, &targets).filter(|free| {
@@ -159,8 +166,11 @@ impl Dispatcher {
             let leg = self.driver.turnouts().get(turnout)?;
             Some(TurnoutNeed { turnout, leg, facing: true })
         };
-        let frozen = self.driver.turnouts_under(id, now).into_iter().filter_map(as_it_lies).collect();
-        Some(Start { place, room, pace: self.pace(id), pickup: train.lengths.pickup, frozen })
+        let mut near = self.driver.turnouts_under(id, now);
+        near.extend(self.anchors(now, id, place));
+        let frozen = near.into_iter().filter_map(as_it_lies).collect();
+        let may_turn = self.driver.unseen(id, now).is_none();
+        Some(Start { place, room, pace: self.pace(id), frozen, may_turn })
     }
 
     /// The soonest way past obstacles, with what it takes.
@@ -189,8 +199,7 @@ impl Dispatcher {
     /// that lie for the other leg. They gave way when it came, and would not when it goes.
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.driver.layout();
-        let back = layout.reversed(start.place)?;
-        let turned = layout.advance(back, start.pickup, self.driver.turnouts()).ok()?;
+        let turned = self.driver.turned_place(start.place).filter(|_| start.may_turn)?;
         let (way, at) = Way::around(layout, self.driver.turnouts(), turned, start.room.behind, Length::ZERO);
         let lies_otherwise = |need: TurnoutNeed| {
             start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)
@@ -253,7 +262,7 @@ impl Dispatcher {
         }
     }
 
-    fn no_way(&self, id: TrainId) -> Refusal {
+    pub(super) fn no_way(&self, id: TrainId) -> Refusal {
         let layout = self.driver.layout();
         let display = |landmark: Landmark| alloc::format!("{}", layout.display(landmark));
         let target = self.journey(id).map_or_else(Default::default, |(_, journey)| display(journey.target));
@@ -270,17 +279,27 @@ impl Dispatcher {
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
     }
 
-    /// The fastest step that a train can have settled at, and still stop from, within a run.
-    pub(super) fn brisk_step(&self, id: TrainId, way: Length) -> Option<SpeedStep> {
+    /// The step for a run: the fastest at which a train can have settled, and from which it stops surely enough; on ways
+    /// that are too short for any the slowest that does not crawl.
+    pub(super) fn step_for(
+        &self,
+        id: TrainId,
+        way: Length,
+        is_sure: impl Fn(Length) -> bool,
+    ) -> Option<SpeedStep> {
         let model = self.driver.model(id)?;
-        let fits = |step: &SpeedStep| {
-            let speed = model.speed(*step, Approach::Below).value;
-            let stop = model.stop(*step, Approach::Below).distance;
-            let starts = speed * model.settles_within(SpeedStep::STAND, *step);
-            let is_sure = speed <= FASTEST;
-            is_sure && starts + stop + PLACE <= way
+        let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
+        let lively = || steps(model).filter(|step| speed(*step) >= CRAWL && speed(*step) <= FASTEST);
+        let spread = |step: SpeedStep| {
+            let stop = model.stop(step, Approach::Below);
+            Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
         };
-        steps(model).filter(fits).last()
+        let fits = |step: SpeedStep| {
+            let stop = model.stop(step, Approach::Below).distance;
+            let starts = speed(step) * model.settles_within(SpeedStep::STAND, step);
+            starts + stop + PLACE <= way
+        };
+        lively().filter(|step| fits(*step) && is_sure(spread(*step))).last().or_else(|| lively().next())
     }
 
     /// How long a train takes for what.

@@ -93,14 +93,7 @@ impl Dispatcher {
 
     /// A train will never come to its destination.
     pub(super) fn cannot_go(&mut self, now: Timestamp, id: TrainId, why: Refusal) {
-        let Some(train) = self.trains.get_mut(&id) else { return };
-        if let Some(asked) = train.asked.take() {
-            self.say(DispatchNotice::Drive(DriveNotice::GivenUp {
-                order: asked.order,
-                train: id,
-                why: why.clone(),
-            }));
-        }
+        self.give_up_journey(id, why.clone());
         self.withdraw(now, id, Some(why));
     }
 

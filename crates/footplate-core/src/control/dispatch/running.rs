@@ -1,9 +1,9 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
-use crate::control::drive::{Aim, Order, Refusal, StopOrder};
+use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Landmark;
+use crate::track::{Landmark, TurnoutNeed};
 use crate::units::Length;
 
 use super::course::{GrantedRun, SLACK};
@@ -14,6 +14,12 @@ use super::notice::DispatchNotice;
 
 /// What could not be done is not tried again for so long.
 const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
+
+/// A journey that could not be begun so many times in a row is given up.
+const MOST_WITHDRAWN: u8 = 5;
+
+/// One standard deviation of stops that are sure enough for a destination: two thirds of them end within a centimetre.
+const SURE: Length = Length::from_mm(10.0);
 
 /// A train that was stopped on the way goes on after this.
 const AFTER_HALT: TimeSpan = TimeSpan::from_s(1.0);
@@ -34,15 +40,34 @@ impl Dispatcher {
                 }
                 State::Lost if self.driver.position(id, now).is_some() => self.found_by_hand(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
+                State::Resting if self.is_somewhere(id) && self.driver.position(id, now).is_none() => {
+                    self.set_state(id, State::Lost);
+                    self.say(DispatchNotice::HeldAsUnknown { train: id });
+                }
                 _ => {}
             }
         }
+    }
+
+    /// A train was not seen where it should have been, and there is no way on which it could be found: a person has to say
+    /// where it stands.
+    pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
+        self.driver.lose(now, id);
+        self.set_state(id, State::Lost);
+        self.say(DispatchNotice::HeldAsUnknown { train: id });
+    }
+
+    fn is_somewhere(&self, id: TrainId) -> bool {
+        self.trains.get(&id).is_some_and(|train| !train.held.is_empty())
     }
 
     /// The turnouts lie for the next run.
     fn depart(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
         if run.turns {
+            if let Some(need) = self.missing_to_turn(now, id) {
+                return self.need_more(now, id, need);
+            }
             let turn = Order::Reverse { train: id, then: crate::ids::SpeedStep::STAND };
             match self.driver.order(now, turn) {
                 Ok(order) => self.set_state(id, State::Turning { order }),
@@ -51,6 +76,29 @@ impl Dispatcher {
         } else {
             self.run(now, id);
         }
+    }
+
+    /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
+    /// stand on another edge than was planned.
+    fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
+        let turned = self.driver.turned_place(self.driver.position(id, now)?)?;
+        let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
+        self.driver.layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
+    }
+
+    /// A run needs one more turnout, if nobody else holds that.
+    fn need_more(&mut self, now: Timestamp, id: TrainId, need: TurnoutNeed) {
+        let is_held = self.trains.values().any(|other| other.id != id && other.held.takes(need.turnout));
+        let layout = self.driver.layout();
+        let run = self.trains.get_mut(&id).and_then(|train| train.course.front_mut());
+        let Some(run) = run.filter(|run| !is_held && !run.needs.contains(&need)) else {
+            return self.withdraw(now, id, None);
+        };
+        run.needs.retain(|known| known.turnout != need.turnout);
+        run.needs.push(need);
+        run.taken.take_turnout(layout, need.turnout);
+        self.set_state(id, State::Setting { ready: None, since: now });
+        self.hold(now, id);
     }
 
     /// Begins the run itself.
@@ -64,7 +112,7 @@ impl Dispatcher {
         let found = located.zip(place).and_then(|(located, place)| {
             let at = run.way.find(place, from)?;
             let limit = run.way.place(run.limit)?;
-            let limit = self.driver.way_point(id, located.at.node, limit)?;
+            let limit = self.driver.way_point_ahead(id, located.at, limit)?;
             let stop = run.way.place(run.stop)?;
             (limit.way > located.at.way).then_some((at, limit, stop))
         });
@@ -76,7 +124,7 @@ impl Dispatcher {
         let is_last = train.course.len() == 1 && train.purpose == Purpose::Journey;
         let aim = train.asked.filter(|_| is_last).map_or(Aim::Median, |asked| asked.journey.aim);
         // Where a train only turns around or waits, time counts more than millimetres.
-        let step = if is_last { None } else { self.brisk_step(id, run.stop - at) };
+        let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round: false };
         self.driver.set_limit(now, id, Some(limit));
         let taken = self.driver.order(now, Order::Stop(stop));
@@ -86,6 +134,9 @@ impl Dispatcher {
                 // It has not moved since, whatever turning around makes of what is known of its place.
                 let rear = (at - room.behind).max(run_begin);
                 self.set_state(id, State::Running { order, rear, confirmed: false });
+                if let Some(train) = self.trains.get_mut(&id) {
+                    train.withdrawn = 0;
+                }
                 self.hold(now, id);
             }
             Err(why) => self.withdraw(now, id, Some(why)),
@@ -99,6 +150,10 @@ impl Dispatcher {
         let confirmed = confirmed && !unseen;
         let ended = train.course.pop_front();
         train.caution = 1.0;
+        if unseen && !train.course.is_empty() {
+            // It is not where it should be: nothing that was planned from there holds.
+            return self.halted(now, id, false);
+        }
         if train.course.is_empty() {
             train.state = State::Resting;
             self.driver.set_limit(now, id, None);
@@ -138,6 +193,9 @@ impl Dispatcher {
     /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
     /// contact has confirmed it keeps what it had, all of it.
     fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<GrantedRun>) {
+        if ended.is_some() {
+            self.free_anchors(now, id);
+        }
         let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
         let Some(place) = self.driver.position(id, now) else { return };
         let room = self.room(now, train);
@@ -161,11 +219,25 @@ impl Dispatcher {
             train.course.clear();
             train.state = State::Resting;
             train.purpose = Purpose::Journey;
+            train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
         self.driver.set_limit(now, id, None);
         self.hold_again(now, id);
         self.say(DispatchNotice::Withdrawn { train: id, why });
+        // Whoever asked for it has to know.
+        if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
+            self.give_up_journey(id, self.no_way(id));
+        }
+    }
+
+    /// A train will never come to its destination.
+    pub(super) fn give_up_journey(&mut self, id: TrainId, why: Refusal) {
+        let Some(train) = self.trains.get_mut(&id) else { return };
+        train.withdrawn = 0;
+        if let Some(asked) = train.asked.take() {
+            self.say(DispatchNotice::Drive(DriveNotice::GivenUp { order: asked.order, train: id, why }));
+        }
     }
 
     /// A train at rest that does not go holds what it held before, and what it stands on now that it may have turned

@@ -1,8 +1,9 @@
 //! Setting turnouts for a run, so surely that one that fails now and then does not matter.
 
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
-use crate::control::drive::Order;
+use crate::control::drive::{Order, Refusal};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutNeed};
@@ -54,6 +55,11 @@ impl Dispatcher {
             }
             return ready <= now;
         }
+        let place = self.driver.position(id, now);
+        let anchors = place.map(|place| self.anchors(now, id, place)).unwrap_or_default();
+        if self.is_in_its_own_way(now, id, &missing, &anchors) {
+            return false;
+        }
         for need in missing {
             // Points that are still moving might be left half way by a second word that fails.
             let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
@@ -61,7 +67,12 @@ impl Dispatcher {
                 continue;
             }
             let order = Order::Turnout { turnout: need.turnout, curved: need.leg.is_curved() };
-            match self.driver.order(now, order) {
+            let taken = if anchors.contains(&need.turnout) {
+                Err(Refusal::TurnoutOccupied { turnout: need.turnout, train: id })
+            } else {
+                self.driver.order(now, order)
+            };
+            match taken {
                 Ok(_) => {
                     self.throwing.insert(need.turnout);
                 }
@@ -71,8 +82,7 @@ impl Dispatcher {
                         train.skipped.insert(need.turnout);
                     }
                 }
-                // It stands too near itself: no waiting helps, but another way may.
-                Err(why) if why.occupier() == Some(id) || now - since > PATIENCE => {
+                Err(why) if now - since > PATIENCE => {
                     self.withdraw(now, id, Some(why));
                     return false;
                 }
@@ -80,6 +90,27 @@ impl Dispatcher {
             }
         }
         false
+    }
+
+    /// Takes back what was granted to a train that stands too near to a turnout of its run: no waiting helps, but another
+    /// way may. Not while a turnout is on its way to being thrown, which nobody would hold.
+    fn is_in_its_own_way(
+        &mut self,
+        now: Timestamp,
+        id: TrainId,
+        missing: &[TurnoutNeed],
+        anchors: &BTreeSet<TurnoutId>,
+    ) -> bool {
+        if missing.iter().any(|need| self.throwing.contains(&need.turnout)) {
+            return false;
+        }
+        let under = self.driver.turnouts_under(id, now);
+        let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
+        let is_own = |turnout| under.contains(turnout) || anchors.contains(turnout);
+        let blocked = missing.iter().find(|need| need.facing && is_own(&need.turnout) && !lies(need));
+        let Some(turnout) = blocked.map(|need| need.turnout) else { return false };
+        self.withdraw(now, id, Some(Refusal::TurnoutOccupied { turnout, train: id }));
+        true
     }
 
     /// The needs of a run, each turnout after the one in the same place that has to lie straight for it.

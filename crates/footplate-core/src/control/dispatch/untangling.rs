@@ -12,7 +12,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position};
 
 use super::course::{Room, standing};
-use super::dispatched_train::Purpose;
+use super::dispatched_train::{DispatchedTrain, Purpose};
 use super::dispatcher::Dispatcher;
 use super::footprint::Footprint;
 use super::granting::{Proposal, Start};
@@ -63,19 +63,21 @@ impl Dispatcher {
         if self.trains.get(&id).is_none_or(|train| now < train.no_room_until) {
             return;
         }
-        let found = self.untangled(now, id, targets, wish);
-        if let Some(train) = self.trains.get_mut(&id).filter(|_| found.is_none()) {
-            train.no_room_until = now + IN_VAIN;
-        }
-        let Some(moves) = found else { return };
-        let Some((first, place)) = moves.first().copied() else { return };
-        let order = moves.iter().map(|(train, _)| *train).collect();
-        self.say(DispatchNotice::Deadlock { train: id, moves: order });
-        let Some(start) = self.start(now, first) else { return };
-        let obstacles = self.obstacles_of_others(first);
-        if let Some(proposal) = self.propose(&start, &self.both_ways(place), &obstacles)
-            && self.is_free(first, &proposal)
-        {
+        let found = self.untangled(now, id, targets, wish).and_then(|moves| {
+            let (first, place) = moves.first().copied()?;
+            let start = self.start(now, first)?;
+            let proposal = self.propose(&start, &self.both_ways(place), &self.obstacles_of_others(first))?;
+            self.is_free(first, &proposal).then_some((moves, place, proposal))
+        });
+        let Some((moves, place, proposal)) = found else {
+            if let Some(train) = self.trains.get_mut(&id) {
+                train.no_room_until = now + IN_VAIN;
+            }
+            return;
+        };
+        let moves: Vec<TrainId> = moves.into_iter().map(|(train, _)| train).collect();
+        if let Some(first) = moves.first().copied() {
+            self.say(DispatchNotice::Deadlock { train: id, moves });
             self.send_aside(now, first, id, place, proposal);
         }
     }
@@ -163,7 +165,8 @@ impl Dispatcher {
             Some(Stander { id: train.id, place, held: train.held.clone() })
         });
         let mut fixed = Obstacles::default();
-        let moving = || self.trains.values().filter(|train| !train.rests());
+        let is_placed = |train: &DispatchedTrain| self.driver.position(train.id, now).is_some();
+        let moving = || self.trains.values().filter(|train| !train.rests() || !is_placed(train));
         moving().for_each(|train| fixed.add(&train.held, f64::INFINITY));
         let is_fixed_free = |taken: &Footprint| moving().all(|train| !train.held.meets(taken));
         let mut tried = 0;
@@ -244,13 +247,16 @@ impl Dispatcher {
             }
         }
         places.sort_by(|one, other| one.0.cmp(&other.0).then(one.3.total_cmp(&other.3)));
-        let can_go = |(_, place, ..): &(bool, Position, Footprint, f64)| {
-            let itinerary = reached.to(self.both_ways(*place).into_iter());
-            let proposal = itinerary.and_then(|itinerary| self.proposal(&start, itinerary));
-            proposal.is_some_and(|proposal| others().all(|other| !proposal.meets(&other.held)))
+        // Where it comes to stand it needs the turnout whose leg that is on: its place is counted over that.
+        let can_go = |(_, place, mut held, seconds): (bool, Position, Footprint, f64)| {
+            let itinerary = reached.to(self.both_ways(place).into_iter())?;
+            let proposal = self.proposal(&start, itinerary)?;
+            let stop = proposal.itinerary.runs.last()?.stop;
+            let own = layout.needs_of(stop.edge).filter(|need| need.facing);
+            own.for_each(|need| held.take_turnout(layout, need.turnout));
+            others().all(|other| !proposal.meets(&other.held)).then_some((place, held, seconds))
         };
-        let found = places.into_iter().filter(can_go).take(PLACES_TRIED);
-        found.map(|(_, place, held, seconds)| (place, held, seconds)).collect()
+        places.into_iter().filter_map(can_go).take(PLACES_TRIED).collect()
     }
 
     /// How long a train takes to its destination in a scene; `None` if it cannot go there.

@@ -3,7 +3,7 @@
 use crate::calibration::motion::{MotionModel, StepUse};
 use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint, landmark_of};
 use crate::event::{Approach, Command, Event, EventKind};
-use crate::ids::{NodeId, SpeedStep, TrainId};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
@@ -378,6 +378,12 @@ impl DrivenTrain {
         }
     }
 
+    /// A contact that it has certainly passed without a report, if it runs as it should.
+    pub(super) fn passed_unheard(&self, ground: Ground<'_>, located: &Located) -> Option<SensorId> {
+        let certain = located.at.way - located.uncertainty * CERTAINLY;
+        contacts_until(ground, &self.model, located.at.node, certain).last().map(|(sensor, _)| sensor)
+    }
+
     /// The order has been carried out.
     pub(super) fn finish(
         &mut self,
@@ -395,9 +401,7 @@ impl DrivenTrain {
             error: target.and_then(|target| self.beyond(ground, located.at, target)),
         });
         if let Some(located) = located {
-            let certain = located.at.way - located.uncertainty * CERTAINLY;
-            let passed = contacts_until(ground, &self.model, located.at.node, certain).last();
-            self.expected.unseen = self.expected.unseen.or(passed.map(|(sensor, _)| sensor));
+            self.expected.unseen = self.expected.unseen.or(self.passed_unheard(ground, &located));
         }
         self.task = None;
         let unseen = self.expected.unseen;

@@ -3,15 +3,16 @@
 use alloc::collections::BTreeSet;
 
 use crate::estimation::{Ground, Rest, WayPoint, place_of, way_to};
-use crate::ids::{NodeId, TrainId, TurnoutId};
+use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::Position;
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
-use super::felt_way::counted_from;
+use super::felt_way::{counted_from, lap};
 use super::order::OrderId;
+use super::turning::turned_place;
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
@@ -69,6 +70,27 @@ impl Driver {
         self.trains.get(&train)?.widest_stop
     }
 
+    /// A contact that a train should have closed and did not, since it was seen last: it may be far behind where it is
+    /// believed to be.
+    #[must_use]
+    pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+        let (train, ground) = (self.trains.get(&train)?, self.track.ground());
+        train.unseen().or_else(|| train.passed_unheard(ground, &train.located(ground, now)?))
+    }
+
+    /// Counts a train at rest from the node behind it, whatever is there: how turnouts further away lie makes no
+    /// difference from now on.
+    pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
+        let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
+        let at = self.position_at(train, located.at).and_then(|place| {
+            let behind = self.track.layout.edge(place.edge)?.from;
+            self.way_point(train, behind, place)
+        });
+        if let Some(at) = at {
+            self.place(now, train, at, located.uncertainty);
+        }
+    }
+
     /// The turnouts that cannot be thrown now for this train.
     #[must_use]
     pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
@@ -86,6 +108,24 @@ impl Driver {
     #[must_use]
     pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
         place_of(self.track.ground(), &self.trains.get(&train)?.model, at)
+    }
+
+    /// The same ahead of a point of its way: where the way leads there only once round, that is taken.
+    #[must_use]
+    pub fn way_point_ahead(&self, train: TrainId, from: WayPoint, to: Position) -> Option<WayPoint> {
+        let found = self.way_point(train, from.node, to)?;
+        if found.way > from.way {
+            return Some(found);
+        }
+        let round = lap(self.track.ground(), &self.trains.get(&train)?.model, from.node)?;
+        Some(WayPoint { way: found.way + round, ..found })
+    }
+
+    /// Where the leading end of the pickup will be taken to be when a train at rest at a place has turned around. It is
+    /// counted from the node behind it then: a turnout there has to lie for where it stands.
+    #[must_use]
+    pub fn turned_place(&self, place: Position) -> Option<Position> {
+        turned_place(self.track.ground(), place)
     }
 
     /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads

@@ -2,6 +2,7 @@
 
 use crate::calibration::motion::MotionModel;
 use crate::estimation::{Ground, Located, WayPoint, place_of, way_to};
+use crate::track::Position;
 use crate::units::Length;
 
 /// The length of a pickup shoe along the track, which nobody has measured for this train. Shoes for three-rail track
@@ -18,11 +19,14 @@ pub(super) fn turned(
     model: &MotionModel,
     located: Located,
 ) -> Option<(WayPoint, Length)> {
-    let place = place_of(ground, model, located.at)?;
-    let back = ground.layout.reversed(place)?;
-    let leading = ground.layout.advance(back, SHOE, ground.turnouts).ok()?;
+    let leading = turned_place(ground, place_of(ground, model, located.at)?)?;
     let behind = ground.layout.edge(leading.edge)?.from;
     let way = way_to(ground, model, behind, leading)?;
     let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DOUBT.as_m()));
     Some((WayPoint { node: behind, way }, uncertainty))
+}
+
+/// Where the leading end of the pickup is once a train at rest at a place has turned around.
+pub(super) fn turned_place(ground: Ground<'_>, place: Position) -> Option<Position> {
+    ground.layout.advance(ground.layout.reversed(place)?, SHOE, ground.turnouts).ok()
 }

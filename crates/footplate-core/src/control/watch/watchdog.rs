@@ -152,6 +152,18 @@ impl Watchdog {
         self.drain(now);
     }
 
+    /// See [`Driver::lose`].
+    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
+        self.driver.lose(now, train);
+        self.drain(now);
+    }
+
+    /// See [`Driver::count_from_behind`].
+    pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
+        self.driver.count_from_behind(now, train);
+        self.drain(now);
+    }
+
     /// Whether a train is in danger or held because of one.
     #[must_use]
     pub fn is_held(&self, train: TrainId) -> bool {

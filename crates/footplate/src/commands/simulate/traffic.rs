@@ -12,11 +12,15 @@ use footplate_core::TimeSpan;
 use footplate_store::layout_named;
 
 use self::page::Page;
-use self::session::{Asked, Session};
+use self::session::{Asked, Session, Tally};
 use super::super::Outcome;
+use super::again::{FailedRun, name_failed};
 use super::seeds::Seeds;
 use crate::progress::with_progress;
 use crate::spread::{all_cores, spread};
+
+/// A train that comes to no destination for so long starves: ten journeys of those that wait longest.
+const STARVES: TimeSpan = TimeSpan::from_ms(1_500_000);
 
 /// Send several calibrated trains to random places, one after the other, and count what comes of it by the truth.
 #[derive(Args)]
@@ -76,8 +80,26 @@ impl Arguments {
         } else {
             page.write_text(output)?;
         }
-        let is_sound = tallies.iter().all(|tally| tally.mishaps.is_empty());
-        Ok(if is_sound { Outcome::Done } else { Outcome::FallsShort })
+        let failed: Vec<FailedRun> = tallies.iter().filter_map(|tally| self.failed(tally)).collect();
+        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    /// What must never become of trains, if it did, and how to have it again with all that is said.
+    fn failed(&self, tally: &Tally) -> Option<FailedRun> {
+        let mut what: Vec<String> = tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect();
+        let intrusions = tally.intrusions.iter();
+        what.extend(intrusions.map(|(at, train)| {
+            format!("train {train} on track that it does not hold at {:.2} s", at.as_s())
+        }));
+        if tally.starved > STARVES.as_s() {
+            what.push(format!("a train came nowhere for {:.0} s", tally.starved));
+        }
+        let again = self.asked().replace(&format!("--seeds {}", self.seeds.written()), "");
+        let again = again.replace("--markdown", "").split_whitespace().collect::<Vec<_>>().join(" ");
+        (!what.is_empty()).then(|| FailedRun {
+            what: format!("seed {}: {}", tally.seed, what.join(", ")),
+            again: format!("simulate traffic {again} --seed {} --talk", tally.seed),
+        })
     }
 
     /// What was asked for, as on the command line.

@@ -18,7 +18,8 @@ fail, at the rates of a well-kept laboratory. The simulator's truth is used for 
 const LEGEND: &str = "\
 *Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted.
 *Waited* is from the order until the way was set, *took* until arrival (mean). *Nowhere* is the longest time that a train
-came to no destination. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
+came to no destination. *Mistaken*: of all rests past a contact those at which the train stood further than four standard
+deviations from where it was believed to. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
 near to the end of a track, for which another was drawn.
 ";
 
@@ -38,8 +39,8 @@ impl Page<'_> {
         writeln!(
             output,
             "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
-             collisions | derailments | overruns | intrusions | wrong legs | lost | hands | no way |\n\
-             | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
+             collisions | derailments | overruns | intrusions | mistaken | wrong legs | lost | hands | no way |\n\
+             | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
         )?;
         for tally in self.tallies {
@@ -48,24 +49,7 @@ impl Page<'_> {
         if self.tallies.len() > 1 {
             row(output, "all", &self.tallies.iter().collect::<Vec<_>>())?;
         }
-        for tally in self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()) {
-            writeln!(
-                output,
-                "\nSeed {} ended early: {:?}. Again, with all that is said:",
-                tally.seed, tally.mishaps
-            )?;
-            writeln!(output, "`footplate simulate traffic {} --talk`", self.again(tally.seed))?;
-        }
         Ok(())
-    }
-
-    /// The same seed alone.
-    fn again(&self, seed: u64) -> String {
-        let words: Vec<&str> = self.asked.split(' ').collect();
-        let at = words.iter().position(|word| *word == "--seeds").map_or(words.len(), |at| at + 1);
-        let seed = seed.to_string();
-        let said = words.iter().enumerate().map(|(nth, word)| if nth == at { seed.as_str() } else { word });
-        said.filter(|word| *word != "--markdown").collect::<Vec<_>>().join(" ")
     }
 
     pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
@@ -75,7 +59,7 @@ impl Page<'_> {
                 "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
                 "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
                 "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost,
-                "hands": tally.hands, "refused": tally.refused, "withdrawn": tally.withdrawn,
+                "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
                 "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
@@ -96,8 +80,8 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
     };
     writeln!(
         output,
-        "| {name} | {:.1} | {arrivals} | {:.1} | {:.1} | {:.1} | {longest:.0} | {} | {} | {} | {} | {} | {} | {} | \
-         {} | {} | {} |",
+        "| {name} | {:.1} | {arrivals} | {:.1} | {:.1} | {:.1} | {longest:.0} | {} | {} | {} | {} | {} | {} | \
+         {} of {} | {} | {} | {} | {} |",
         tallies.iter().map(|tally| tally.hours).sum::<f64>(),
         arrivals as f64 / train_hours.max(1e-9),
         mean(|tally| &tally.waits),
@@ -108,6 +92,8 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
         sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Derailment { .. }))),
         sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Overrun))),
         sum(|tally| tally.intrusions.len()),
+        sum(|tally| tally.mistaken as usize),
+        sum(|tally| tally.beliefs as usize),
         sum(|tally| tally.diverged as usize),
         sum(|tally| tally.lost as usize),
         sum(|tally| tally.hands as usize),

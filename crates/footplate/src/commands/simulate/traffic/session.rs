@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::bail;
-use footplate_core::control::{DispatchNotice, Dispatcher, DriveNotice, Journey, Span, TrainLengths};
+use footplate_core::control::{
+    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
+};
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
@@ -21,6 +23,10 @@ const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
 /// How well a person reads off where a train stands.
 const HAND: Length = Length::from_mm(12.0);
+/// No train should be further from where it is believed to stand, in standard deviations: one time in 15 000.
+const CERTAIN: f64 = 4.0;
+/// Who is so far from where it is believed to stand was counted from a contact that it passed the other way.
+const FAR: Length = Length::from_mm(1_000.0);
 /// A person comes to the help of a lost train after this long.
 const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
 /// Where trains stand past a contact in the beginning.
@@ -65,6 +71,9 @@ pub(super) struct Tally {
     pub(super) took: Vec<f64>,
     /// The longest time that a train came nowhere, in s.
     pub(super) starved: f64,
+    /// Rests past a contact, and those at which a train was further from where it was believed than ever should be.
+    pub(super) beliefs: u32,
+    pub(super) mistaken: u32,
     /// Errors of arrivals as believed, in mm.
     pub(super) errors: Vec<f64>,
 }
@@ -188,6 +197,7 @@ impl<'l> Session<'l> {
             DispatchNotice::Withdrawn { why, .. } => {
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
+            DispatchNotice::Drive(DriveNotice::Done(finished)) => self.check_belief(finished),
             DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
             DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
             DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
@@ -257,6 +267,28 @@ impl<'l> Session<'l> {
             };
             held.covers(id.stretch(), span, ROUNDING)
         })
+    }
+
+    /// Compares where a train stands with where it is believed to.
+    fn check_belief(&mut self, finished: &Finished) {
+        let truth = self.rehearsal.world().truth();
+        let Some(achieved) = finished.achieved else { return };
+        let sensor = self.layout.sensor_at(achieved.at.node);
+        let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
+        let error = past - achieved.at.offset;
+        // Who has turned around since did not come from that contact.
+        if error.abs() > FAR {
+            return;
+        }
+        let sigmas = error / achieved.uncertainty;
+        self.tally.beliefs += 1;
+        if sigmas.abs() > CERTAIN {
+            self.tally.mistaken += 1;
+            if self.talk {
+                let (train, mm) = (finished.train, error.as_mm());
+                eprintln!("{:9.2} train {train} is {mm:.0} mm ({sigmas:.1} sd) beyond", finished.time.as_s());
+            }
+        }
     }
 
     /// What a train and the turnouts really do, where that is not what is believed.
