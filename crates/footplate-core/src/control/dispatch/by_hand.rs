@@ -65,9 +65,16 @@ impl Dispatcher {
         let layout = self.driver.layout();
         let room = self.room(now, train);
         let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, AHEAD + room.ahead);
+        // Who follows another train shares its track, and that of whom it follows in turn: the driver keeps gaps safe.
+        let mut row = alloc::vec![id];
+        while let Some(leader) =
+            row.last().and_then(|last| self.driver.leader(*last)).filter(|leader| !row.contains(leader))
+        {
+            row.push(leader);
+        }
         let is_free = |end: Length| {
             let taken = way.footprint(layout, at - room.behind, end + room.ahead);
-            self.trains.values().all(|other| other.id == id || !other.held.meets(&taken))
+            self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
         };
         let reach = (way.length() - room.ahead).min(at + AHEAD);
         let mut end = reach;

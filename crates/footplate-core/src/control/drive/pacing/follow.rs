@@ -12,6 +12,7 @@ use alloc::collections::BTreeMap;
 
 use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::driver::Driver;
 use crate::control::drive::felt_way::way_between;
 use crate::control::drive::notice::DriveNotice;
 use crate::control::drive::order::{Aim, Gap, OrderId};
@@ -66,6 +67,17 @@ pub(in crate::control::drive) struct Following {
 
 /// The other trains.
 pub(super) type Others = BTreeMap<TrainId, DrivenTrain>;
+
+impl Driver {
+    /// The train behind which a train has been ordered to keep a gap.
+    #[must_use]
+    pub fn leader(&self, train: TrainId) -> Option<TrainId> {
+        match &self.trains.get(&train)?.paced()?.pace {
+            Pace::Follow(following) => Some(following.leader),
+            _ => None,
+        }
+    }
+}
 
 impl DrivenTrain {
     /// Takes an order to follow.
