@@ -270,7 +270,7 @@ mod tests {
             ("follow 58 behind 24 by 1", "column 24: `1` should be a distance ahead, such as 37mm or 1.2m"),
             ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
             ("go 24 at D5", "column 7: `at` should be `to`"),
-            ("go 24 to D5 face", "column 13: `face` says nothing here: did you mean `facing`?"),
+            ("go 24 to D5 facin", "column 13: `facin` says nothing here: did you mean `facing`?"),
             ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),

@@ -67,7 +67,8 @@ impl Watched {
         }
         let elapsed = self.stopwatch.elapsed();
         if elapsed >= self.painted + BETWEEN_PICTURES {
-            self.painted = elapsed;
+            // Counted from when it was due: a look that came late does not make all others late.
+            self.painted = (self.painted + BETWEEN_PICTURES).max(elapsed.saturating_sub(BETWEEN_PICTURES));
             conductor.machine().show(&mut self.painter, now);
         }
     }
