@@ -2,16 +2,18 @@
 
 use crate::control::drive::Refusal;
 use crate::ids::TrainId;
-use crate::time::Timestamp;
+use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
 use super::way::Way;
 
-/// How far ahead a train that is driven by hand takes the track: more than any train needs to stop from its highest
-/// step (1.2 m) and the next contact.
-const AHEAD: Length = Length::from_mm(2_500.0);
+/// How far ahead a train that is driven by hand takes the track at least and at most: a locomotive's length, and more than
+/// any train needs to stop from its highest step (1.2 m) and the next contact.
+const AHEAD: [Length; 2] = [Length::from_mm(300.0), Length::from_mm(2_500.0)];
+/// It takes what it needs to come to rest if it is told to after this: until then nobody looks again but a few times.
+const TOLD_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
 /// Steps in which it is tried whether less of it is free.
 const EVERY: Length = Length::from_mm(50.0);
 
@@ -64,7 +66,11 @@ impl Dispatcher {
         };
         let layout = self.driver.layout();
         let room = self.room(now, train);
-        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, AHEAD + room.ahead);
+        let ahead = self.driver.rest_if_stopped(id, now + TOLD_AFTER).map_or(AHEAD[1], |rest| {
+            let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
+            runs_on.max(AHEAD[0]).min(AHEAD[1])
+        });
+        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, ahead + room.ahead);
         // Who follows another train shares its track, and that of whom it follows in turn: the driver keeps gaps safe.
         let mut row = alloc::vec![id];
         while let Some(leader) =
@@ -76,7 +82,7 @@ impl Dispatcher {
             let taken = way.footprint(layout, at - room.behind, end + room.ahead);
             self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
         };
-        let reach = (way.length() - room.ahead).min(at + AHEAD);
+        let reach = (way.length() - room.ahead).min(at + ahead);
         let mut end = reach;
         while end > at && !is_free(end) {
             end -= EVERY;
