@@ -98,9 +98,24 @@ pub(super) fn granted(
                 }
             }
         }
+        // What it takes beyond its stop may need a turnout otherwise than its way does: it would be thrown to and fro.
+        if contradicts(layout, &granted.needs) {
+            return None;
+        }
         runs.push(granted);
     }
     Some(runs)
+}
+
+/// Whether a turnout is needed both ways, or both of a pair in one place curved.
+fn contradicts(layout: &Layout, needs: &[TurnoutNeed]) -> bool {
+    needs.iter().any(|need| {
+        let partner = layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved());
+        needs.iter().any(|other| {
+            other.turnout == need.turnout && other.leg != need.leg
+                || Some(other.turnout) == partner && other.leg.is_curved()
+        })
+    })
 }
 
 /// The whole way of a run and where on it the run begins. What is behind the train is what was ahead of it before it

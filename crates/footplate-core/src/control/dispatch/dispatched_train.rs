@@ -71,6 +71,8 @@ pub(super) struct DispatchedTrain {
     pub(super) skipped: BTreeSet<TurnoutId>,
     /// Where it can stand, and whether clear of all turnouts.
     pub(super) parking: Vec<(Position, bool)>,
+    /// How often others stepped aside for it since it set out last.
+    pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
     pub(super) no_room_until: Timestamp,
     /// How long it would take from where it stands if nobody were in its way, in seconds; `None` until it was looked for.
@@ -101,6 +103,7 @@ impl DispatchedTrain {
             kept: Footprint::empty(),
             skipped: BTreeSet::new(),
             parking: Vec::new(),
+            rooms_made: 0,
             no_room_until: Timestamp::ZERO,
             unobstructed_s: None,
             caution: 1.0,

@@ -37,8 +37,8 @@ pub struct Dispatcher {
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
     /// How turnouts were told to lie, and how often and when last since anything said that they lay otherwise.
     pub(super) told: BTreeMap<TurnoutId, Told>,
-    /// Turnouts that were asked for and not told yet.
-    pub(super) throwing: BTreeSet<TurnoutId>,
+    /// Turnouts that were asked for and not told yet, since when.
+    pub(super) throwing: BTreeMap<TurnoutId, Timestamp>,
     pub(super) outputs: VecDeque<Output<DispatchNotice>>,
     /// Whether anything has changed since trains at rest were last looked at.
     pub(super) is_stirred: bool,
@@ -75,7 +75,7 @@ impl Dispatcher {
             crawlers: BTreeSet::new(),
             trains: BTreeMap::new(),
             told,
-            throwing: BTreeSet::new(),
+            throwing: BTreeMap::new(),
             outputs: VecDeque::new(),
             is_stirred: true,
             shuffled: 0,

@@ -31,6 +31,8 @@ const LONGER_BY_S: f64 = 10.0;
 const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
 /// When all trains at rest have waited so long and nobody runs, nothing that was looked for will be found.
 const STALLED: TimeSpan = TimeSpan::from_s(20.0);
+/// When others have stepped aside so often for a train that still waits, it is somebody else's turn.
+const ROOMS_IN_A_ROW: u32 = 3;
 /// Who waits is looked at again after this long, whatever happens: much does that is nothing to it.
 const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
 /// From the end of a run until its train is taken to stand, and turning around: commands and margins of time.
@@ -77,15 +79,18 @@ pub(super) struct Start {
 }
 
 impl Dispatcher {
-    /// Looks at all trains at rest that want to go somewhere, those that have waited longest first.
+    /// Looks at all trains at rest that want to go somewhere, those that have waited longest first, unless room was made for
+    /// them again and again in vain.
     pub(super) fn arrange(&mut self, now: Timestamp) {
-        let mut waiting: Vec<(Timestamp, TrainId)> = self
+        let mut waiting: Vec<(u32, Timestamp, TrainId)> = self
             .trains
             .values()
             .filter(|train| train.is_ready(now))
-            .filter_map(|train| Some((train.asked?.since, train.id)))
+            .filter_map(|train| Some((train.rooms_made / ROOMS_IN_A_ROW, train.asked?.since, train.id)))
             .collect();
         waiting.sort_unstable();
+        let waiting: Vec<(Timestamp, TrainId)> =
+            waiting.into_iter().map(|(_, since, id)| (since, id)).collect();
         let mut kept_free: Option<Proposal> = None;
         let mut all_wait = !waiting.is_empty();
         for (since, id) in waiting.iter().copied() {
@@ -246,6 +251,9 @@ impl Dispatcher {
         train.granted_for = train.asked.filter(|_| purpose == Purpose::Journey).map(|asked| asked.order);
         train.waits_said = false;
         train.unobstructed_s = None;
+        if purpose == Purpose::Journey {
+            train.rooms_made = 0;
+        }
         train.state = State::Setting { ready: None, since: now };
         train.skipped.clear();
         self.hold(now, id);

@@ -16,6 +16,8 @@ use super::dispatcher::Dispatcher;
 pub(super) const SURE: u8 = 2;
 /// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
 const MOVES: TimeSpan = TimeSpan::from_ms(350);
+/// A line that works tells a turnout within this: two polls, and the solenoids of a dozen others before it.
+const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 /// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
@@ -63,7 +65,7 @@ impl Dispatcher {
         for need in missing {
             // Points that are still moving might be left half way by a second word that fails.
             let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
-            if self.throwing.contains(&need.turnout) || self.told.get(&need.turnout).is_some_and(moves) {
+            if self.is_being_thrown(now, need.turnout) || self.told.get(&need.turnout).is_some_and(moves) {
                 continue;
             }
             let order = Order::Turnout { turnout: need.turnout, curved: need.leg.is_curved() };
@@ -74,7 +76,7 @@ impl Dispatcher {
             };
             match taken {
                 Ok(_) => {
-                    self.throwing.insert(need.turnout);
+                    self.throwing.insert(need.turnout, now);
                 }
                 // It stands on the points, and they give way to it.
                 Err(_) if !need.facing => {
@@ -101,7 +103,7 @@ impl Dispatcher {
         missing: &[TurnoutNeed],
         anchors: &BTreeSet<TurnoutId>,
     ) -> bool {
-        if missing.iter().any(|need| self.throwing.contains(&need.turnout)) {
+        if missing.iter().any(|need| self.is_being_thrown(now, need.turnout)) {
             return false;
         }
         let under = self.driver.turnouts_under(id, now);
@@ -111,6 +113,11 @@ impl Dispatcher {
         let Some(turnout) = blocked.map(|need| need.turnout) else { return false };
         self.withdraw(now, id, Some(Refusal::TurnoutOccupied { turnout, train: id }));
         true
+    }
+
+    /// Whether a turnout was asked for and may still be told. What got lost on the line is asked for again.
+    fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
+        self.throwing.get(&turnout).is_some_and(|since| now - *since < TOLD_WITHIN)
     }
 
     /// The needs of a run, each turnout after the one in the same place that has to lie straight for it.

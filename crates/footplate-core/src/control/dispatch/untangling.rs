@@ -78,6 +78,9 @@ impl Dispatcher {
         let moves: Vec<TrainId> = moves.into_iter().map(|(train, _)| train).collect();
         if let Some(first) = moves.first().copied() {
             self.say(DispatchNotice::Deadlock { train: id, moves });
+            if let Some(train) = self.trains.get_mut(&id) {
+                train.rooms_made = train.rooms_made.saturating_add(1);
+            }
             self.send_aside(now, first, id, place, proposal);
         }
     }

@@ -168,9 +168,7 @@ impl<'l> Session<'l> {
 
     fn hear(&mut self, notice: &DispatchNotice) {
         let now = self.rehearsal.line.now();
-        if self.talk
-            && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_) | DriveNotice::Thrown { .. }))
-        {
+        if self.talk && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_))) {
             eprintln!("{:9.2} {notice:?}", now.as_s());
         }
         match notice {
