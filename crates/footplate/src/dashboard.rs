@@ -5,6 +5,7 @@
 //! picture  spans   what there is to see now; which rails a stretch of way covers
 //! history          what was in the last minutes; `way_travelled` makes one number of places along a way
 //! model_picture    how a train moves, step by step
+//! alarm            what is not as it should be, in sentences that pages have in both languages
 //! board            where the control loop leaves all that, and finds what was asked; it never waits for anybody
 //! guard            who may ask: hosts, origins, a token beyond loopback
 //! server  stream   HTTP on a thread of its own; what one watcher is sent
@@ -13,6 +14,7 @@
 //! assets           the pages, inside the program
 //! ```
 
+mod alarm;
 mod assets;
 mod board;
 mod calibration_picture;
@@ -28,6 +30,7 @@ mod spans;
 mod stream;
 mod way_travelled;
 
+pub(crate) use alarm::Alarm;
 pub(crate) use board::{Answer, Board};
 pub(crate) use painter::{Painter, TrainPassed};
 pub(crate) use picture::LayoutPicture;

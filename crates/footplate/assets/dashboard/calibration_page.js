@@ -38,23 +38,26 @@ export function calibrationPage(root, live, number) {
     };
   }
   const bySide = (unit) => SIDES.map(([side, name]) => dots(say(`from-${side}`), name, unit, 0));
-  const upright = { y: { range: (_, __, high) => [0, Math.max(100, 1.08 * (high ?? 0))] }, x: { range: () => [0, (model?.highest ?? 14) + 0.6] } };
+  /** From nought to the end of the highest bar. */
+  const upright = (bars) => ({
+    y: { range: () => [0, 1.06 * Math.max(100, ...bars.flat().map(({ y, dy }) => y + dy))] }, x: { range: () => [0, (model?.highest ?? 14) + 0.6] },
+  });
 
   const speedBars = [[], [], []];
   add("speeds", () => ({
-    name: say("chart-speeds"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-speed"), ticks: [1, 2, 5], range: upright,
+    name: say("chart-speeds"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-speed"), ticks: [1, 2, 5], range: upright(speedBars),
     zooms: false, series: bySide("mm/s"), bars: barsOf(speedBars, SIDES),
   }), sides(() => (model?.steps ?? []).filter(({ uses, contacts }) => uses !== "unreliable" && (uses === "moves" || contacts > 0))
     .map((step) => ({ step: step.step, side: step.approach, value: step.speed_mm_per_s, half: step.speed_half_mm_per_s })), speedBars));
   const stopBars = [[], [], []];
   add("stops-by-step", () => ({
-    name: say("chart-stops-by-step"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-stop"), ticks: [1, 2, 5], range: upright,
+    name: say("chart-stops-by-step"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-stop"), ticks: [1, 2, 5], range: upright(stopBars),
     zooms: false, series: bySide("mm"), bars: barsOf(stopBars, SIDES),
   }), sides(() => (model?.steps ?? []).filter(({ uses }) => uses === "moves")
     .map((step) => ({ step: step.step, side: step.approach, value: step.stop_mm, half: step.stop_half_mm })), stopBars));
   const storedBars = [[], [], []];
   add("stored", () => ({
-    name: say("chart-stored"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-speed"), ticks: [1, 2, 5], range: upright,
+    name: say("chart-stored"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-speed"), ticks: [1, 2, 5], range: upright(storedBars),
     zooms: false, series: bySide("mm/s"), bars: barsOf(storedBars, SIDES),
   }), sides(() => (report?.calibration.speeds ?? [])
     .map(({ step, approach, speed }) => ({ step, side: approach.toLowerCase(), value: speed.value, half: speed.uncertainty / SIGMA })), storedBars));
@@ -228,7 +231,8 @@ export function calibrationPage(root, live, number) {
   function progress(now) {
     $("#progress").hidden = !now;
     if (!now) return;
-    put($("#about"), now.experiment ?? say(`phase-${now.phase}`));
+    const { what, step, side, run_s: run } = now.trial ?? {};
+    put($("#about"), now.trial ? say(`trial-${what}`, step, side && say(`trial-from-${side}`), run && shown(run, 1)) : say(`phase-${now.phase}`));
     put($("#because"), !now.experiment ? "–" : now.gain == null ? say("because-untried") : say("because-most", shown(now.takes_s), shown(now.gain, 1)));
     put($("#left"), say("left-of", shown(now.left_s), shown(now.elapsed_s + now.left_s)));
     $("#elapsed").max = now.elapsed_s + now.left_s;

@@ -1,6 +1,7 @@
 // The frame of the pages: which of them is open, what it is told, and how the connection stands.
 
 import "./halt.js";
+import { Alarmed } from "./alarms.js";
 import { make } from "./dom.js";
 import { calibrationPage } from "./calibration_page.js";
 import { healthPage } from "./health_page.js";
@@ -20,6 +21,7 @@ const COLOURS = { connecting: "amber", connected: "green", lost: "red" };
 
 const $ = (id) => document.getElementById(id);
 const live = new Live();
+const alarmed = new Alarmed($("alarmed"), live);
 let open;
 
 /** The page that the address names, and of what. */
@@ -36,6 +38,7 @@ function turn() {
   page.dataset.page = name;
   translate(page);
   open = PAGES[name](page, live, what);
+  alarmed.turn(name);
   if (live.picture) open.picture?.(live.picture);
   const here = `#/${name === "train" ? `train/${what}` : name}`;
   for (const link of $("pages").querySelectorAll("a")) {

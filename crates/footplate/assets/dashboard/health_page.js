@@ -1,5 +1,6 @@
 // Whether all is as it should be: prediction errors, drift, alarms, and how the line keeps time.
 
+import { told } from "./alarms.js";
 import { colour, dots } from "./chart.js";
 import { LiveChart, upright } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -101,8 +102,8 @@ export function healthPage(root, live) {
   }
 
   function alarms() {
-    const rows = live.alarms.slice(-LISTED).reverse().map(({ t_s, train, text }) => make("li", {},
-      make("span", { class: "quiet" }, `${shown(t_s, 1)} s `), train ? `${say("train", train)}: ${text}` : text));
+    const rows = live.alarms.slice(-LISTED).reverse().map((alarm) => make("li", { class: alarm.grade },
+      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), told(alarm)));
     $("#alarms").replaceChildren(...rows);
     $("#no-alarm").hidden = rows.length > 0;
   }

@@ -1,6 +1,6 @@
 // The layout with all trains, what is said, and a line to write orders in.
 
-import { make, put } from "./dom.js";
+import { make, put, signed } from "./dom.js";
 import { order } from "./server.js";
 import { PickTrack } from "./pick_track.js";
 import { colourOf } from "./track.js";
@@ -70,7 +70,7 @@ export function layoutPage(root, live) {
       const speed = train.at ? `${train.speed_mm_per_s.toFixed(0)} ± ${train.speed_half_mm_per_s.toFixed(0)} mm/s, ` : "";
       put(parts.speed, speed + say("at-step", train.step));
       const rests = train.promise_mm;
-      const ends = rests ? ` (${say("rests")} ${rests[1].toFixed(0)} … ${rests[2].toFixed(0)} mm)` : "";
+      const ends = rests ? ` (${say("rests")} ${signed(rests[1])} … ${signed(rests[2])} mm)` : "";
       put(parts.busy, train.doing ? train.doing + ends : "–");
       parts.stopHere.disabled = !track.place;
       put(parts.stopHere, say("stop-here", track.place ?? "…"));

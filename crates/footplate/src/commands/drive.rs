@@ -38,6 +38,7 @@ use self::script::read_script;
 pub(crate) use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::terminal::Terminal;
+pub(super) use self::told::Tongue;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;

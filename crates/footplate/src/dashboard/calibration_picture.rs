@@ -1,5 +1,6 @@
 //! What a calibration is about: the experiment and why it, the time that is left, and how well stops are known by now.
 
+use footplate_core::Approach;
 use footplate_core::control::calibrate::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
 use serde::Serialize;
 
@@ -12,6 +13,8 @@ pub(super) struct CalibrationPicture {
     phase: &'static str,
     /// The experiment in words, while there is one.
     experiment: Option<String>,
+    /// The same for who has words of their own.
+    trial: Option<TrialPicture>,
     /// What it was expected to gain (variances relative to the scatter of stops) and to take; none where a step was
     /// never tried.
     gain: Option<f64>,
@@ -19,6 +22,34 @@ pub(super) struct CalibrationPicture {
     elapsed_s: f64,
     left_s: f64,
     expected: Option<ExpectedPicture>,
+}
+
+/// What is tried.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct TrialPicture {
+    /// `speed`, `stop-past`, `stop-short` or `move`.
+    what: &'static str,
+    step: u8,
+    /// The side from which the step is reached: `below` or `above`; from rest where that is all.
+    side: Option<&'static str>,
+    /// How long the train runs.
+    run_s: Option<f64>,
+}
+
+impl TrialPicture {
+    fn of(experiment: Experiment) -> Self {
+        let side = |approach| match approach {
+            Approach::Above => "above",
+            Approach::Below | Approach::Unknown => "below",
+        };
+        let (what, from, run_s) = match experiment {
+            Experiment::Speed { approach, .. } => ("speed", Some(side(approach)), None),
+            Experiment::Stop { approach, is_past: true, .. } => ("stop-past", Some(side(approach)), None),
+            Experiment::Stop { approach, is_past: false, .. } => ("stop-short", Some(side(approach)), None),
+            Experiment::Move { run, .. } => ("move", None, Some(tenths(run.as_s()))),
+        };
+        Self { what, step: experiment.step().get(), side: from, run_s }
+    }
 }
 
 /// How well the middle one of the steps is known, 95 %.
@@ -41,6 +72,7 @@ impl CalibrationPicture {
 
     fn begins(&mut self, experiment: Experiment, why: Why) {
         self.experiment = Some(experiment.to_string());
+        self.trial = Some(TrialPicture::of(experiment));
         (self.gain, self.takes_s) = match why {
             Why::NeverTried => (None, None),
             Why::MostPerSecond { gain, takes } => (Some(tenths(gain)), Some(tenths(takes.as_s()))),
@@ -58,6 +90,7 @@ impl CalibrationPicture {
         };
         if !matches!(progress.phase, Phase::Experiment(_)) {
             self.experiment = None;
+            self.trial = None;
         }
         self.elapsed_s = tenths(progress.elapsed.as_s());
         self.left_s = tenths(progress.left.as_s());

@@ -1,17 +1,17 @@
 //! Paints what a driver knows: the picture of now, what was along the way, and the contacts that trains passed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use footplate_core::calibration::DriftTest;
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::calibration::{Drift, DriftTest};
 use footplate_core::control::calibrate::CalibrationNotice;
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
-use serde_json::json;
 
+use super::alarm::{Alarm, Grade};
 use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
@@ -48,6 +48,8 @@ pub(crate) struct Painter {
     samples: Vec<(TrainId, Sample)>,
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
+    /// Of which trains something was said that is not over, or of the line (`None`).
+    alarmed: BTreeSet<Option<TrainId>>,
     /// The line's clock when the session began, once that is known.
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
@@ -55,6 +57,14 @@ pub(crate) struct Painter {
     /// Somebody else tells the trains what to do: what a train was told is what has left for it.
     follows: bool,
     calibration: Option<CalibrationPicture>,
+}
+
+/// An alarm as the browser gets it.
+#[derive(Debug, Serialize)]
+struct TimedAlarm<'a> {
+    t_s: f64,
+    #[serde(flatten)]
+    alarm: &'a Alarm,
 }
 
 /// A passed contact as the browser gets it.
@@ -98,6 +108,7 @@ impl Painter {
             samples: Vec::new(),
             sampled: None,
             drifts: BTreeMap::new(),
+            alarmed: BTreeSet::new(),
             began: None,
             models: BTreeMap::new(),
             looked_at_models: None,
@@ -127,10 +138,20 @@ impl Painter {
         self.fresh.push(passed);
     }
 
-    /// Something is not as it should be, with a train or with the line.
-    pub(crate) fn alarm(&self, now: Timestamp, train: Option<TrainId>, text: &str) {
-        let t_s = millis((now - self.began.unwrap_or(now)).as_s());
-        self.board.tell("alarm", &json!({ "t_s": t_s, "train": train, "text": text }));
+    /// Something is not as it should be, with a train or with the line, or is so again.
+    pub(crate) fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
+        let is_news = match alarm.grade {
+            Grade::Over => self.alarmed.remove(&alarm.train),
+            Grade::Danger | Grade::Warning => {
+                self.alarmed.insert(alarm.train);
+                true
+            }
+        };
+        // That something is over matters to those who have heard of it.
+        if is_news {
+            let t_s = millis((now - self.began.unwrap_or(now)).as_s());
+            self.board.tell("alarm", &TimedAlarm { t_s, alarm });
+        }
     }
 
     /// Leaves the picture of a moment that is not before the last entry, and what has become of it since.
@@ -146,8 +167,14 @@ impl Painter {
     }
 
     /// The same of trains that nobody dispatches: they hold nothing.
-    pub(crate) fn paint_alone(&mut self, driver: &Driver, now: Timestamp, began: Timestamp) {
-        self.paint_driven(driver, |_| Vec::new(), &BTreeMap::new(), now, began);
+    pub(crate) fn paint_alone(
+        &mut self,
+        driver: &Driver,
+        tasks: &BTreeMap<TrainId, TrainTask>,
+        now: Timestamp,
+        began: Timestamp,
+    ) {
+        self.paint_driven(driver, |_| Vec::new(), tasks, now, began);
     }
 
     fn paint_driven(
@@ -221,11 +248,7 @@ impl Painter {
         let alarm = passed.late.and_then(|[late, doubt]| drift.take(late.as_s() / doubt.as_s()));
         let level = drift.level();
         if let Some(drift) = alarm {
-            let text = match drift {
-                Drift::Slower => "contacts close later and later: it has become slower than it was",
-                Drift::Faster => "contacts close earlier and earlier: it has become faster than it was",
-            };
-            self.alarm(time, Some(*train), text);
+            self.alarm(time, &Alarm::drifts(*train, drift));
         }
         self.board.tell(
             "passed",

@@ -5,7 +5,7 @@
 //! GET  /api/openapi.json     all that can be asked for, as programs read it
 //! GET  /api/layout           the layout, with where to draw it
 //! GET  /api/picture          what there is to see now
-//! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `gap`; `Last-Event-ID` goes on
+//! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `alarm`, `gap`; `Last-Event-ID` goes on
 //! GET  /api/trains/24/history   the last five minutes of a train
 //! GET  /api/trains/24/model     how it moves
 //! GET  /api/line             how the line and the loop keep time

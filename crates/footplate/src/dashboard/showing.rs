@@ -1,15 +1,18 @@
 //! Shows on the dashboard what machines do that take no orders: a train that is being calibrated, or a demonstration.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use footplate_core::Timestamp;
 use footplate_core::control::Driver;
 use footplate_core::control::calibrate::{CalibrationNotice, Calibrator};
 use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::{Timestamp, TrainId};
 
+use super::alarm::Alarm;
 use super::board::{Answer, Board};
 use super::painter::{Painter, TrainPassed};
+use super::picture::TrainTask;
 use super::server::Dashboard;
 use crate::clock::Stopwatch;
 
@@ -63,16 +66,24 @@ impl Showing {
         self.painter.passed(passed);
     }
 
-    /// Takes in what a calibration says.
-    pub(crate) fn hear(&mut self, notice: &CalibrationNotice) {
+    /// Something is not as it should be.
+    pub(crate) fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
+        self.painter.alarm(now, alarm);
+    }
+
+    /// Takes in what the calibration of a train says, and in which words that is said elsewhere.
+    pub(crate) fn hear(&mut self, now: Timestamp, train: TrainId, notice: &CalibrationNotice, said: &str) {
+        if let CalibrationNotice::Mishap(mishap) = notice {
+            self.painter.alarm(now, &Alarm::of_mishap(&self.layout, train, mishap).said(said));
+        }
         self.painter.hear_calibration(notice);
     }
 
-    /// Shows the trains of a driver, if it is time to.
-    pub(crate) fn driver(&mut self, driver: &Driver, now: Timestamp) {
+    /// Shows the trains of a driver and what they are busy with, if it is time to.
+    pub(crate) fn driver(&mut self, driver: &Driver, tasks: &BTreeMap<TrainId, TrainTask>, now: Timestamp) {
         if self.is_due() {
             self.painter.calibrates_no_more();
-            self.painter.paint_alone(driver, now, self.began);
+            self.painter.paint_alone(driver, tasks, now, self.began);
         }
     }
 
@@ -90,7 +101,7 @@ impl Showing {
         }
         if let Some((_, driver)) = &mut self.shadow {
             driver.add_located(calibrator.fit().model().clone(), calibrator.locator().clone());
-            self.painter.paint_alone(driver, now, self.began);
+            self.painter.paint_alone(driver, &BTreeMap::new(), now, self.began);
         }
     }
 

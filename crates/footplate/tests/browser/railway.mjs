@@ -5,7 +5,8 @@ import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-const LINK = "sim:track-a?seed=7";
+/** A railway that is the same every time. */
+export const LINK = "sim:track-a?seed=7";
 /** The longest that anything takes in a test: a lap of the track, at four times real time. */
 export const PATIENCE = 60_000;
 
@@ -16,25 +17,34 @@ export function calibratedStore(name) {
   return store;
 }
 
-/** Starts the program at a port, 0 for any, so many times as fast as real; resolves with the address that it prints. */
-export function serve(store, port, { speed = 4, more = [], token } = {}) {
-  const env = { ...process.env, ...(token && { FOOTPLATE_TOKEN: token }) };
-  const child = spawn(process.env.FOOTPLATE, ["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], { stdio: ["ignore", "ignore", "pipe"], env });
+/**
+ * Starts the program with a dashboard; resolves with the address that it prints. What it writes is collected in `wrote`, and `over`
+ * resolves with its status when it has ended.
+ */
+export function begin(commands, env = process.env) {
+  const child = spawn(process.env.FOOTPLATE, commands, { stdio: ["ignore", "pipe", "pipe"], env });
+  const wrote = { output: "", errors: "" };
+  const over = new Promise((resolve) => child.on("close", resolve));
+  child.stdout.on("data", (text) => { wrote.output += text; });
   return new Promise((resolve, reject) => {
-    let said = "";
     child.stderr.on("data", (text) => {
-      said += text;
-      const found = /the dashboard is at (http:\S+)/.exec(said);
-      if (found) resolve({ child, url: found[1], port: Number(new URL(found[1]).port) });
+      wrote.errors += text;
+      const found = /the dashboard is at (http:\S+)/.exec(wrote.errors);
+      if (found) resolve({ child, url: found[1], port: Number(new URL(found[1]).port), wrote, over });
     });
-    child.on("exit", () => reject(new Error(said)));
+    child.on("exit", () => reject(new Error(wrote.errors)));
   });
 }
 
-export function end({ child }) {
-  const gone = new Promise((resolve) => child.on("exit", resolve));
+/** Starts the program at a port, 0 for any, so many times as fast as real. */
+export function serve(store, port, { speed = 4, more = [], token } = {}) {
+  const env = { ...process.env, ...(token && { FOOTPLATE_TOKEN: token }) };
+  return begin(["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], env);
+}
+
+export function end({ child, over }) {
   child.kill("SIGTERM");
-  return gone;
+  return over;
 }
 
 /** Gives an order over HTTP. */

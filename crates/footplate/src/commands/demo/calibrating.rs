@@ -44,8 +44,13 @@ pub(super) fn calibrate(
     stage.works(train, "learns", "");
     while calibrator.machine().ending().is_none() {
         for notice in stage.go_on(&mut calibrator)? {
+            let now = stage.now();
             if let Some(showing) = &mut stage.showing {
-                showing.hear(&notice);
+                let said = match &notice {
+                    CalibrationNotice::Mishap(mishap) => what_happened(layout, mishap),
+                    _ => String::new(),
+                };
+                showing.hear(now, train, &notice, &said);
             }
             tell(stage, layout, train, budget, &notice)?;
         }

@@ -1,5 +1,7 @@
 //! The second half: a train is driven to places drawn from the seed, and the truth is looked up.
 
+use std::collections::BTreeMap;
+
 use footplate_core::calibration::SectionIndex;
 use footplate_core::control::{
     DriveNotice, Driver, Finished, Order, OrderId, PlannedStop, Refusal, StopOrder,
@@ -13,8 +15,9 @@ use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::stage::Stage;
 use super::targets::{Dice, steps_to_stop_from, target_ahead};
+use crate::commands::drive::Tongue;
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::TrainPassed;
+use crate::dashboard::{Alarm, TrainPassed, TrainTask};
 use crate::witness::{Input, Witnessed};
 
 /// Targets that may be refused before no more are tried.
@@ -70,7 +73,7 @@ impl<'l> Tour<'l> {
             };
             let name = self.layout.display(target).to_string();
             self.planned = None;
-            match self.carry_out(stage, order, &name, step)? {
+            match self.carry_out(stage, order, target, step)? {
                 Some(finished) => {
                     let stop = self.truth(stage, target, &name, step, finished);
                     match stop {
@@ -123,9 +126,10 @@ impl<'l> Tour<'l> {
         &mut self,
         stage: &mut Stage<'_, '_, '_>,
         order: OrderId,
-        target: &str,
+        target: Landmark,
         step: SpeedStep,
     ) -> anyhow::Result<Option<Finished>> {
+        let name = self.layout.display(target).to_string();
         let until = stage.now() + PATIENCE;
         let mut finished: Option<Finished> = None;
         stage.works(self.train, "drives", "");
@@ -140,10 +144,16 @@ impl<'l> Tour<'l> {
                 return Ok(None);
             }
             for notice in stage.go_on(&mut self.driver)? {
+                if let (Some(showing), Some(alarm)) =
+                    (&mut stage.showing, Alarm::of_drive(self.layout, &notice))
+                {
+                    let tongue = Tongue { driver: self.driver.machine(), began: Timestamp::ZERO };
+                    showing.alarm(now, &alarm.said(&tongue.line(&notice).unwrap_or_default()));
+                }
                 match notice {
                     DriveNotice::Done(done) if done.order == order => finished = Some(done),
                     DriveNotice::GivenUp { order: of, why, .. } if of == order => {
-                        stage.screen.mishap(self.train, &format!("gave up {target}: {why}"))?;
+                        stage.screen.mishap(self.train, &format!("gave up {name}: {why}"))?;
                         return Ok(None);
                     }
                     DriveNotice::Lost { .. } => {
@@ -160,7 +170,7 @@ impl<'l> Tour<'l> {
                     DriveNotice::Overshoots { by, .. } => {
                         stage.screen.mishap(
                             self.train,
-                            &format!("is too late for {target}: {:.0} mm beyond", by.as_mm()),
+                            &format!("is too late for {name}: {:.0} mm beyond", by.as_mm()),
                         )?;
                     }
                     DriveNotice::Unexplained { sensor, .. } => {
@@ -174,9 +184,15 @@ impl<'l> Tour<'l> {
             }
             let now = stage.now();
             if let Some(showing) = &mut stage.showing {
-                showing.driver(self.driver.machine(), now);
+                let promise = self.planned.map(|planned| planned.promise);
+                let task = TrainTask {
+                    text: format!("stop {} at {name} from step {step}", self.train),
+                    target: Some(target),
+                    promise: promise.map(|promise| [promise.median, promise.low, promise.high]),
+                };
+                showing.driver(self.driver.machine(), &BTreeMap::from([(self.train, task)]), now);
             }
-            let detail = self.detail(stage.now(), target, step, finished.is_some());
+            let detail = self.detail(stage.now(), &name, step, finished.is_some());
             stage.shows(self.train, &detail, None);
         }
     }

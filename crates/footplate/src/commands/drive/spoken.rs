@@ -4,7 +4,7 @@ use footplate_core::control::Promise;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, TrainId};
 
-use crate::dashboard::TrainPassed;
+use crate::dashboard::{Alarm, TrainPassed};
 
 /// Something to be said.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,8 @@ pub(crate) enum Spoken {
     },
     /// A train passed a contact; for whoever draws it.
     Passed(TrainPassed),
+    /// Something is not as it should be; for whoever looks at pages, where it is said, too.
+    Alarm(Alarm),
     /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
     Begun(TrainId),
     /// An order has ended.

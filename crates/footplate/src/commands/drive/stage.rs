@@ -13,7 +13,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::conductor::Conductor;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
-use crate::dashboard::{Answer, Board, Painter};
+use crate::dashboard::{Alarm, Answer, Board, Painter};
 use crate::link::news_of;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
@@ -123,11 +123,10 @@ impl Stage {
     }
 
     /// Says what is not as it should be.
-    fn alarm(&self, now: Timestamp, text: &str) {
-        if let Some(watched) = &self.watched {
-            watched.painter.alarm(now, None, text);
+    fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
+        if let Some(watched) = &mut self.watched {
+            watched.painter.alarm(now, alarm);
         }
-        self.screen.say(text, "");
     }
 }
 
@@ -145,6 +144,7 @@ impl Attendant<Witnessed<Conductor>> for Stage {
                     watched.painter.passed(passed);
                 }
             }
+            Spoken::Alarm(alarm) => self.alarm(now, &alarm),
             Spoken::Over => self.is_over = true,
             begun_or_ended => self.for_referee.push(begun_or_ended),
         }
@@ -152,13 +152,18 @@ impl Attendant<Witnessed<Conductor>> for Stage {
 
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
         self.news.extend(news_of(notice));
+        if let Some(alarm) = Alarm::of_line(notice) {
+            self.alarm(now, &alarm);
+        }
         if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
-            self.alarm(now, &notice.to_string());
+            self.screen.say(&notice.to_string(), "");
         }
     }
 
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
-        self.alarm(now, &format!("not sent: {command}: {error}"));
+        let why = format!("{command}: {error}");
+        self.screen.say(&format!("not sent: {why}"), "");
+        self.alarm(now, &Alarm::not_sent(&why));
     }
 
     fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) -> Wish {

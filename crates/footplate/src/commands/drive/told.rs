@@ -10,9 +10,9 @@ use footplate_core::{SensorId, Timestamp, TrainId};
 use super::instruction::Instruction;
 
 /// Knows the names of things.
-pub(super) struct Tongue<'d> {
-    pub(super) driver: &'d Driver,
-    pub(super) began: Timestamp,
+pub(in crate::commands) struct Tongue<'d> {
+    pub(in crate::commands) driver: &'d Driver,
+    pub(in crate::commands) began: Timestamp,
 }
 
 /// The first word of an instruction.
@@ -83,7 +83,7 @@ impl Tongue<'_> {
     }
 
     /// A notice as one line, if there is anything to say.
-    pub(super) fn line(&self, notice: &DriveNotice) -> Option<String> {
+    pub(in crate::commands) fn line(&self, notice: &DriveNotice) -> Option<String> {
         Some(match notice {
             DriveNotice::Passed { train, passed, next } => self.passed(*train, passed, next.as_ref()),
             DriveNotice::Planned(plan) => self.planned(plan),

@@ -1,5 +1,7 @@
 //! A session walked again for those who want to see it: pictures as the dashboard showed them, and what happened.
 
+use std::collections::BTreeMap;
+
 use anyhow::bail;
 use footplate_core::control::{DriveNotice, Output};
 use footplate_core::{TimeSpan, Timestamp};
@@ -9,7 +11,7 @@ use super::session::read;
 use crate::commands::demo::TourBeginning;
 use crate::commands::drive::{Conductor, DriveBeginning, Spoken};
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{Board, LayoutPicture, Painter, TrainPassed};
+use crate::dashboard::{Alarm, Board, LayoutPicture, Painter, TrainPassed};
 use crate::witness::{Input, Listener};
 
 /// Between two pictures, unless the session is so long that there would be too many of them.
@@ -28,6 +30,7 @@ trait Seen: Listener {
 enum Shown {
     Line(String),
     Passed(TrainPassed),
+    Alarm(Alarm),
 }
 
 impl Seen for Conductor {
@@ -39,6 +42,7 @@ impl Seen for Conductor {
         match notice {
             Spoken::Line { text, .. } => Some(Shown::Line(text)),
             Spoken::Passed(passed) => Some(Shown::Passed(passed)),
+            Spoken::Alarm(alarm) => Some(Shown::Alarm(alarm)),
             _ => None,
         }
     }
@@ -46,7 +50,7 @@ impl Seen for Conductor {
 
 impl Seen for footplate_core::control::Driver {
     fn show(&self, painter: &mut Painter, now: Timestamp) {
-        painter.paint_alone(self, now, Timestamp::ZERO);
+        painter.paint_alone(self, &BTreeMap::new(), now, Timestamp::ZERO);
     }
 
     fn shown(notice: DriveNotice) -> Option<Shown> {
@@ -136,6 +140,7 @@ impl Walked {
                 match M::shown(notice) {
                     Some(Shown::Line(text)) => board.say((row.time - Timestamp::ZERO).as_s(), &text),
                     Some(Shown::Passed(passed)) => painter.passed(passed),
+                    Some(Shown::Alarm(alarm)) => painter.alarm(row.time, &alarm),
                     None => {}
                 }
             }

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
 use super::told;
-use crate::dashboard::Showing;
+use crate::dashboard::{Alarm, Showing};
 use crate::runtime::{Attendant, Wish};
 use crate::witness::Witnessed;
 
@@ -25,6 +25,7 @@ const FEWEST_EXPLAINED: usize = 2;
 /// Tells people how it goes, on standard error.
 pub(super) struct Watcher<'l> {
     layout: &'l Layout,
+    train: TrainId,
     bar: ProgressBar,
     budget: TimeSpan,
     began: Option<Timestamp>,
@@ -45,6 +46,7 @@ impl<'l> Watcher<'l> {
         let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
         Self {
             layout,
+            train,
             bar,
             budget,
             began: None,
@@ -95,8 +97,9 @@ impl<'l> Watcher<'l> {
 
 impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
     fn hear(&mut self, now: Timestamp, notice: CalibrationNotice) {
+        let line = told::line(self.layout, &notice);
         if let Some(showing) = &mut self.showing {
-            showing.hear(&notice);
+            showing.hear(now, self.train, &notice, line.as_deref().unwrap_or_default());
         }
         if let CalibrationNotice::Progress(progress) = &notice {
             self.began = self.began.or(Some(now + (TimeSpan::ZERO - progress.elapsed)));
@@ -109,17 +112,23 @@ impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
                 self.other_layout = self.other_layout.or_else(|| self.layout_with(hops));
             }
         }
-        if let Some(line) = told::line(self.layout, &notice) {
+        if let Some(line) = line {
             self.say(now, &line);
         }
     }
 
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
+        if let (Some(showing), Some(alarm)) = (&mut self.showing, Alarm::of_line(notice)) {
+            showing.alarm(now, &alarm.said(&notice.to_string()));
+        }
         self.say(now, &notice.to_string());
     }
 
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
-        self.say(now, &format!("{command:?} was not taken: {error}"));
+        if let Some(showing) = &mut self.showing {
+            showing.alarm(now, &Alarm::not_sent(&format!("{command}: {error}")));
+        }
+        self.say(now, &format!("{command} was not taken: {error}"));
     }
 
     fn attend(&mut self, now: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {

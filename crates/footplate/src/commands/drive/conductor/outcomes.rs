@@ -11,7 +11,7 @@ use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
 use crate::commands::drive::told::verb;
-use crate::dashboard::TrainPassed;
+use crate::dashboard::{Alarm, TrainPassed};
 
 impl Conductor {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
@@ -53,6 +53,9 @@ impl Conductor {
     /// Says what the dispatcher says, and does what follows.
     pub(super) fn dispatched(&mut self, now: Timestamp, notice: &DispatchNotice) {
         if let Some(line) = self.tongue().dispatched(notice) {
+            if let Some(alarm) = Alarm::of_dispatch(self.driver().layout(), notice) {
+                self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm.said(&line))));
+            }
             self.say(line);
         }
         match notice {

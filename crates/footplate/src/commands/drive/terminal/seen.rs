@@ -82,6 +82,13 @@ struct Line {
 }
 
 #[derive(Deserialize)]
+struct Alarm {
+    text: String,
+    /// There is a line of it.
+    is_said: bool,
+}
+
+#[derive(Deserialize)]
 struct Drawn {
     name: String,
     nodes: Vec<Node>,
@@ -143,7 +150,7 @@ impl Seen {
                     }
                 }
                 "alarm" => {
-                    if let Ok(Line { text }) = serde_json::from_str(&happening.json) {
+                    if let Ok(Alarm { text, is_said: false }) = serde_json::from_str(&happening.json) {
                         self.say(format!("! {text}"));
                     }
                 }

@@ -1,0 +1,214 @@
+//! What is not as it should be, with which of the sentences of the pages says it.
+
+use footplate_core::TrainId;
+use footplate_core::calibration::Drift;
+use footplate_core::control::calibrate::Mishap;
+use footplate_core::control::{Alarm as Noticed, DispatchNotice, DriveNotice, WatchdogNotice};
+use footplate_core::track::Layout;
+use footplate_wire::LinkNotice;
+use serde::Serialize;
+
+/// How bad it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Grade {
+    /// Trains may meet, or do what nobody told them.
+    Danger,
+    /// Something went otherwise than it should have.
+    Warning,
+    /// What was said of the train before, or of the line if it is of none, is over.
+    Over,
+}
+
+/// Something that people should know of whichever page they look at.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Alarm {
+    /// Which of the sentences of the pages it is.
+    what: &'static str,
+    pub(super) grade: Grade,
+    pub(super) train: Option<TrainId>,
+    /// What the sentence has blanks for.
+    blanks: Vec<String>,
+    /// The sentence in English, for programs.
+    text: String,
+    /// Whether it is said as a line, too.
+    is_said: bool,
+}
+
+impl Alarm {
+    fn new(grade: Grade, what: &'static str, train: impl Into<Option<TrainId>>, blanks: Vec<String>) -> Self {
+        Self { what, grade, train: train.into(), blanks, text: String::new(), is_said: false }
+    }
+
+    /// In English, as it was said.
+    pub(crate) fn said(self, text: &str) -> Self {
+        Self { text: text.to_owned(), is_said: true, ..self }
+    }
+
+    /// A train drifts.
+    pub(super) fn drifts(train: TrainId, drift: Drift) -> Self {
+        let (what, text) = match drift {
+            Drift::Slower => {
+                ("drifts-slower", "contacts close later and later: it has become slower than it was")
+            }
+            Drift::Faster => {
+                ("drifts-faster", "contacts close earlier and earlier: it has become faster than it was")
+            }
+        };
+        Self { text: text.to_owned(), ..Self::new(Grade::Warning, what, train, Vec::new()) }
+    }
+
+    /// A command that the session did not take.
+    pub(crate) fn not_sent(text: &str) -> Self {
+        let alarm = Self::new(Grade::Danger, "not-sent", None, vec![text.to_owned()]);
+        Self { text: format!("not sent: {text}"), ..alarm }
+    }
+
+    /// What a line has to say, if it concerns people. That a station answers matters to who has heard that it did not.
+    pub(crate) fn of_line(notice: &LinkNotice) -> Option<Self> {
+        let (grade, what, train, blanks) = match notice {
+            LinkNotice::Closed(_) => return None,
+            LinkNotice::Answers => (Grade::Over, "line-answers", None, Vec::new()),
+            LinkNotice::Silent { since, .. } => {
+                (Grade::Danger, "line-silent", None, vec![format!("{:.1}", since.as_s())])
+            }
+            LinkNotice::NotReady { since } => {
+                (Grade::Danger, "line-not-ready", None, vec![format!("{:.1}", since.as_s())])
+            }
+            LinkNotice::ReplyLost { .. } => (Grade::Warning, "line-reply-lost", None, Vec::new()),
+            LinkNotice::UnexpectedBytes { count } => {
+                (Grade::Warning, "line-unexpected", None, vec![count.to_string()])
+            }
+            LinkNotice::Repeated { .. } => (Grade::Warning, "line-repeated", None, Vec::new()),
+            LinkNotice::ReverseInDoubt { train } => {
+                (Grade::Danger, "line-reverse-in-doubt", Some(*train), Vec::new())
+            }
+            LinkNotice::HeldClosed { sensor } => {
+                (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
+            }
+            LinkNotice::SolenoidLate { turnout, held } => {
+                let blanks = vec![turnout.to_string(), format!("{:.0}", held.as_ms())];
+                (Grade::Danger, "line-solenoid-late", None, blanks)
+            }
+            other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
+        };
+        Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })
+    }
+
+    /// What a dispatcher, its watchdog or its driver says, if it is not as it should be.
+    pub(crate) fn of_dispatch(layout: &Layout, notice: &DispatchNotice) -> Option<Self> {
+        let none = Vec::new();
+        Some(match notice {
+            DispatchNotice::Drive(notice) => return Self::of_drive(layout, notice),
+            DispatchNotice::Watch(notice) => return Self::of_watch(notice),
+            DispatchNotice::Deadlock { train, moves } => {
+                Self::new(Grade::Warning, "deadlock", *train, vec![listed(moves)])
+            }
+            DispatchNotice::Diverged { train, stopped } if stopped.is_empty() => {
+                Self::new(Grade::Danger, "diverged", *train, none)
+            }
+            DispatchNotice::Diverged { train, stopped } => {
+                Self::new(Grade::Danger, "diverged-and-others", *train, vec![listed(stopped)])
+            }
+            DispatchNotice::HeldAsUnknown { train } => {
+                Self::new(Grade::Warning, "held-as-unknown", *train, none)
+            }
+            _ => return None,
+        })
+    }
+
+    /// What a driver says, if it is not as it should be.
+    pub(crate) fn of_drive(layout: &Layout, notice: &DriveNotice) -> Option<Self> {
+        let name = |sensor| layout.sensor_name(sensor).to_owned();
+        let (grade, what, train, blanks) = match notice {
+            DriveNotice::Lost { train } => (Grade::Danger, "lost", Some(*train), Vec::new()),
+            DriveNotice::HeldBack { train, leader, .. } => {
+                (Grade::Warning, "held-back", Some(*train), vec![leader.to_string()])
+            }
+            DriveNotice::Overshoots { train, by, .. } => {
+                (Grade::Warning, "overshoots", Some(*train), vec![format!("{:.0}", by.as_mm())])
+            }
+            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+                let what = if *curved { "lies-curved" } else { "lies-straight" };
+                (Grade::Warning, what, Some(*train), vec![turnout.to_string()])
+            }
+            DriveNotice::Overdue { train, sensor, by } => {
+                let blanks = vec![name(*sensor), format!("{:.1}", by.as_s())];
+                (Grade::Warning, "overdue", Some(*train), blanks)
+            }
+            DriveNotice::TrackEnds { train, end } => {
+                (Grade::Warning, "track-ends", Some(*train), vec![layout.node_name(*end).to_owned()])
+            }
+            DriveNotice::ContactStuck { sensor } => {
+                (Grade::Warning, "contact-stuck", None, vec![name(*sensor)])
+            }
+            DriveNotice::Unexplained { sensor, .. } => {
+                (Grade::Warning, "unexplained", None, vec![name(*sensor)])
+            }
+            DriveNotice::Unconfirmed { command } => {
+                (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
+            }
+            _ => return None,
+        };
+        Some(Self::new(grade, what, train, blanks))
+    }
+
+    fn of_watch(notice: &WatchdogNotice) -> Option<Self> {
+        let none = Vec::new();
+        Some(match notice {
+            WatchdogNotice::Danger { train, why, .. } => {
+                Self::new(Grade::Danger, told_to_stand(*why), *train, none)
+            }
+            WatchdogNotice::PowerOff { train } => Self::new(Grade::Danger, "power-off", *train, none),
+            WatchdogNotice::NeedsPerson { train, .. } => {
+                Self::new(Grade::Danger, "needs-person", *train, none)
+            }
+            WatchdogNotice::Dropped { train, .. } => Self::new(Grade::Warning, "dropped", *train, none),
+            WatchdogNotice::Recovered { train, .. } => Self::new(Grade::Over, "recovered", *train, none),
+            _ => return None,
+        })
+    }
+
+    /// What goes wrong while a train is calibrated.
+    pub(super) fn of_mishap(layout: &Layout, train: TrainId, mishap: &Mishap) -> Self {
+        let name = |sensor| layout.sensor_name(sensor).to_owned();
+        let (grade, what, blanks) = match mishap {
+            Mishap::Stalled { step } => (Grade::Warning, "mishap-stalled", vec![step.to_string()]),
+            Mishap::Missed { count, before } => {
+                (Grade::Warning, "mishap-missed", vec![count.to_string(), name(*before)])
+            }
+            Mishap::Unexplained { sensor } => (Grade::Warning, "unexplained", vec![name(*sensor)]),
+            Mishap::WrongLeg { turnout, .. } => {
+                (Grade::Warning, "mishap-wrong-leg", vec![turnout.to_string()])
+            }
+            Mishap::Moved { to, .. } => {
+                (Grade::Danger, "mishap-moved", vec![layout.node_name(*to).to_owned()])
+            }
+            Mishap::Lost { .. } => (Grade::Danger, "mishap-lost", Vec::new()),
+            Mishap::LengthsDiffer { hops } => {
+                (Grade::Warning, "mishap-lengths", vec![hops.len().to_string()])
+            }
+        };
+        Self::new(grade, what, train, blanks)
+    }
+}
+
+/// Why a watchdog tells a train to stand.
+const fn told_to_stand(why: Noticed) -> &'static str {
+    match why {
+        Noticed::Drift(Drift::Slower) => "stands-slower",
+        Noticed::Drift(Drift::Faster) => "stands-faster",
+        Noticed::Lost => "stands-lost",
+        Noticed::Elsewhere(_) => "stands-elsewhere",
+        Noticed::Misses => "stands-misses",
+        Noticed::LinkSilent => "stands-silent",
+        Noticed::StopUnconfirmed => "stands-unconfirmed",
+        Noticed::DoesNotStop(_) => "does-not-stop",
+        _ => "stands-distrusted",
+    }
+}
+
+fn listed(trains: &[TrainId]) -> String {
+    let trains: Vec<String> = trains.iter().map(ToString::to_string).collect();
+    if trains.is_empty() { "–".to_owned() } else { trains.join(", ") }
+}

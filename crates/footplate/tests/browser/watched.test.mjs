@@ -1,0 +1,189 @@
+// What drives by itself, watched in a real browser: a calibration and a demonstration. The numbers on the page are those that the
+// program answers, prints and keeps, and the emergency stop ends either.
+
+import assert from "node:assert/strict";
+import { mkdtempSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { findings } from "./axe.mjs";
+import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
+import { LINK, PATIENCE, begin, calibratedStore, end, say, serve } from "./railway.mjs";
+
+const PHONE = { viewport: { width: 390, height: 800 }, locale: "de-DE", hasTouch: true };
+/** What a browser itself writes down when the server has gone, which it has to when the calibration is over. */
+const GONE = /ERR_CONNECTION_REFUSED|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE/;
+
+let browser;
+const running = new Set();
+
+const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
+const text = (page, selector) => page.locator(selector).textContent();
+const folder = () => mkdtempSync(join(tmpdir(), "footplate-watched-"));
+
+async function started(...commands) {
+  const program = await begin(commands);
+  running.add(program);
+  program.over.then(() => running.delete(program));
+  return program;
+}
+
+const calibrating = (store, { budget = "2m", speed = 8 } = {}) => started("calibrate", "--link", `${LINK}&speed=${speed}`,
+  "--layout", "track-a", "--train", "24", "--budget", budget, "--store", store, "--serve", "0", "--json");
+
+const get = async ({ url }, path) => (await fetch(url + path)).json();
+
+/** The rows of the table of steps, by step and side. */
+const rows = (page) => page.$$eval("#steps tr", (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
+
+/** Looks again until what the page says is what somebody else says of the same moment. */
+async function agree(page, said, expected) {
+  let last;
+  for (const began = Date.now(); Date.now() - began < PATIENCE;) {
+    last = [await said(), await expected()];
+    if (JSON.stringify(last[0]) === JSON.stringify(last[1])) return last[0];
+    await page.waitForTimeout(100);
+  }
+  assert.deepEqual(...last);
+}
+
+before(async () => { browser = await launch(); });
+after(async () => {
+  await browser?.close();
+  await Promise.all([...running].map(end));
+});
+
+test("a calibration says what it tries and why, and its table is what the program answers, prints and keeps", async () => {
+  const store = join(folder(), "railway.db");
+  const program = await calibrating(store);
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/calibration`);
+  await until(page, () => !document.querySelector("#progress").hidden);
+  await until(page, () => /within|: |step/.test(document.querySelector("#about").textContent) && /^\d+ s of 120 s/.test(document.querySelector("#left").textContent));
+  await agree(page, () => text(page, "#about"), async () => (await get(program, "api/picture")).calibration.experiment);
+  await agree(page, async () => Number((await text(page, "#left")).split(" ")[0]), async () => Math.round((await get(program, "api/picture")).calibration.left_s));
+  // The next experiment is one of those that take most doubt away, and that reason is shown with what it takes.
+  await until(page, () => /most doubt away for its time: [\d.]+ scatters squared in \d+ s/.test(document.querySelector("#because").textContent));
+  await until(page, () => /at step \d+: stops within \d+ mm, speed within [\d.]+ %/.test(document.querySelector("#expected").textContent));
+  await until(page, () => document.querySelectorAll("#steps tr").length > 8);
+  for (const [place, count] of (await colours(page)).entries()) if (place < 2) assert.ok(count > 5, `chart ${place}: ${count} colours`);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "calibrating.png"), fullPage: true });
+
+  // While it runs: what the page says of each step is the model that the program answers.
+  const of = (steps) => steps.filter(({ uses, contacts }) => uses === "moves" || contacts > 0).map((one) => [String(one.step), one.approach,
+    `${one.speed_mm_per_s.toFixed(1)} ± ${one.speed_half_mm_per_s.toFixed(1)}`, String(one.contacts), `${one.stop_mm.toFixed(0)} ± ${one.stop_half_mm.toFixed(0)}`]);
+  await agree(page, async () => (await rows(page)).map((cells) => cells.slice(0, 5)), async () => of((await get(program, "api/trains/24/model")).steps));
+
+  // When it is over, what it printed is what a session that begins with its store shows: an interval is 1.96 standard deviations.
+  assert.equal(await program.over, 0);
+  await page.waitForSelector("#connection.red", { timeout: PATIENCE });
+  assert.deepEqual(complaints.filter((complaint) => !GONE.test(complaint) && !/422/.test(complaint)), []);
+  await page.close();
+  const printed = JSON.parse(program.wrote.output).steps;
+  const driving = await serve(store, 0);
+  running.add(driving);
+  const later = await openQuietly(browser, `${driving.url}#/calibration`);
+  await until(later.page, (least) => document.querySelectorAll("#steps tr").length >= least, printed.length);
+  const shown = new Map((await rows(later.page)).map(([step, side, speed, contacts, stop]) => [`${step} ${side}`, [speed, contacts, stop]]));
+  for (const { step, approach, speed_mm_s: speed, speed_uncertainty_mm_s: sigma, contacts, stop_mm: stop } of printed) {
+    const [said, from, way] = shown.get(`${step} ${approach}`);
+    const [value, half] = said.split(" ± ").map(Number);
+    assert.ok(Math.abs(value - speed) < 0.06 && Math.abs(half - 1.959964 * sigma) < 0.06, `step ${step} ${approach}: ${said} beside ${speed} ± ${sigma}`);
+    assert.equal(Number(from), contacts, `step ${step} ${approach}`);
+    assert.ok(Math.abs(Number(way.split(" ± ")[0]) - stop) < 0.6, `step ${step} ${approach}: ${way} beside ${stop}`);
+  }
+  // And what the store says of the train is there with the number of contacts behind it.
+  await until(later.page, () => !document.querySelector("#of-store").hidden);
+  assert.deepEqual(later.complaints, []);
+  await later.page.close();
+  await end(driving);
+});
+
+test("a calibration fits a phone in the dark and in German, takes no orders, and ends at an emergency stop", async () => {
+  const program = await calibrating(join(folder(), "railway.db"), { budget: "10m", speed: 4 });
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/calibration`, { ...PHONE, colorScheme: "dark" });
+  await until(page, () => document.querySelectorAll("#steps tr").length > 4 && /^\d+ s von 600 s/.test(document.querySelector("#left").textContent));
+  assert.equal(await width(page), 390);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "calibrating-phone.png"), fullPage: true });
+  const refused = await fetch(`${program.url}api/orders`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ line: "speed 24 8" }) });
+  assert.equal(refused.status, 422);
+  assert.match((await refused.json()).error, /drives by itself/);
+  await page.click("#halt");
+  await until(page, () => /allen Zügen ist Halt befohlen/.test(document.querySelector("#halted").textContent));
+  await program.over;
+  assert.equal(JSON.parse(program.wrote.output).ended, "interrupted");
+  assert.deepEqual(complaints.filter((complaint) => !GONE.test(complaint) && !/422/.test(complaint)), []);
+  await page.close();
+});
+
+test("a demonstration is watched from its first contact to its last stop, and says what it prints", async () => {
+  const program = await started("demo", "--seed", "7", "--speed", "30", "--serve", "0", "--json");
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await page.waitForSelector(".train");
+  await until(page, () => /±/.test(document.querySelector(".train dd").textContent));
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "demo.png"), fullPage: true });
+  // A stop is shown while it is under way: where it leads to, and within which millimetres it will end.
+  await until(page, () => /^stop \d+ at \S+ from step \d+ \(will rest [+−]?\d+ … [+−]?\d+ mm\)$/.test(document.querySelectorAll(".train dd")[2]?.textContent));
+  await page.waitForSelector("#track .target", { state: "attached" });
+  await page.screenshot({ path: join(AT, "demo-stopping.png"), fullPage: true });
+  await until(page, () => document.querySelectorAll("#said li").length >= 5);
+  const phone = await openQuietly(browser, `${program.url}#/layout`, { ...PHONE, colorScheme: "dark" });
+  await phone.page.waitForSelector(".train");
+  assert.equal(await width(phone.page), 390);
+  assert.deepEqual(await findings(phone.page), []);
+  await phone.page.screenshot({ path: join(AT, "demo-phone.png"), fullPage: true });
+  await phone.page.close();
+  // Every stop is said on the page as the simulator's truth has it in what the program writes.
+  await until(page, () => document.querySelectorAll("#said li").length >= 11);
+  const said = await page.$$eval("#said li", (all) => all.map((one) => one.textContent));
+  const lines = program.wrote.output.trim().split("\n").map((line) => JSON.parse(line));
+  const stops = lines.filter(({ stop }) => stop).map(({ stop }) => stop);
+  assert.ok(stops.length >= 9, `${stops.length} stops`);
+  for (const { train, target, error_mm: error } of stops.slice(0, 9)) {
+    const mm = Math.round(Math.abs(error));
+    const expected = new RegExp(`train ${train} stands ${mm} mm ${error < -0.5 ? "short of" : "(beyond|short of)"} ${target.replace("+", "\\+")},`);
+    assert.ok(said.some((line) => expected.test(line)), `${expected} in ${said.join(" | ")}`);
+  }
+  assert.deepEqual(complaints.filter((complaint) => !GONE.test(complaint) && !/422/.test(complaint)), []);
+  await page.close();
+  assert.equal(await program.over, 0);
+});
+
+test("what is not as it should be is said on every page in the reader's language, until somebody has looked, and is listed", async () => {
+  const store = calibratedStore("alarmed");
+  const program = await serve(store, 0);
+  running.add(program);
+  const { page, complaints } = await openQuietly(browser, program.url, { locale: "de-DE" });
+  await say(program, "turnout all straight");
+  await say(program, "speed 24 8");
+  await until(page, () => /±/.test(document.querySelector(".train dd")?.textContent ?? ""));
+  assert.ok(await page.locator("#alarmed").isHidden());
+  await say(program, "stop 24");
+  await until(page, () => /^0 /.test(document.querySelectorAll(".train dd")[1].textContent));
+  // A person says that it stands somewhere else. What closes then cannot have been this train.
+  const elsewhere = (await get(program, "api/picture")).trains[0].at.startsWith("E") ? "A13" : "E14";
+  await say(program, `place 24 at ${elsewhere}`);
+  await say(program, "speed 24 8");
+  await until(page, () => !document.querySelector("#alarmed").hidden);
+  const alarm = await text(page, "#alarmed");
+  assert.match(alarm, /hat geschlossen, und kein Zug kann dort gewesen sein|aufgetaucht, wohin er nicht gefahren sein kann|hätte .* erreichen sollen|verloren/);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "alarmed.png") });
+  await page.click("#alarmed a");
+  await until(page, () => document.querySelector("#page").dataset.page === "health" && document.querySelectorAll("#alarms li").length > 0);
+  assert.ok(await page.locator("#alarmed").isHidden());
+  // The line that the prompt says, word by word in English, is the same alarm for programs.
+  const listed = await page.$$eval("#alarms li", (all) => all.map((one) => one.className));
+  assert.ok(listed.every((grade) => ["danger", "warning", "over"].includes(grade)), String(listed));
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "alarms.png"), fullPage: true });
+  await page.goto(`${program.url}#/layout`);
+  await until(page, () => document.querySelector("#page").dataset.page === "layout");
+  assert.ok(await page.locator("#alarmed").isHidden(), "what was seen is not shown again");
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(program);
+});
