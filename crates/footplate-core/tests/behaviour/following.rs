@@ -1,7 +1,7 @@
 //! A train keeps its gap to the one ahead, never comes too near to it, and refuses what could not be safe.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Driver, Gap, Order, Refusal};
+use footplate_core::control::{DriveNotice, Driver, Gap, Order, Refusal};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -84,6 +84,52 @@ fn a_gap_that_no_stop_could_keep_is_refused_with_the_shortest_that_could() {
     assert!(matches!(driver.order(world.now, own), Err(Refusal::FollowsInCircle { .. })));
     let nobody = Order::Follow { train: FOLLOWER, leader: TrainId(99), gap: seconds(5.0) };
     assert!(matches!(driver.order(world.now, nobody), Err(Refusal::UnknownTrain { .. })));
+}
+
+#[test]
+fn a_contact_that_fails_under_the_leader_alone_neither_stops_its_follower_nor_sends_it_after_a_leader_a_round_ahead()
+ {
+    let (mut world, mut driver) = two_trains();
+    run_leader(&world, &mut driver, 7);
+    world.run(&mut driver, 2.0);
+    driver.order(world.now, follow(seconds(3.0))).expect("a safe gap");
+    world.run(&mut driver, 40.0);
+    let (since, notices) = (world.now, world.notices.len());
+    let [failing, before] = [SensorId(0), SensorId(6)];
+    let mut failed = 0;
+    for _ in 0..600 {
+        let leads_to_it = world.passes.iter().rfind(|(_, _, who)| *who == LEADER);
+        let fails = leads_to_it.is_some_and(|(_, sensor, _)| *sensor == before);
+        failed += usize::from(fails && world.dead.is_empty());
+        world.dead = fails.then_some(failing).into_iter().collect();
+        world.run(&mut driver, 0.1);
+    }
+    assert!(failed > 3, "once a round");
+    let held_back = |notice: &DriveNotice| matches!(notice, DriveNotice::HeldBack { .. });
+    assert!(!world.notices[notices..].iter().any(held_back));
+    let gaps = gaps(&world, since);
+    let off = gaps.iter().map(|gap| (gap - 3.0).abs()).fold(0.0, f64::max);
+    assert!(off < 0.3, "{gaps:?}");
+}
+
+#[test]
+fn a_follower_slows_down_behind_a_slower_leader_and_is_not_stopped() {
+    let (mut world, mut driver) = two_trains();
+    run_leader(&world, &mut driver, 10);
+    world.run(&mut driver, 2.0);
+    let shortest = match driver.order(world.now, follow(seconds(0.1))) {
+        Err(Refusal::GapTooShort { shortest: Gap::Time(shortest), .. }) => shortest.as_s(),
+        other => panic!("{other:?}"),
+    };
+    driver.order(world.now, follow(seconds(shortest + 0.05))).expect("a safe gap");
+    world.run(&mut driver, 30.0);
+    let notices = world.notices.len();
+    for at in [7, 9, 6, 8] {
+        run_leader(&world, &mut driver, at);
+        world.run(&mut driver, 15.0);
+    }
+    let held_back = |notice: &DriveNotice| matches!(notice, DriveNotice::HeldBack { .. });
+    assert!(!world.notices[notices..].iter().any(held_back));
 }
 
 proptest! {

@@ -16,6 +16,9 @@ use super::task::Phase;
 
 /// A contact is overdue this long after the last of 99.7 % of cases.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
+/// The contact behind one that was silent is late this long after the last of 99.7 % of cases: two polls of all modules. Who
+/// follows the train waits no longer.
+const LATE: TimeSpan = TimeSpan::from_ms(250);
 /// Contacts that stay silent in a row until the train is lost: two are missed one after the other once in 100 000 times,
 /// and trains are stuck, derailed or lifted ten times as often.
 const MOST_SILENT: u8 = 2;
@@ -52,6 +55,18 @@ impl DrivenTrain {
     /// A contact that should have reported it long ago: it may never have come there.
     pub(super) const fn unseen(&self) -> Option<SensorId> {
         self.expected.unseen
+    }
+
+    /// Whether one contact was silent, and the next is not late.
+    pub(super) fn missed_just_one(&self, now: Timestamp) -> bool {
+        let Expectation { due, overdue_said, silent, .. } = self.expected;
+        let by = due.map(|due| due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s()) + LATE);
+        match silent {
+            // Passed for certain, and not overdue yet.
+            0 => true,
+            1 => !overdue_said && by.is_some_and(|by| now < by),
+            _ => false,
+        }
     }
 
     /// The next contact and when it is due.

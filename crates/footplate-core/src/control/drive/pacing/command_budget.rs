@@ -34,6 +34,12 @@ impl CommandBudget {
         (last + SPACING.as_s()).max(oldest + BUDGET.as_s())
     }
 
+    /// When the next may leave that cannot wait for the budget.
+    pub(super) fn spaced(&self) -> f64 {
+        let [.., last] = self.sent;
+        last + SPACING.as_s()
+    }
+
     /// The same on a clock on which all of it is so much later (s).
     pub(super) fn later(self, by: f64) -> Self {
         Self { sent: self.sent.map(|sent| sent + by) }

@@ -6,10 +6,12 @@
 //! not grow from train to train.
 //!
 //! Whatever the gap, the follower can come to rest before the rear of its leader, should that be told to stand now, but for
-//! one time in about a thousand. Of a leader that is in doubt only the contact counts at which it was seen last.
+//! one time in about a thousand. It slows down step by step before that needs a stop. Of a leader that is in doubt only the
+//! contact counts at which it was seen last.
 
 use alloc::collections::BTreeMap;
 
+use crate::calibration::motion::INTERRUPTED;
 use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::driver::Driver;
@@ -25,8 +27,10 @@ use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Ratio, Speed};
 
+use super::command_budget::seconds;
 use super::lead_line::LeadLine;
 use super::reference::Reference;
+use super::surveyed_way::SurveyedWay;
 use super::task::{POLL_WAIT, Pace, Pacing};
 
 /// From the rear of one train to the front of the next there is never less: a hand's breadth.
@@ -49,10 +53,22 @@ const LOOK_AGAIN: f64 = 0.4;
 /// A train that was held back starts again when it can run so far before it would have to stop: no train should start for
 /// less.
 const WORTH_STARTING: Length = Length::from_mm(150.0);
+/// A follower that will not be able to stop in so much time slows down: a change of step begins to be felt within it, and a
+/// longer one would hold back trains that are in no danger.
+const FORESEEN: TimeSpan = TimeSpan::from_ms(500);
+/// It does not creep up to its leader, and trains that run so fast do not stall.
+const CREEPS: Speed = Speed::from_mm_per_s(60.0);
+const LIVELY: Speed = Speed::from_mm_per_s(150.0);
+/// A train has run ever since it was seen if it needed no more than this part of the time for its way at its speed.
+const RAN_ON: f64 = 1.5;
 /// More trains in a row are on no layout.
 const MOST_IN_A_ROW: usize = 12;
-/// The least speed for which a gap is judged: a leader that stands, or crawls, will not do so for ever.
+/// Gaps are judged for speeds from the one to the other, or to that of the leader if it is faster: one that stands, or crawls,
+/// will not do so for ever.
+const SLOWEST_JUDGED: Speed = Speed::from_mm_per_s(200.0);
 const USUAL_SPEED: Speed = Speed::from_mm_per_s(250.0);
+/// So many speeds beside the slowest.
+const SPEEDS_JUDGED: u8 = 4;
 
 /// Whom it follows, and how.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +77,17 @@ pub(in crate::control::drive) struct Following {
     gap: Gap,
     /// It has been told to stand because it would come too near.
     is_held: bool,
-    /// What it shall not pass, as of the last look.
+    /// What it shall not pass, as of the last look, ...
     rear: Option<WayPoint>,
+    /// ... and the fastest step from which it will still be able to stop before it.
+    fastest: Option<SpeedStep>,
+}
+
+impl Following {
+    /// The fastest step that is safe, as of the last look.
+    pub(super) const fn fastest(&self) -> Option<SpeedStep> {
+        self.fastest
+    }
 }
 
 /// The other trains.
@@ -99,7 +124,7 @@ impl DrivenTrain {
         if self.leads(leader, others) {
             return Err(Refusal::FollowsInCircle { train: self.id(), leader });
         }
-        let shortest = self.shortest_gap(ahead, gap);
+        let shortest = self.shortest_gap(ahead, gap, others);
         let is_short = match (gap, shortest) {
             (Gap::Time(gap), Gap::Time(shortest)) => gap < shortest,
             (Gap::Way(gap), Gap::Way(shortest)) => gap < shortest,
@@ -109,7 +134,8 @@ impl DrivenTrain {
             return Err(Refusal::GapTooShort { leader, shortest });
         }
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
-        let following = Following { leader, gap, is_held: self.told == SpeedStep::STAND, rear: None };
+        let following =
+            Following { leader, gap, is_held: self.told == SpeedStep::STAND, rear: None, fastest: None };
         self.pacing = Some(Pacing::new(Pace::Follow(following), self.usable_steps(), now));
         Ok(())
     }
@@ -136,33 +162,56 @@ impl DrivenTrain {
         true
     }
 
-    /// The shortest gap at which it could still stop behind a leader that is told to stand, both at the speed of the leader's
-    /// step; that one may be on its way there.
-    fn shortest_gap(&self, leader: &Self, gap: Gap) -> Gap {
-        let speed = leader.model.steady_speed(leader.told, Approach::Below).max(USUAL_SPEED);
+    /// The shortest gap at which it could still stop behind a leader that is told to stand, whatever usual speed they run at.
+    fn shortest_gap(&self, leader: &Self, gap: Gap, others: &Others) -> Gap {
+        // Who follows runs faster for a while to catch up: the first of all says how fast all of them usually are.
+        let mut first = leader;
+        while let Some(next) = first.followed().and_then(|following| others.get(&following.leader)) {
+            first = next;
+        }
+        let fastest = first.model.steady_speed(first.told, Approach::Below).max(USUAL_SPEED);
+        let speeds = (0..=SPEEDS_JUDGED).map(|nth| {
+            SLOWEST_JUDGED + (fastest - SLOWEST_JUDGED) * (f64::from(nth) / f64::from(SPEEDS_JUDGED))
+        });
+        let gaps = speeds.map(|speed| (self.bumpers_apart(leader, speed), speed));
+        match gap {
+            Gap::Way(_) => Gap::Way(gaps.map(|(bumpers, _)| bumpers).fold(SAFE, Length::max)),
+            Gap::Time(_) => {
+                let times = gaps.map(|(bumpers, speed)| (bumpers + leader.reach[1] + self.reach[0]) / speed);
+                Gap::Time(times.fold(TimeSpan::ZERO, TimeSpan::max))
+            }
+        }
+    }
+
+    /// The least way from bumper to bumper at a speed.
+    fn bumpers_apart(&self, leader: &Self, speed: Speed) -> Length {
         let stop = |train: &Self, speed: Speed, margins: f64| {
-            let off = |step: &SpeedStep| (train.model.steady_speed(*step, Approach::Below) - speed).abs();
+            let steady = |step: &SpeedStep| train.model.steady_speed(*step, Approach::Below);
+            let off = |step: &SpeedStep| (steady(step) - speed).abs();
             let steps = train.usable_steps();
-            let step = steps
-                .into_iter()
-                .min_by(|one, other| off(one).as_m_per_s().total_cmp(&off(other).as_m_per_s()));
-            step.map_or(Length::ZERO, |step| {
-                let stop = train.model.stop(step, Approach::Below);
+            let near = |one: &&SpeedStep, other: &&SpeedStep| {
+                off(one).as_m_per_s().total_cmp(&off(other).as_m_per_s())
+            };
+            let nearest = steps.iter().min_by(near);
+            nearest.map_or(Length::ZERO, |step| {
+                let stop = train.model.stop(*step, Approach::Below);
                 // Steps are coarse: what a stop from just this speed takes.
-                let faster = speed - train.model.steady_speed(step, Approach::Below);
-                let doubts = [stop.doubt, stop.scatter, BELIEVED].map(Length::as_m);
+                let faster = speed - steady(step);
+                let next = steps.iter().filter(|next| *next != step).min_by(near);
+                // Who is paced is always between two steps.
+                let switches = next.map_or(Speed::ZERO, |next| (steady(next) - steady(step)).abs());
+                let is_paced = train.id() == self.id() || train.paced().is_some();
+                let switching =
+                    if is_paced { switches * TimeSpan::from_s(INTERRUPTED) } else { Length::ZERO };
+                let doubts = [stop.doubt, stop.scatter, BELIEVED, switching].map(Length::as_m);
                 let doubt = Length::from_m(libm::sqrt(doubts.iter().map(|doubt| doubt * doubt).sum()));
                 stop.distance + faster * stop.time + doubt * margins
             })
         };
         let own = stop(self, speed * (1.0 + SLOWS), Aim::NotBeyond(NEARER).margin());
         let ahead = stop(leader, speed, -Aim::NotBeyond(SHORTER).margin());
-        let bumpers = own - ahead + speed * (LINE_TIME + POLL_WAIT) + STRAYS + SAFE;
-        let bumpers = bumpers.max(SAFE);
-        match gap {
-            Gap::Way(_) => Gap::Way(bumpers),
-            Gap::Time(_) => Gap::Time((bumpers + leader.reach[1] + self.reach[0]) / speed),
-        }
+        let strays = if leader.followed().is_some() { STRAYS + STRAYS } else { STRAYS };
+        (own - ahead + speed * (LINE_TIME + POLL_WAIT) + strays + SAFE).max(SAFE)
     }
 
     /// Where a follower should be; `None` while nobody knows where its leader is.
@@ -175,10 +224,12 @@ impl DrivenTrain {
         others: &Others,
     ) -> Option<Reference> {
         let mut leader = others.get(&following.leader)?;
+        let located = self.located(ground, now)?;
+        let past = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
         let mut late = match following.gap {
             Gap::Time(gap) => gap.as_s(),
             Gap::Way(way) => {
-                let line = LeadLine::of(ground, leader, now, node)?;
+                let line = LeadLine::of(ground, leader, now, (node, past))?;
                 let behind = (way + leader.reach[1] + self.reach[0]).as_m();
                 let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead));
                 return Some(Reference::of(|ahead| line.place(ahead) - behind, speeds));
@@ -189,14 +240,20 @@ impl DrivenTrain {
             late += gap.as_s();
             leader = others.get(next)?;
         }
-        let line = LeadLine::of(ground, leader, now, node)?;
+        let line = LeadLine::of(ground, leader, now, (node, past))?;
         let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead - late));
         Some(Reference::of(|ahead| line.place(ahead - late), speeds))
     }
 
-    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is told to stand now, on the
-    /// follower's way. `None` if no way leads there.
-    fn rear_of(&self, ground: Ground<'_>, now: Timestamp, leader: &Self) -> Option<WayPoint> {
+    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is told to stand at a time
+    /// from now on, on the follower's way. `None` if no way leads there.
+    fn rear_of(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        leader: &Self,
+        stopped: Timestamp,
+    ) -> Option<WayPoint> {
         let node = self.locator.outlook()?.node();
         let seen = leader
             .passages
@@ -204,8 +261,8 @@ impl DrivenTrain {
             .next_back()
             .map(|(node, _)| node)
             .or(leader.locator.outlook().map(|outlook| outlook.node()))?;
-        let doubtful = leader.unseen().is_some() || leader.located(ground, now).is_none();
-        let rest = leader.locator.rest_if_stopped(ground, &leader.model, now).filter(|_| !doubtful);
+        let rest = leader.locator.rest_if_stopped(ground, &leader.model, stopped);
+        let rest = rest.filter(|_| !leader.is_in_doubt(ground, now));
         let past = rest.map_or(Length::ZERO, |rest| {
             let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(SHORTER).margin();
             surely.max(Length::ZERO)
@@ -213,6 +270,34 @@ impl DrivenTrain {
         let from = rest.map_or(seen, |rest| rest.at.node);
         let between = way_between(ground, &self.model, node, from)?;
         Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE })
+    }
+
+    /// Whether it may be elsewhere than where it is believed to be. Contacts fail thirty times as often as trains stall: one
+    /// that was silent is no doubt of a train that was seen running before, and runs too fast to stall, until the next is late.
+    fn is_in_doubt(&self, ground: Ground<'_>, now: Timestamp) -> bool {
+        let Some(located) = self.located(ground, now) else { return true };
+        if self.unseen().is_none() {
+            return false;
+        }
+        let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
+        let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * RAN_ON);
+        let is_lively = self.model.steady_speed(self.told, Approach::Below) >= LIVELY;
+        !(has_run && is_lively && self.missed_just_one(now))
+    }
+
+    /// The fastest step that it could be told now and still stop before the rear of its leader in a while, if neither is told
+    /// anything else until then; `None` if it is time to stand.
+    fn fastest_behind(&self, ground: Ground<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
+        let later = now + FORESEEN;
+        let rear = self.rear_of(ground, now, leader, later)?;
+        let start = now + LINE_TIME + POLL_WAIT;
+        let is_safe = |step: &SpeedStep| {
+            let rest = self.locator.rest_after_move(ground, &self.model, start, *step, later);
+            let beyond = rest.and_then(|rest| self.aimed_beyond(ground, &rest, rear, Aim::NotBeyond(NEARER)));
+            beyond.is_some_and(|beyond| beyond <= Length::ZERO)
+        };
+        let runs = |step: &&SpeedStep| self.model.steady_speed(**step, Approach::Below) >= CREEPS;
+        self.pacing.as_ref()?.usable.iter().rev().filter(runs).find(|step| is_safe(step)).copied()
     }
 
     /// Looks after the distance to the leader. Says whether the train may be paced now.
@@ -230,24 +315,31 @@ impl DrivenTrain {
             self.give_up(now, Refusal::UnknownTrain { train: leader }, out);
             return false;
         };
-        let rear = self.rear_of(ground, now, ahead);
+        let rear = self.rear_of(ground, now, ahead, now);
+        let fastest = self.fastest_behind(ground, now, ahead);
         let soon = now + LINE_TIME + TimeSpan::from_s(LOOK_AGAIN);
         let stop_by = rear.and_then(|rear| self.last_stop_before(ground, now, rear));
         let is_free = rear.is_some_and(|rear| {
             if self.told > SpeedStep::STAND {
-                return stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
+                return fastest.is_some() && stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
             }
             let rest = self.locator.rest_if_stopped(ground, &self.model, now);
             let beyond = rest.and_then(|rest| self.beyond(ground, rest.at, rear));
             ahead.told > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
         });
         let told = self.told;
-        let Some(Pacing { pace: Pace::Follow(following), look, .. }) = &mut self.pacing else { return true };
+        let Some(Pacing { pace: Pace::Follow(following), look, budget, .. }) = &mut self.pacing else {
+            return true;
+        };
         *look = Some(stop_by.map_or(soon, |by| (by - LINE_TIME).clamp(now + LINE_TIME, soon)));
-        following.rear = rear;
+        (following.rear, following.fastest) = (rear, fastest);
         if is_free {
             following.is_held = false;
-            return true;
+            let slower = fastest.filter(|step| *step < told);
+            if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
+                self.tell_step(now, step, out);
+            }
+            return slower.is_none();
         }
         if told > SpeedStep::STAND {
             if !following.is_held {

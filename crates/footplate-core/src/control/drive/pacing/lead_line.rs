@@ -11,6 +11,7 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::estimation::{Ground, Outlook};
 use crate::ids::NodeId;
 use crate::time::Timestamp;
+use crate::units::Length;
 
 use super::surveyed_way::{SurveyedWay, surveyed_between};
 
@@ -32,32 +33,41 @@ pub(super) struct LeadLine<'a> {
 }
 
 impl<'a> LeadLine<'a> {
-    /// The line of `leader` for a train that passed the contact at `from` last; `None` if nobody knows it.
+    /// The line of `leader` for a train that passed the contact at `from` last and is so far (surveyed m) past it; `None` if
+    /// nobody knows it.
     pub(super) fn of(
         ground: Ground<'_>,
         leader: &'a DrivenTrain,
         now: Timestamp,
-        from: NodeId,
+        (from, past): (NodeId, f64),
     ) -> Option<Self> {
         let outlook = leader.locator.outlook()?;
-        let passed: Vec<(NodeId, Timestamp)> = leader.passages.iter().collect();
-        // It came by the same contact, or runs from one that is ahead of it.
-        let first = passed.iter().rposition(|(node, _)| *node == from).unwrap_or_default();
-        let mut marks: Vec<[f64; 2]> = Vec::with_capacity(passed.len());
-        let (mut surveyed, mut before) = (0.0, from);
-        for (node, time) in passed.get(first..).unwrap_or_default() {
-            if *node != before {
-                surveyed += surveyed_between(ground, before, *node)?.as_m();
-            }
-            before = *node;
-            marks.push([(*time - now).as_s(), surveyed]);
-        }
-        if outlook.node() != before {
-            surveyed += surveyed_between(ground, before, outlook.node())?.as_m();
-        }
         let way = SurveyedWay::ahead(ground, &leader.model, outlook.node());
-        let now = outlook.seconds(now);
-        Some(Self { marks, outlook, begins: surveyed, way, model: &leader.model, now })
+        let zero = outlook.seconds(now);
+        let mut here = outlook;
+        let since = way.of_felt(here.place(&leader.model, zero));
+        let mut begins = ahead_of(ground, from, outlook.node())?;
+        // It may have come by the contact without a report, and be less than a round ahead.
+        if let Some(round) = surveyed_between(ground, from, from).map(Length::as_m)
+            && begins + since - round > past
+        {
+            begins -= round;
+        }
+        let mut marks: Vec<[f64; 2]> = Vec::new();
+        let (mut surveyed, mut next) = (begins, outlook.node());
+        for (node, time) in leader.passages.iter().rev() {
+            if node != next {
+                surveyed -= surveyed_between(ground, node, next)?.as_m();
+            }
+            next = node;
+            marks.push([(time - now).as_s(), surveyed]);
+            // What is behind the train that comes after it is over.
+            if surveyed <= 0.0 {
+                break;
+            }
+        }
+        marks.reverse();
+        Some(Self { marks, outlook, begins, way, model: &leader.model, now: zero })
     }
 
     /// Where it is at a time (s from now).
@@ -83,4 +93,9 @@ impl<'a> LeadLine<'a> {
     pub(super) fn speed(&self, time: f64) -> f64 {
         (self.place(time + SPEED_SPAN) - self.place(time - SPEED_SPAN)) / (2.0 * SPEED_SPAN)
     }
+}
+
+/// The surveyed way (m) from a contact to one ahead of it, which may be itself.
+fn ahead_of(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<f64> {
+    if from == to { Some(0.0) } else { surveyed_between(ground, from, to).map(Length::as_m) }
 }

@@ -156,7 +156,13 @@ impl DrivenTrain {
         let at = outlook.seconds(now);
         let mut here = outlook;
         let behind = reference.now() - way.of_felt(here.place(&self.model, at));
-        let search = StepSearch::new(&self.model, &way, &reference, &pacing.usable, [at, leaves], behind);
+        let fastest = match pacing.pace {
+            Pace::Follow(following) => following.fastest(),
+            Pace::Hold(_) | Pace::Arrive(_) => None,
+        };
+        let usable = pacing.usable.partition_point(|step| fastest.is_none_or(|fastest| *step <= fastest));
+        let usable = pacing.usable.get(..usable).unwrap_or_default();
+        let search = StepSearch::new(&self.model, &way, &reference, usable, [at, leaves], behind);
         let choice = search.best(outlook, pacing.budget.later(at - seconds(now)));
         match choice.first {
             Some((0, step)) => {
