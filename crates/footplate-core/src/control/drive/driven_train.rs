@@ -8,7 +8,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::expectation::Expectation;
-use super::felt_way::{contacts_until, counted_from};
+use super::felt_way::contacts_until;
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
@@ -267,18 +267,14 @@ impl DrivenTrain {
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
             (Phase::Finding { .. }, _) => self.set_out(ground, now, task.order, destination, out),
-            (_, Some(at)) => {
-                let shifted = counted_from(ground, &self.model, at, node);
-                let at = shifted.or_else(|| self.waypoint_again(ground, node, &destination));
-                match at {
-                    Some(at) => {
-                        let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
-                        self.task = Some(Task { goal, ..task });
-                        self.plan(ground, now, out);
-                    }
-                    None => self.give_up(now, self.no_way(ground, node, &destination), out),
+            (_, Some(at)) => match self.counted_again(ground, at, node, &destination) {
+                Some(at) => {
+                    let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
+                    self.task = Some(Task { goal, ..task });
+                    self.plan(ground, now, out);
                 }
-            }
+                None => self.give_up(now, self.no_way(ground, node, &destination), out),
+            },
             _ => {}
         }
     }

@@ -9,7 +9,7 @@ use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::{contacts_until, lap, unknown_turnout, way_between};
+use super::felt_way::{contacts_until, counted_from, lap, unknown_turnout, way_between};
 use super::notice::{DriveNotice, PlannedStop, Promise};
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
@@ -47,6 +47,7 @@ impl DrivenTrain {
             aim: stop.aim,
             step: stop.step,
             next_round: stop.next_round,
+            in_time: false,
         };
         ground.layout.locate(stop.target, ground.turnouts).map_err(Refusal::Place)?;
         let stands = self.stands(ground, now);
@@ -113,8 +114,14 @@ impl DrivenTrain {
             return Err(Refusal::StillMoves { train: self.id() });
         }
         let at = WayPoint { way: located.at.way + distance, ..located.at };
-        let destination =
-            Destination { named: None, at: Some(at), aim: Aim::Median, step: None, next_round: false };
+        let destination = Destination {
+            named: None,
+            at: Some(at),
+            aim: Aim::Median,
+            step: None,
+            next_round: false,
+            in_time: false,
+        };
         self.head_for(ground, now, order, &located, destination, true, out)
     }
 
@@ -227,6 +234,30 @@ impl DrivenTrain {
         Some(WayPoint { node, way: way_to_landmark(ground, &self.model, node, destination.named?)? })
     }
 
+    /// A target that has a name, found again from the node that it is counted from: lengths are learnt on the way, and
+    /// turnouts thrown. As many rounds from now as before; `None` if no way leads there any more.
+    fn named_again(&self, ground: Ground<'_>, at: WayPoint, destination: &Destination) -> Option<WayPoint> {
+        let again = self.waypoint_again(ground, at.node, destination)?;
+        let Some(round) = lap(ground, &self.model, at.node) else { return Some(again) };
+        let rounds = libm::round((at.way - again.way) / round).max(0.0);
+        Some(WayPoint { way: again.way + round * rounds, ..at })
+    }
+
+    /// The target counted from a contact that the train came to since, as its way is known now; `None` if no way leads
+    /// there any more.
+    pub(super) fn counted_again(
+        &self,
+        ground: Ground<'_>,
+        at: WayPoint,
+        node: NodeId,
+        destination: &Destination,
+    ) -> Option<WayPoint> {
+        let Some(counted) = counted_from(ground, &self.model, at, node) else {
+            return self.waypoint_again(ground, node, destination);
+        };
+        if destination.in_time { self.named_again(ground, counted, destination) } else { Some(counted) }
+    }
+
     /// The turnouts lie otherwise: is the target still where it was?
     pub(super) fn way_changed(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
         self.expect_next(ground, now);
@@ -236,16 +267,11 @@ impl DrivenTrain {
         };
         let Some(at) = destination.at else { return };
         if destination.named.is_some() {
-            let again = self.waypoint_again(ground, at.node, &destination);
-            let round = lap(ground, &self.model, at.node);
-            let Some(again) = again else {
+            let Some(at) = self.named_again(ground, at, &destination) else {
                 return self.give_up(now, self.no_way(ground, at.node, &destination), out);
             };
-            // As many rounds from now as before.
-            let rounds = round.map_or(0.0, |round| libm::round((at.way - again.way) / round).max(0.0));
-            let way = again.way + round.unwrap_or(Length::ZERO) * rounds;
             if let Some(task) = &mut self.task {
-                task.goal = Goal::RestAt(Destination { at: Some(WayPoint { way, ..at }), ..destination });
+                task.goal = Goal::RestAt(Destination { at: Some(at), ..destination });
             }
         }
         self.plan(ground, now, out);

@@ -42,6 +42,8 @@ pub(super) struct Destination {
     /// The step to stop from, if it was named.
     pub(super) step: Option<SpeedStep>,
     pub(super) next_round: bool,
+    /// Whether it is to be reached in time: what hops are like is learnt on the way then, and the way counted anew.
+    pub(super) in_time: bool,
 }
 
 /// How far a task is.

@@ -102,8 +102,14 @@ impl DrivenTrain {
         }
         let located = self.located(ground, now).filter(|_| self.unseen().is_none() || !stands);
         let located = located.ok_or(Refusal::Lost { train: self.id() })?;
-        let mut destination =
-            Destination { named: Some(target), at: None, aim: Aim::Median, step: None, next_round: false };
+        let mut destination = Destination {
+            named: Some(target),
+            at: None,
+            aim: Aim::Median,
+            step: None,
+            next_round: false,
+            in_time: true,
+        };
         let mut at = self.waypoint(ground, now, &located, &destination, stands);
         if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
             destination.next_round = true;
@@ -320,8 +326,7 @@ impl DrivenTrain {
     ) {
         let Some(Pacing { pace: Pace::Arrive(arriving), .. }) = &mut self.pacing else { return };
         let destination = arriving.destination;
-        let again = destination.at.and_then(|at| counted_from(ground, &self.model, at, node));
-        let again = again.or_else(|| self.waypoint_again(ground, node, &destination));
+        let again = destination.at.and_then(|at| self.counted_again(ground, at, node, &destination));
         match (again, &mut self.pacing) {
             (Some(at), Some(Pacing { pace: Pace::Arrive(arriving), .. })) => {
                 arriving.destination.at = Some(at);

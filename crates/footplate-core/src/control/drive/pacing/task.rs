@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::task::Goal;
+use crate::control::drive::task::{Destination, Goal};
 use crate::estimation::Ground;
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::latency::ContactWindow;
@@ -91,7 +91,8 @@ impl DrivenTrain {
         sensor: SensorId,
         window: ContactWindow,
     ) {
-        if self.paced().is_none() {
+        let comes_in_time = matches!(self.goal(), Some(Goal::RestAt(Destination { in_time: true, .. })));
+        if self.paced().is_none() && !comes_in_time {
             return;
         }
         if let Some((section, longer)) = self.locator.shown_length(ground, &self.model, sensor, window) {
