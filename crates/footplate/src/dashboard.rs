@@ -9,6 +9,7 @@
 //! board            where the control loop leaves all that, and finds what was asked; it never waits for anybody
 //! guard            who may ask: hosts, origins, a token beyond loopback
 //! server  stream   HTTP on a thread of its own; what one watcher is sent
+//! shadow           where the train of a calibration is
 //! showing          what machines do that take no orders: calibrations, a demonstration
 //! routes           what can be asked for
 //! assets           the pages, inside the program
@@ -25,6 +26,7 @@ mod painter;
 mod picture;
 mod routes;
 mod server;
+mod shadow;
 mod showing;
 mod spans;
 mod stream;
@@ -37,4 +39,5 @@ pub(crate) use picture::LayoutPicture;
 pub(crate) use picture::TrainTask;
 pub(crate) use routes::Routes;
 pub(crate) use server::{Dashboard, ServedAt};
+pub(crate) use shadow::Shadow;
 pub(crate) use showing::Showing;

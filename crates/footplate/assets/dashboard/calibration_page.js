@@ -12,6 +12,13 @@ const LOOKED_EVERY_MS = 2000;
 /** One standard deviation is this part of half a 95 % interval. */
 const SIGMA = 1 / 1.959964;
 
+/** What a calibration is about, in the reader's language. */
+export function aboutCalibration({ trial, phase }) {
+  if (!trial) return say(`phase-${phase || "finding"}`);
+  const { what, step, side, run_s: run } = trial;
+  return say(`trial-${what}`, step, side && say(`trial-from-${side}`), run && shown(run, 1));
+}
+
 export function calibrationPage(root, live, number) {
   const $ = (selector) => root.querySelector(selector);
   const select = $("#train");
@@ -231,8 +238,7 @@ export function calibrationPage(root, live, number) {
   function progress(now) {
     $("#progress").hidden = !now;
     if (!now) return;
-    const { what, step, side, run_s: run } = now.trial ?? {};
-    put($("#about"), now.trial ? say(`trial-${what}`, step, side && say(`trial-from-${side}`), run && shown(run, 1)) : say(`phase-${now.phase}`));
+    put($("#about"), aboutCalibration(now));
     put($("#because"), !now.experiment ? "–" : now.gain == null ? say("because-untried") : say("because-most", shown(now.takes_s), shown(now.gain, 1)));
     put($("#left"), say("left-of", shown(now.left_s), shown(now.elapsed_s + now.left_s)));
     $("#elapsed").max = now.elapsed_s + now.left_s;

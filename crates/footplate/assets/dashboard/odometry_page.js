@@ -1,8 +1,9 @@
 // A recording of a tachometer, dropped here: the same walk and the same charts as on the command line.
 
 import { put } from "./dom.js";
+import { SlideView } from "./slide_view.js";
 import { send, withToken } from "./server.js";
-import { say } from "./words.js";
+import { LANGUAGE, say } from "./words.js";
 
 /** The largest recording that the server takes. */
 const LARGEST = 64 * 1024 * 1024;
@@ -10,13 +11,14 @@ const LARGEST = 64 * 1024 * 1024;
 export function odometryPage(root) {
   const $ = (selector) => root.querySelector(selector);
   const place = $("#drop");
+  const slide = new SlideView(root);
 
   async function walk(file) {
     if (!file) return;
     if (file.size > LARGEST) return put($("#answer"), say("too-large", file.name, Math.round(file.size / 1e6)));
     put($("#answer"), say("walking-file", file.name));
     try {
-      const { page } = await send(`/api/odometry/${encodeURIComponent(file.name)}`, file);
+      const { page } = await send(`/api/odometry/${encodeURIComponent(file.name)}?language=${LANGUAGE}`, file);
       $("#result").hidden = false;
       $("#result").title = say("odometry-of", file.name);
       $("#result").src = withToken(page);
@@ -38,5 +40,5 @@ export function odometryPage(root) {
     place.classList.remove("over");
     walk(event.dataTransfer.files[0]);
   });
-  return {};
+  return { close: () => slide.close() };
 }

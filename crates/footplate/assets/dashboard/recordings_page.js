@@ -1,5 +1,6 @@
 // Sessions that were written down: listed, walked again with a slider, and beside each other.
 
+import { aboutCalibration } from "./calibration_page.js";
 import { colour, dots } from "./chart.js";
 import { LiveChart } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -50,6 +51,7 @@ class Walked {
     const picture = this.#pictures[low];
     this.#track.show(picture);
     const where = picture.trains.map((train) => `${say("train", train.train)}: ${train.at ? `${train.at} ± ${shown(train.half_mm)} mm, ${shown(train.speed_mm_per_s)} mm/s` : say("nowhere")}${train.doing ? ` (${train.doing})` : ""}`);
+    if (picture.calibration) where.push(aboutCalibration(picture.calibration));
     put(this.#root.querySelector(".where"), where.join("; "));
     const said = this.#lines.filter(({ t_s }) => t_s <= at).slice(-LINES).map(({ text }) => make("li", {}, text));
     this.#root.querySelector(".said").replaceChildren(...said);
@@ -79,7 +81,10 @@ export function recordingsPage(root, live, number) {
     chart = undefined;
     const all = [...shownSessions.entries()].map(([name, walked]) => [name, walked.errors()]);
     $("#walked").hidden = all.length === 0;
-    if (all.length === 0) return;
+    // Whoever calibrates a train predicts no contacts.
+    const predicts = all.some(([, own]) => own.length > 0);
+    $("figure").hidden = $("#compared").hidden = !predicts;
+    if (!predicts) return;
     chart = new LiveChart($("figure"), () => ({
       name: say("chart-recorded"), x: { label: say("axis-session"), unit: "s", digits: 1 }, y: say("axis-sure"), zero: true, zooms: true,
       series: all.map(([name], place) => dots(name, ["first", "second"][place], "mm", 1)),
@@ -157,8 +162,7 @@ export function recordingsPage(root, live, number) {
       return;
     }
     $("#recordings").replaceChildren(...list.map((one) => {
-      const drives = one.machines.some((kind) => kind !== "calibrate");
-      const box = make("input", { type: "checkbox", value: String(one.recording), disabled: !drives, checked: String(one.recording) === number });
+      const box = make("input", { type: "checkbox", value: String(one.recording), disabled: one.machines.length === 0, checked: String(one.recording) === number });
       box.addEventListener("change", () => {
         const checked = [...root.querySelectorAll("#recordings input:checked")];
         // Two can be compared; a third takes the place of the one before.

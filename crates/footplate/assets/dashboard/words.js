@@ -5,6 +5,8 @@ import { GERMAN } from "./german.js";
 
 const isGerman = navigator.language.toLowerCase().startsWith("de");
 const WORDS = isGerman ? GERMAN : ENGLISH;
+/** The reader's language, as pages of the server are asked for in it. */
+export const LANGUAGE = isGerman ? "de" : "en";
 
 /** A text with its blanks filled in. */
 export function say(word, ...blanks) {
@@ -13,7 +15,7 @@ export function say(word, ...blanks) {
 
 /** Puts every text of a part of the page in place. */
 export function translate(root) {
-  document.documentElement.lang = isGerman ? "de" : "en";
+  document.documentElement.lang = LANGUAGE;
   for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
   for (const element of root.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", say(element.dataset.label));

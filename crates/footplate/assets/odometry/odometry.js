@@ -9,14 +9,28 @@ const LISTED = 200;
 /** Height of the strip of modes, as a part of the axis that shows 100 %. */
 const STRIP_OF = 0.09;
 
-const WORDS = {
+/** The one of two texts that is in the page's language. */
+const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
+const WORDS = pick({
   spin: "slips", slide: "slides", excluded: "not believed",
   one_slip: "one slips or slides", degraded: "degraded", correction: "correction", ambiguous: "ambiguous",
-};
-const PLACES = { wheel_1: "wheelset 1", wheel_2: "wheelset 2", mode: "mode" };
+}, {
+  spin: "schleudert", slide: "gleitet", excluded: "nicht geglaubt",
+  one_slip: "einer gleitet oder schleudert", degraded: "beeinträchtigt", correction: "Korrektur", ambiguous: "mehrdeutig",
+});
+const PLACES = pick(
+  { wheel_1: "wheelset 1", wheel_2: "wheelset 2", mode: "mode" },
+  { wheel_1: "Radsatz 1", wheel_2: "Radsatz 2", mode: "Betriebsart" },
+);
+/** What stands on axes and beside lines. */
+const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST] = pick(
+  ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least"],
+  ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens"],
+);
+const KEYS_SAID = pick(KEYS, "Pfeiltasten gehen die Werte entlang, Plus und Minus vergrößern, Escape zeigt alles.");
 
 const time = () => ({
-  label: "time since the first period (s)",
+  label: TIME,
   value: (_, value) => {
     if (value == null) return "–";
     return `${rounded(value, 2)} s${run.begin_s === 0 ? "" : ` (t_s ${rounded(run.begin_s + value, 2)})`}`;
@@ -56,7 +70,7 @@ function key(figure, places) {
   if (there.size === 0) return;
   const list = document.createElement("ul");
   list.className = "key";
-  list.setAttribute("aria-label", "Key to the marks");
+  list.setAttribute("aria-label", pick("Key to the marks", "Schlüssel zu den Marken"));
   for (const what of Object.keys(WORDS).filter((word) => there.has(word))) {
     const swatch = document.createElement("span");
     swatch.className = "swatch";
@@ -80,22 +94,23 @@ function say(figure, text) {
 const known = (values) => (values ?? []).filter((value) => value != null);
 const least = (values) => known(values).reduce((one, other) => Math.min(one, other), Infinity);
 const greatest = (values) => known(values).reduce((one, other) => Math.max(one, other), -Infinity);
-const span = (values, unit, digits) => `${rounded(least(values), digits)} to ${rounded(greatest(values), digits)} ${unit}`;
+const span = (values, unit, digits) => `${rounded(least(values), digits)} ${pick("to", "bis")} ${rounded(greatest(values), digits)} ${unit}`;
 const bound = (label, unit, digits) => ({ ...line(label, "quiet", unit, digits), width: 1 });
 const dashed = (series) => ({ ...series, dash: [6, 4] });
 
 function speed(figure, { speed_m_s, speed_low_m_s, speed_high_m_s, true_speed_m_s }) {
   chart(figure, {
-    name: "Speed with its bounds", x: time(), y: "speed (m/s)", sync: SYNC,
+    name: pick("Speed with its bounds", "Tempo mit seinen Grenzen"), keys: KEYS_SAID, x: time(), y: SPEED, sync: SYNC,
     data: [run.time_s, speed_high_m_s, speed_low_m_s, speed_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
     series: [
-      bound("at most", "m/s", 2), bound("at least", "m/s", 2), line("estimate", "first", "m/s", 2),
-      ...(true_speed_m_s ? [dashed(line("true", "truth", "m/s", 2))] : []),
+      bound(AT_MOST, "m/s", 2), bound(AT_LEAST, "m/s", 2), line(ESTIMATE, "first", "m/s", 2),
+      ...(true_speed_m_s ? [dashed(line(pick("true", "wahr"), "truth", "m/s", 2))] : []),
     ],
     bands: [{ series: [1, 2], fill: colour("band") }],
   });
   const widest = greatest(speed_high_m_s.map((high, place) => high - speed_low_m_s[place]));
-  say(figure, `The estimate goes from ${span(speed_m_s, "m/s", 2)}; its bounds are at most ${rounded(widest, 2)} m/s apart.`);
+  const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
+  say(figure, pick(`The estimate goes from ${goes}; its bounds are at most ${apart} m/s apart.`, `Die Schätzung geht von ${goes}; ihre Grenzen sind höchstens ${apart} m/s auseinander.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
@@ -109,25 +124,26 @@ function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
   });
   const none = run.time_s.map(() => null);
   chart(figure, {
-    name: "Speed of each wheel", x: time(), y: "speed (m/s)", sync: SYNC,
+    name: pick("Speed of each wheel", "Tempo jedes Rades"), keys: KEYS_SAID, x: time(), y: SPEED, sync: SYNC,
     below: [shade(run.marks.wheel_1, 0, 0.5), shade(run.marks.wheel_2, 0.5, 1)],
     data: [run.time_s, wheel_1_m_s ?? none, wheel_2_m_s ?? none, speed_m_s],
-    series: [wheel("wheel_1", "second"), wheel("wheel_2", "third"), { ...line("estimate", "first", "m/s", 2), width: 1.5 }],
+    series: [wheel("wheel_1", "second"), wheel("wheel_2", "third"), { ...line(ESTIMATE, "first", "m/s", 2), width: 1.5 }],
   });
   key(figure, ["wheel_1", "wheel_2"]);
   const told = ["wheel_1", "wheel_2"].map((place) => `${PLACES[place]} ${stretchesOf(place)}`);
-  say(figure, `Marks: ${told.join("; ")}.`);
+  say(figure, `${pick("Marks", "Marken")}: ${told.join("; ")}.`);
 }
 
 /** How often and how long something is marked, in words. */
 function stretchesOf(place) {
   const marks = run.marks[place];
-  if (marks.length === 0) return place === "mode" ? "always normal" : "always rolls";
+  if (marks.length === 0) return place === "mode" ? pick("always normal", "immer normal") : pick("always rolls", "rollt immer");
   const kinds = [...new Set(marks.map(([, , what]) => what))];
   return kinds.map((kind) => {
     const own = marks.filter(([, , what]) => what === kind);
     const lasts = own.reduce((sum, [from, to]) => sum + to - from, 0);
-    return `${WORDS[kind]} ${own.length === 1 ? "once" : `${own.length} times`}, for ${rounded(lasts, 1)} s`;
+    const often = own.length === 1 ? pick("once", "einmal") : `${own.length} ${pick("times", "Mal")}`;
+    return pick(`${WORDS[kind]} ${often}, for ${rounded(lasts, 1)} s`, `${WORDS[kind]} ${often}, ${rounded(lasts, 1)} s lang`);
   }).join(", ");
 }
 
@@ -143,61 +159,70 @@ function shares(figure, { share_1, share_1_and_2 }) {
   });
   const mode = (u, _, __, index) => WORDS[markedAt("mode", u.data[0][index ?? 0])] ?? "normal";
   chart(figure, {
-    name: "Shares of the wheels and of the virtual sensor, and the mode", x: time(), y: "share (%)", sync: SYNC, height: STRIP + 30,
+    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des gedachten Sensors, und die Betriebsart"), keys: KEYS_SAID, x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
     range: { y: { range: [0, 100 / (1 - STRIP_OF)] } },
     below: [shade(run.marks.mode, 0, STRIP_OF - 0.02, 1)],
     data: [run.time_s, run.time_s.map(() => 100), both, first, run.time_s.map(() => null)],
     series: [
-      part("virtual sensor", "first", (index) => 100 - both[index]),
-      part("wheelset 2", "third", (index) => both[index] - first[index]),
-      { ...part("wheelset 1", "second", (index) => first[index]), fill: `color-mix(in srgb, ${colour("second")} 25%, transparent)` },
-      { ...line("mode", "quiet", "", 0), value: mode },
+      part(pick("virtual sensor", "gedachter Sensor"), "first", (index) => 100 - both[index]),
+      part(PLACES.wheel_2, "third", (index) => both[index] - first[index]),
+      { ...part(PLACES.wheel_1, "second", (index) => first[index]), fill: `color-mix(in srgb, ${colour("second")} 25%, transparent)` },
+      { ...line(PLACES.mode, "quiet", "", 0), value: mode },
     ],
     bands: [["first", [1, 2]], ["third", [2, 3]]].map(([name, pair]) => (
       { series: pair, fill: `color-mix(in srgb, ${colour(name)} 25%, transparent)` }
     )),
   });
   key(figure, ["mode"]);
-  say(figure, `Mode: ${stretchesOf("mode")}.`);
+  say(figure, `${PLACES.mode}: ${stretchesOf("mode")}.`);
 }
 
 function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m, under_m }) {
   if (error_m) {
     chart(figure, {
-      name: "Distance less the true distance, with its bounds", x: time(), y: "beyond the truth (m)", sync: SYNC, zero: true,
+      name: pick("Distance less the true distance, with its bounds", "Weg weniger dem wahren Weg, mit seinen Grenzen"), keys: KEYS_SAID, x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
       data: [run.time_s, error_high_m, error_low_m, error_m],
-      series: [bound("at most", "m", 2), bound("at least", "m", 2), line("estimate", "first", "m", 2)],
+      series: [bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2)],
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
-    say(figure, `The error goes from ${span(error_m, "m", 2)}; its bounds from ${rounded(least(error_low_m), 2)} to ${rounded(greatest(error_high_m), 2)} m.`);
+    const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(error_high_m), 2)} m`];
+    say(figure, pick(`The error goes from ${goes}; its bounds from ${bounds}.`, `Der Fehler geht von ${goes}; seine Grenzen von ${bounds}.`));
     return;
   }
   chart(figure, {
-    name: "Width of the interval of the distance, and amounts of over- and under-reading", x: time(), y: "distance (m)", sync: SYNC,
+    name: pick("Width of the interval of the distance, and amounts of over- and under-reading", "Breite des Intervalls des Weges, und wie viel er zu lang und zu kurz gelesen wird"), keys: KEYS_SAID, x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
-    series: [line("width of the interval", "first", "m", 2), line("over-read by at most", "second", "m", 2), line("under-read by at most", "third", "m", 2)],
+    series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });
   const last = (values) => rounded(known(values).at(-1) ?? 0, 2);
-  say(figure, `At the end the interval is ${last(width_m)} m wide; the distance is over-read by at most ${last(over_m)} m and under-read by at most ${last(under_m)} m.`);
+  const [wide, over, under] = [width_m, over_m, under_m].map(last);
+  say(figure, pick(
+    `At the end the interval is ${wide} m wide; the distance is over-read by at most ${over} m and under-read by at most ${under} m.`,
+    `Am Ende ist das Intervall ${wide} m breit; der Weg ist höchstens um ${over} m zu lang und um ${under} m zu kurz gelesen.`,
+  ));
 }
 
 function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
-  const measured = measured_accel_m_s2 && { ...line("accelerometer", "third", "m/s²", 2), width: 1, spanGaps: false };
+  const measured = measured_accel_m_s2 && { ...line(pick("accelerometer", "Beschleunigungsmesser"), "third", "m/s²", 2), width: 1, spanGaps: false };
   chart(figure, {
-    name: "Acceleration", x: time(), y: "acceleration (m/s²)", sync: SYNC, height: STRIP + 30, zero: true,
+    name: pick("Acceleration", "Beschleunigung"), keys: KEYS_SAID, x: time(), y: pick("acceleration (m/s²)", "Beschleunigung (m/s²)"), sync: SYNC, height: STRIP + 30, zero: true,
     data: [run.time_s, ...(measured ? [measured_accel_m_s2] : []), accel_m_s2],
-    series: [...(measured ? [measured] : []), line("estimate", "first", "m/s²", 2)],
+    series: [...(measured ? [measured] : []), line(ESTIMATE, "first", "m/s²", 2)],
   });
   if (effort) {
     chart(figure, {
-      name: "Effort", x: time(), y: "effort (%)", sync: SYNC, height: STRIP - 30, zero: true,
+      name: pick("Effort", "Befehl"), keys: KEYS_SAID, x: time(), y: pick("effort (%)", "Befehl (%)"), sync: SYNC, height: STRIP - 30, zero: true,
       range: { y: { range: [-105, 105] } },
       data: [run.time_s, effort.map((part) => (part == null ? null : 100 * part))],
-      series: [line("effort", "second", "%", 0)],
+      series: [line(pick("effort", "Befehl"), "second", "%", 0)],
     });
   }
-  const recorded = [measured && "an accelerometer", effort && "the command"].filter(Boolean).join(" and ");
-  say(figure, `The estimate goes from ${span(accel_m_s2, "m/s²", 2)}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`);
+  const recorded = [measured && pick("an accelerometer", "ein Beschleunigungsmesser"), effort && pick("the command", "der Befehl")].filter(Boolean).join(pick(" and ", " und "));
+  const goes = span(accel_m_s2, "m/s²", 2);
+  say(figure, pick(
+    `The estimate goes from ${goes}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`,
+    `Die Schätzung geht von ${goes}. ${recorded ? `Daneben aufgezeichnet: ${recorded}.` : "Weder ein Beschleunigungsmesser noch der Befehl ist aufgezeichnet."}`,
+  ));
 }
 
 /** Every stretch that is marked, as a table. */
@@ -209,8 +234,8 @@ function listMarks() {
   if (marks.length === 0) return;
   const details = document.createElement("details");
   const summary = document.createElement("summary");
-  const shown = marks.length > LISTED ? `, the first ${LISTED}` : "";
-  summary.textContent = `Marks of ${run.name} as a table (${marks.length}${shown})`;
+  const shown = marks.length > LISTED ? pick(`, the first ${LISTED}`, `, die ersten ${LISTED}`) : "";
+  summary.textContent = pick(`Marks of ${run.name} as a table (${marks.length}${shown})`, `Marken von ${run.name} als Tabelle (${marks.length}${shown})`);
   const wide = document.createElement("div");
   wide.className = "wide";
   const table = document.createElement("table");
@@ -225,7 +250,7 @@ function listMarks() {
     });
     return tr;
   };
-  table.createTHead().append(row("th", ["of", "what", "from s", "to s"]));
+  table.createTHead().append(row("th", pick(["of", "what", "from s", "to s"], ["von", "was", "von s", "bis s"])));
   const body = table.createTBody();
   for (const [place, from, to, what] of marks.slice(0, LISTED)) {
     body.append(row("td", [PLACES[place], WORDS[what], rounded(from, 2), rounded(to, 2)]));
@@ -253,5 +278,5 @@ offerRuns();
 listMarks();
 drawFigures((figure) => {
   if (run.time_s.length > 0) KINDS[figure.dataset.chart](figure, run.lines);
-  else figure.append("The run has no period.");
+  else figure.append(pick("The run has no period.", "Die Fahrt hat keine Periode."));
 });

@@ -3,6 +3,7 @@
 
 mod explain;
 mod live;
+mod picture;
 mod table;
 
 use std::io::Write;
@@ -19,11 +20,13 @@ use footplate_store::{
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::plot::PictureFile;
 use crate::clock::{Moment, now};
 use crate::dashboard::ServedAt;
 use crate::link::Address;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
+pub(super) use live::calibration_line;
 
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
@@ -39,6 +42,7 @@ Examples:
   footplate calibrate --link marklin-serial:/dev/ttyUSB0 --layout track-a --train 24 --budget 5m --store railway.db
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
   footplate calibrate --from session.csv --layout track-a --store railway.db
+  footplate calibrate --store railway.db --layout track-a --train 24 --plot train24.svg
   footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
 pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
@@ -73,6 +77,9 @@ pub(crate) struct Arguments {
     /// Write the calibration to a file, TOML or JSON by its ending.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Draw speeds and stops by step to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE", conflicts_with = "explain")]
+    plot: Option<PictureFile>,
     /// List the measurements behind a number instead: SPEED:STEP, STOP:STEP, LAW:up, LAW:down or
     /// LENGTH:FROM-TO.
     #[arg(long, value_name = "NUMBER")]
@@ -94,6 +101,7 @@ impl Arguments {
                 serve: self.serve.as_ref(),
                 store: self.store.as_deref(),
                 out: self.out.as_deref(),
+                plot: self.plot.as_ref(),
                 is_json: self.json,
             };
             return session.run(output);
@@ -119,6 +127,16 @@ impl Arguments {
         }
         if let Some(path) = &self.out {
             write_calibration(&file, path)?;
+        }
+        if let Some(plot) = &self.plot {
+            let [train] = file.trains.as_slice() else {
+                bail!(
+                    "{}: a picture is of one train, and there are {}; choose one with --train",
+                    plot.path().display(),
+                    file.trains.len()
+                );
+            };
+            plot.write(&picture::of_file(&file, train))?;
         }
         match &self.explain {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,

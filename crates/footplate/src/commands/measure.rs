@@ -2,6 +2,7 @@
 
 mod stop;
 mod stopped_run;
+mod stops_picture;
 
 use std::io::Write;
 

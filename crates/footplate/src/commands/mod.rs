@@ -16,6 +16,7 @@ mod layout;
 mod log_file;
 mod measure;
 mod odometry;
+mod plot;
 mod predict;
 mod replay;
 mod report;
@@ -27,4 +28,4 @@ mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
 #[cfg(test)]
-pub(crate) use serve::{archive_routes, odometry_routes};
+pub(crate) use serve::{archive_routes, odometry_routes, slide_routes};

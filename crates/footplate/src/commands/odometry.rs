@@ -8,6 +8,7 @@ mod results;
 mod tables;
 mod uploaded;
 mod walked;
+mod watched_slide;
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -18,10 +19,13 @@ use footplate_store::odometry::{Preset, RunContext};
 use footplate_store::{default_vehicle, read_vehicle};
 
 use super::Outcome;
+use super::plot::PictureFile;
+use super::web_page::Language;
 use recording::{OpenRecording, WalkedRecording};
 use results::Results;
 pub(super) use uploaded::uploaded_page;
 use walked::Walked;
+pub(super) use watched_slide::WatchedSlide;
 
 /// Estimate speed and distance, with bounds, from what two wheelsets counted.
 ///
@@ -34,6 +38,7 @@ use walked::Walked;
 #[command(
     after_help = "Example: footplate odometry run.csv --vehicle train.toml --score --out result.parquet\n\
                   Charts:  footplate odometry run.csv --vehicle train.toml --report run.html\n\
+                  Picture: footplate odometry run.csv --vehicle train.toml --plot run.svg\n\
                   Live:    tachometer | footplate odometry - --out -\n\n\
                   Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
 )]
@@ -53,6 +58,9 @@ pub(crate) struct Arguments {
     /// Write a page with charts to this file (HTML), to open in any browser without a network.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Draw the first run to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PictureFile>,
     /// Compare with the truth that the recording holds.
     #[arg(long)]
     score: bool,
@@ -99,9 +107,20 @@ impl Arguments {
         let preset = Preset::from(self.preset);
         let context = RunContext { vehicle: vehicle.vehicle, preset, score: self.score };
         let recordings = self.walk(&context, output)?;
-        let walked = Walked { vehicle: vehicle.name, preset, recordings, is_scored: self.score };
+        let walked = Walked {
+            vehicle: vehicle.name,
+            preset,
+            recordings,
+            language: Language::English,
+            is_scored: self.score,
+        };
         if let Some(page) = &self.report {
             report::write(page, &walked).with_context(|| format!("writing {}", page.display()))?;
+        }
+        if let Some(plot) = &self.plot {
+            let picture = report::still(&walked)
+                .with_context(|| format!("{}: there is no run to draw", plot.path().display()))?;
+            plot.write(&picture)?;
         }
         if to_standard {
             return Ok(Outcome::Done);
@@ -118,7 +137,8 @@ impl Arguments {
     fn walk(&self, context: &RunContext, output: &mut dyn Write) -> anyhow::Result<Vec<WalkedRecording>> {
         let mut output = Some(output);
         let mut results = None;
-        let mut charts_left = if self.report.is_some() { report::MOST_RUNS } else { 0 };
+        let is_drawn = self.report.is_some() || self.plot.is_some();
+        let mut charts_left = if is_drawn { report::MOST_RUNS } else { 0 };
         let mut walked = Vec::new();
         for file in &self.files {
             let recording = OpenRecording::open(file, self.score)?;
@@ -127,7 +147,7 @@ impl Arguments {
                 results = Some(Results::begin(out, output, with_runs)?);
             }
             // A page says how good it was wherever the truth is there.
-            let score = self.score || (self.report.is_some() && recording.has_truth());
+            let score = self.score || (is_drawn && recording.has_truth());
             let context = RunContext { score, ..*context };
             walked.push(recording.walk(&context, results.as_mut(), &mut charts_left)?);
         }

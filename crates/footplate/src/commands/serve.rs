@@ -3,6 +3,7 @@
 mod archive;
 mod desk;
 mod odometry_desk;
+mod slides;
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use crate::dashboard::{Dashboard, ServedAt};
 
 pub(crate) use archive::archive_routes;
 pub(crate) use odometry_desk::odometry_routes;
+pub(crate) use slides::slide_routes;
 
 /// Drive trains from browsers and programs, without a prompt.
 ///
@@ -47,7 +49,7 @@ pub(super) fn open_dashboard(
 ) -> anyhow::Result<Dashboard> {
     let token = std::env::var("FOOTPLATE_TOKEN").ok();
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
-    let more = archive_routes(store, &written.layout).and(odometry_routes());
+    let more = archive_routes(store, &written.layout).and(odometry_routes()).and(slide_routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
     eprintln!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)

@@ -1,7 +1,9 @@
 //! A page that opens in any browser without a network: one file with its styles, scripts and data inside.
 
+mod language;
 pub(super) mod markup;
 
+pub(crate) use language::Language;
 use serde::Serialize;
 
 use markup::{json, text};
@@ -17,6 +19,7 @@ const POLICY: &str =
 
 /// What one page has of its own.
 pub(super) struct WebPage<'a> {
+    pub(super) language: Language,
     /// Plain text, for the window and as the heading.
     pub(super) title: &'a str,
     /// Markup below the heading.
@@ -35,11 +38,12 @@ impl WebPage<'_> {
     /// # Errors
     /// The data cannot be written as JSON.
     pub(super) fn html(&self, data: &impl Serialize) -> serde_json::Result<String> {
-        let Self { title, introduction, main, style, script } = self;
+        let Self { language, title, introduction, main, style, script } = self;
+        let language = language.code();
         let title = text(title);
         let data = json(&serde_json::to_string(data)?);
         Ok(format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+            "<!doctype html>\n<html lang=\"{language}\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
              <title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{UPLOT_STYLE}\n{STYLE}{style}</style>\n\

@@ -8,6 +8,7 @@ use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::calibrate::CalibrationNotice;
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
+use footplate_core::track::Layout;
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 
@@ -122,8 +123,18 @@ impl Painter {
         Self { follows: true, ..Self::new(board) }
     }
 
-    /// Takes in what a calibration says.
-    pub(super) fn hear_calibration(&mut self, notice: &CalibrationNotice) {
+    /// Takes in what the calibration of a train says, and in which words that is said elsewhere.
+    pub(crate) fn hear_calibration(
+        &mut self,
+        layout: &Layout,
+        now: Timestamp,
+        train: TrainId,
+        notice: &CalibrationNotice,
+        said: &str,
+    ) {
+        if let CalibrationNotice::Mishap(mishap) = notice {
+            self.alarm(now, &Alarm::of_mishap(layout, train, mishap).said(said));
+        }
         self.calibration.get_or_insert_default().hear(notice);
     }
 

@@ -47,6 +47,8 @@ use crate::link::{LineTallies, SharedTallies};
 const LONGEST_BODY: usize = 4 << 10;
 /// The control loop looks for orders every few hundredths of a second; who gets no answer by then is told so.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
+/// What was answered last is on its way to a browser by then, however busy the machine is.
+const ANSWERS_LEAVE: Duration = Duration::from_millis(300);
 /// The port that is asked for unless another is named.
 const USUAL_PORT: u16 = 8417;
 
@@ -146,6 +148,13 @@ impl Dashboard {
             });
         })?;
         Ok(Self { board, line, url })
+    }
+}
+
+/// The program may end because of what somebody asked, such as an emergency stop: the answer leaves before it does.
+impl Drop for Dashboard {
+    fn drop(&mut self) {
+        thread::sleep(ANSWERS_LEAVE);
     }
 }
 
@@ -291,7 +300,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{archive_routes, odometry_routes};
+    use crate::commands::{archive_routes, odometry_routes, slide_routes};
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
@@ -299,7 +308,8 @@ mod tests {
         let shared =
             Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
         let layout = footplate_store::layout_named("track-a").expect("built in").layout;
-        let routes = own_routes(shared).and(archive_routes(None, &layout)).and(odometry_routes());
+        let routes =
+            own_routes(shared).and(archive_routes(None, &layout)).and(odometry_routes()).and(slide_routes());
         let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let described: BTreeSet<&str> =

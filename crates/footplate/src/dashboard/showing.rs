@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use footplate_core::control::Driver;
 use footplate_core::control::calibrate::{CalibrationNotice, Calibrator};
-use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 
 use super::alarm::Alarm;
@@ -14,6 +14,7 @@ use super::board::{Answer, Board};
 use super::painter::{Painter, TrainPassed};
 use super::picture::TrainTask;
 use super::server::Dashboard;
+use super::shadow::Shadow;
 use crate::clock::Stopwatch;
 
 /// A calibration is watched, not driven: twenty pictures a second are enough.
@@ -26,9 +27,7 @@ pub(crate) struct Showing {
     stopwatch: Stopwatch,
     painted: Duration,
     began: Timestamp,
-    layout: Layout,
-    /// A driver that drives nothing: it knows where the train of a calibration is.
-    shadow: Option<(TurnoutStates, Driver)>,
+    shadow: Shadow,
 }
 
 impl Showing {
@@ -40,8 +39,7 @@ impl Showing {
             stopwatch: Stopwatch::start(),
             painted: Duration::ZERO,
             began,
-            layout: layout.clone(),
-            shadow: None,
+            shadow: Shadow::new(layout),
         }
     }
 
@@ -73,10 +71,7 @@ impl Showing {
 
     /// Takes in what the calibration of a train says, and in which words that is said elsewhere.
     pub(crate) fn hear(&mut self, now: Timestamp, train: TrainId, notice: &CalibrationNotice, said: &str) {
-        if let CalibrationNotice::Mishap(mishap) = notice {
-            self.painter.alarm(now, &Alarm::of_mishap(&self.layout, train, mishap).said(said));
-        }
-        self.painter.hear_calibration(notice);
+        self.painter.hear_calibration(self.shadow.layout(), now, train, notice, said);
     }
 
     /// Shows the trains of a driver and what they are busy with, if it is time to.
@@ -92,17 +87,7 @@ impl Showing {
         if !self.is_due() {
             return;
         }
-        let (turnouts, train) = (calibrator.turnouts(), calibrator.locator().train());
-        // Of a train that was calibrated before nobody knows any more where it is.
-        let is_other = |driver: &Driver| driver.trains().any(|other| other != train);
-        if self.shadow.as_ref().is_none_or(|(known, driver)| known != turnouts || is_other(driver)) {
-            let driver = Driver::new(self.layout.clone(), turnouts.clone());
-            self.shadow = Some((turnouts.clone(), driver));
-        }
-        if let Some((_, driver)) = &mut self.shadow {
-            driver.add_located(calibrator.fit().model().clone(), calibrator.locator().clone());
-            self.painter.paint_alone(driver, &BTreeMap::new(), now, self.began);
-        }
+        self.painter.paint_alone(self.shadow.of(calibrator), &BTreeMap::new(), now, self.began);
     }
 
     fn is_due(&mut self) -> bool {

@@ -29,7 +29,7 @@ async function started(...commands) {
   return program;
 }
 
-const calibrating = (store, { budget = "2m", speed = 8 } = {}) => started("calibrate", "--link", `${LINK}&speed=${speed}`,
+const calibrating = (store, { budget = "2m", speed = 4 } = {}) => started("calibrate", "--link", `${LINK}&speed=${speed}`,
   "--layout", "track-a", "--train", "24", "--budget", budget, "--store", store, "--serve", "0", "--json");
 
 const get = async ({ url }, path) => (await fetch(url + path)).json();
@@ -66,14 +66,14 @@ test("a calibration says what it tries and why, and its table is what the progra
   await until(page, () => /most doubt away for its time: [\d.]+ scatters squared in \d+ s/.test(document.querySelector("#because").textContent));
   await until(page, () => /at step \d+: stops within \d+ mm, speed within [\d.]+ %/.test(document.querySelector("#expected").textContent));
   await until(page, () => document.querySelectorAll("#steps tr").length > 8);
-  for (const [place, count] of (await colours(page)).entries()) if (place < 2) assert.ok(count > 5, `chart ${place}: ${count} colours`);
-  assert.deepEqual(await findings(page), []);
-  await page.screenshot({ path: join(AT, "calibrating.png"), fullPage: true });
-
   // While it runs: what the page says of each step is the model that the program answers.
   const of = (steps) => steps.filter(({ uses, contacts }) => uses === "moves" || contacts > 0).map((one) => [String(one.step), one.approach,
     `${one.speed_mm_per_s.toFixed(1)} ± ${one.speed_half_mm_per_s.toFixed(1)}`, String(one.contacts), `${one.stop_mm.toFixed(0)} ± ${one.stop_half_mm.toFixed(0)}`]);
   await agree(page, async () => (await rows(page)).map((cells) => cells.slice(0, 5)), async () => of((await get(program, "api/trains/24/model")).steps));
+
+  for (const [place, count] of (await colours(page)).entries()) if (place < 2) assert.ok(count > 5, `chart ${place}: ${count} colours`);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "calibrating.png"), fullPage: true });
 
   // When it is over, what it printed is what a session that begins with its store shows: an interval is 1.96 standard deviations.
   assert.equal(await program.over, 0);
@@ -95,6 +95,16 @@ test("a calibration says what it tries and why, and its table is what the progra
   }
   // And what the store says of the train is there with the number of contacts behind it.
   await until(later.page, () => !document.querySelector("#of-store").hidden);
+  // The session of calibrating is walked again: its train goes round, and what is tried is said.
+  await later.page.goto(`${driving.url}#/recordings`);
+  const box = later.page.locator("#recordings tr", { hasText: "calibration" }).locator("input");
+  await box.check({ timeout: PATIENCE });
+  await until(later.page, () => document.querySelectorAll(".session").length === 1 && Number(document.querySelector("#time").max) > 100);
+  await later.page.locator("#time").focus();
+  for (let page = 0; page < 5; page++) await later.page.keyboard.press("PageUp");
+  await until(later.page, () => /^Train 24: \S+ ± \d+ mm, \d+ mm\/s; (speed at|stop from|short move)/.test(document.querySelector(".where").textContent));
+  assert.match(await text(later.page, ".said"), /circuit|speed at step|stop from step/);
+  await later.page.screenshot({ path: join(AT, "calibration-walked.png"), fullPage: true });
   assert.deepEqual(later.complaints, []);
   await later.page.close();
   await end(driving);

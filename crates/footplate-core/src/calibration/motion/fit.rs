@@ -139,7 +139,8 @@ impl MotionFit {
                 }
             }
         }
-        let solution = equations.solve();
+        // Nobody asks how the numbers of single trips are known.
+        let solution = equations.solve_for_first(columns.lasting);
         let Some(solution) = solution else { return };
         self.model.learn(&columns, &x, &solution, scale, trips, self.date);
     }

@@ -24,10 +24,12 @@ use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
+pub(in crate::commands) use self::told::line as calibration_line;
 use self::watcher::Watcher;
-use super::write_calibration;
+use super::{picture, write_calibration};
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ServedAt, Showing};
@@ -71,6 +73,7 @@ pub(super) struct Session<'a> {
     pub(super) serve: Option<&'a ServedAt>,
     pub(super) store: Option<&'a Path>,
     pub(super) out: Option<&'a Path>,
+    pub(super) plot: Option<&'a PictureFile>,
     pub(super) is_json: bool,
 }
 
@@ -185,6 +188,9 @@ impl Session<'_> {
             }
             if let Some(path) = self.out {
                 write_calibration(&file, path)?;
+            }
+            if let Some(plot) = self.plot {
+                plot.write(&picture::of_session(self.train, layout.name(), &accuracy))?;
             }
         }
         let figures =

@@ -13,8 +13,10 @@ use footplate_store::{Batch, EventKey, RecordingKey, Store, layout_named};
 use serde_json::{Value, json};
 
 use super::stopped_run::StoppedRun;
+use super::stops_picture::measured_stops;
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::plot::PictureFile;
 
 /// Beyond this many standard deviations from the other stops a reading is pointed out: one in 300 by chance.
 const REMARKABLE: f64 = 3.0;
@@ -27,7 +29,8 @@ const REMARKABLE: f64 = 3.0;
 #[command(after_help = "\
 Examples:
   footplate measure stop --store railway.db --train 24 --at C13+120mm
-  footplate measure stop --store railway.db --train 24 --at E12+1310mm --took 3.4s")]
+  footplate measure stop --store railway.db --train 24 --at E12+1310mm --took 3.4s
+  footplate measure stop --store railway.db --train 24 --at C13+120mm --plot stops.png")]
 pub(super) struct Arguments {
     /// The store of the session, or of the recordings that were imported.
     #[arg(long, value_name = "FILE")]
@@ -47,6 +50,9 @@ pub(super) struct Arguments {
     /// The recording that the stop is in, if not the last one of the train.
     #[arg(long, value_name = "N")]
     recording: Option<i64>,
+    /// Draw all stops that were measured of the train to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PictureFile>,
     /// Write JSON.
     #[arg(long)]
     json: bool,
@@ -80,6 +86,9 @@ impl Arguments {
         store.append(stopped.run.key, &[event], now())?;
         let after = known(&layout, &store, train, stopped.from());
         let key = last_event(&store, &stopped)?;
+        if let Some(plot) = &self.plot {
+            plot.write(&measured_stops(&layout, &store, train, stopped.from())?)?;
+        }
         let told = Told { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
         if self.json {
             writeln!(output, "{}", told.value())?;

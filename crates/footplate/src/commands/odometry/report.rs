@@ -2,6 +2,7 @@
 
 mod decimated;
 mod run_series;
+mod still;
 mod tables;
 mod wheel_speeds;
 
@@ -13,9 +14,11 @@ use footplate_store::write_whole;
 use serde::Serialize;
 
 use super::walked::Walked;
-use crate::commands::web_page::WebPage;
+use crate::commands::web_page::{Language, WebPage};
 pub(super) use run_series::RunSeries;
 use run_series::SeriesForm;
+pub(super) use still::still;
+pub(super) use wheel_speeds::WheelSpeeds;
 
 const CHARTS: &str = include_str!("../../../assets/odometry/odometry.js");
 const STYLE: &str = include_str!("../../../assets/odometry/odometry.css");
@@ -69,11 +72,16 @@ pub(super) fn page(walked: &Walked) -> serde_json::Result<String> {
         [only] => {
             // Where it was is no more than a nuisance to whoever gets the page.
             let name = Path::new(&only.file).file_name();
-            format!("Odometry of {}", name.map_or(only.file.as_str().into(), OsStr::to_string_lossy))
+            let of = walked.language.pick("Odometry of", "Odometrie von");
+            format!("{of} {}", name.map_or(only.file.as_str().into(), OsStr::to_string_lossy))
         }
-        several => format!("Odometry of {} recordings", several.len()),
+        several => match walked.language {
+            Language::English => format!("Odometry of {} recordings", several.len()),
+            Language::German => format!("Odometrie von {} Aufzeichnungen", several.len()),
+        },
     };
     let page = WebPage {
+        language: walked.language,
         title: &title,
         introduction: &tables::introduction(walked),
         main: &tables::main(walked, charted),

@@ -12,6 +12,7 @@ use footplate_store::odometry::{Preset, RunContext};
 use super::recording::OpenRecording;
 use super::report;
 use super::walked::Walked;
+use crate::commands::web_page::Language;
 
 /// Recordings that were sent to this process, so that two of one name are two files.
 static SENT: AtomicU32 = AtomicU32::new(0);
@@ -33,7 +34,7 @@ impl Drop for Passing {
 ///
 /// # Errors
 /// What is wrong with the recording, with its place.
-pub(crate) fn uploaded_page(name: &str, bytes: &[u8]) -> anyhow::Result<String> {
+pub(crate) fn uploaded_page(name: &str, bytes: &[u8], language: Language) -> anyhow::Result<String> {
     let name = Path::new(name).file_name().and_then(|name| name.to_str()).unwrap_or_default();
     if !(name.ends_with(".csv") || name.ends_with(".parquet")) {
         bail!("`{name}` should be a recording whose name ends with .csv or .parquet");
@@ -45,20 +46,20 @@ pub(crate) fn uploaded_page(name: &str, bytes: &[u8]) -> anyhow::Result<String> 
     let folder = Passing(folder);
     let file = folder.0.join(name);
     fs::File::create_new(&file)?.write_all(bytes)?;
-    walked_page(&file).map_err(|error| {
+    walked_page(&file, language).map_err(|error| {
         // Where it passed through is nobody's concern.
         let said = format!("{error:#}").replace(&file.display().to_string(), name);
         anyhow::Error::msg(said)
     })
 }
 
-fn walked_page(path: &Path) -> anyhow::Result<String> {
+fn walked_page(path: &Path, language: Language) -> anyhow::Result<String> {
     let vehicle = default_vehicle()?;
     let preset = Preset::Recommended;
     let recording = OpenRecording::open(path, false)?;
     let context = RunContext { vehicle: vehicle.vehicle, preset, score: recording.has_truth() };
     let mut charts_left = MOST_RUNS;
     let recordings = vec![recording.walk(&context, None, &mut charts_left)?];
-    let walked = Walked { vehicle: vehicle.name, preset, recordings, is_scored: context.score };
+    let walked = Walked { vehicle: vehicle.name, preset, recordings, language, is_scored: context.score };
     Ok(report::page(&walked)?)
 }

@@ -3,6 +3,7 @@
 use footplate_store::odometry::{OdometryScore, Preset, RunScores};
 
 use super::recording::WalkedRecording;
+use crate::commands::web_page::Language;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent): that it holds is promised for
 /// all but one period in ten thousand.
@@ -14,6 +15,8 @@ pub(super) struct Walked {
     pub(super) vehicle: String,
     pub(super) preset: Preset,
     pub(super) recordings: Vec<WalkedRecording>,
+    /// In which a page says it.
+    pub(super) language: Language,
     /// Whether a score was asked for; a page has one wherever the truth is known.
     pub(super) is_scored: bool,
 }

@@ -1,17 +1,20 @@
 //! A session walked again for those who want to see it: pictures as the dashboard showed them, and what happened.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use anyhow::bail;
-use footplate_core::control::{DriveNotice, Output};
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::control::{CalibrationNotice, Calibrator, DriveNotice, Driver, Output};
+use footplate_core::track::Layout;
+use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_layout};
 
 use super::session::read;
+use crate::commands::calibrate::{CalibrationBeginning, calibration_line};
 use crate::commands::demo::TourBeginning;
 use crate::commands::drive::{Conductor, DriveBeginning, Spoken};
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{Alarm, Board, LayoutPicture, Painter, TrainPassed};
+use crate::dashboard::{Alarm, Board, LayoutPicture, Painter, Shadow, TrainPassed};
 use crate::witness::{Input, Listener};
 
 /// Between two pictures, unless the session is so long that there would be too many of them.
@@ -19,54 +22,36 @@ const BETWEEN: TimeSpan = TimeSpan::from_ms(200);
 /// The most pictures of one machine: what a slider can be moved over, and a few megabytes.
 const MOST_PICTURES: i64 = 2_000;
 
-/// A machine whose trains can be looked at.
-trait Seen: Listener {
-    /// Shows where trains are.
-    fn show(&self, painter: &mut Painter, now: Timestamp);
-    /// What of a notice can be shown.
-    fn shown(notice: Self::Notice) -> Option<Shown>;
-}
-
+/// What of a notice can be shown.
 enum Shown {
     Line(String),
     Passed(TrainPassed),
     Alarm(Alarm),
+    Calibration(CalibrationNotice),
 }
 
-impl Seen for Conductor {
-    fn show(&self, painter: &mut Painter, now: Timestamp) {
-        Self::show(self, painter, now);
-    }
-
-    fn shown(notice: Spoken) -> Option<Shown> {
-        match notice {
-            Spoken::Line { text, .. } => Some(Shown::Line(text)),
-            Spoken::Passed(passed) => Some(Shown::Passed(passed)),
-            Spoken::Alarm(alarm) => Some(Shown::Alarm(alarm)),
-            _ => None,
-        }
+fn of_session(notice: Spoken) -> Option<Shown> {
+    match notice {
+        Spoken::Line { text, .. } => Some(Shown::Line(text)),
+        Spoken::Passed(passed) => Some(Shown::Passed(passed)),
+        Spoken::Alarm(alarm) => Some(Shown::Alarm(alarm)),
+        _ => None,
     }
 }
 
-impl Seen for footplate_core::control::Driver {
-    fn show(&self, painter: &mut Painter, now: Timestamp) {
-        painter.paint_alone(self, &BTreeMap::new(), now, Timestamp::ZERO);
-    }
-
-    fn shown(notice: DriveNotice) -> Option<Shown> {
-        match notice {
-            DriveNotice::Passed { train, passed, next } => {
-                Some(Shown::Passed(TrainPassed { train, passed, next }))
-            }
-            _ => None,
+fn of_driver(notice: &DriveNotice) -> Option<Shown> {
+    match *notice {
+        DriveNotice::Passed { train, passed, next } => {
+            Some(Shown::Passed(TrainPassed { train, passed, next }))
         }
+        _ => None,
     }
 }
 
 /// The pictures of a recording, as JSON: its layout, pictures, and what happened.
 ///
 /// # Errors
-/// The recording has no machine that drives, or this program cannot make it again.
+/// The recording has no machine that moves trains, or this program cannot make it again.
 pub(crate) fn pictures(store: &Store, recording: RecordingKey) -> anyhow::Result<String> {
     let mut walked = Walked::default();
     for machine in store.machines()?.iter().filter(|machine| machine.recording == recording) {
@@ -74,7 +59,8 @@ pub(crate) fn pictures(store: &Store, recording: RecordingKey) -> anyhow::Result
     }
     let Some(layout) = &walked.layout else {
         bail!(
-            "recording {recording} cannot be looked at: only sessions in which trains were driven have pictures of them"
+            "recording {recording} cannot be looked at: only sessions in which trains were driven or calibrated have \
+             pictures of them"
         );
     };
     Ok(format!(
@@ -87,6 +73,8 @@ pub(crate) fn pictures(store: &Store, recording: RecordingKey) -> anyhow::Result
 #[derive(Default)]
 struct Walked {
     layout: Option<String>,
+    /// The layout that a calibration was made on, to name places, and its train.
+    calibrated: Option<(Layout, TrainId)>,
     pictures: Vec<String>,
     happened: Vec<String>,
 }
@@ -97,18 +85,46 @@ impl Walked {
             DriveBeginning::KIND => {
                 let beginning: DriveBeginning = read(stored)?;
                 self.draws(beginning.layout())?;
-                self.tell(&mut beginning.conductor()?, trace);
+                let look = |machine: &Conductor, painter: &mut Painter, now| machine.show(painter, now);
+                self.tell(&mut beginning.conductor()?, trace, Painter::new, look, of_session);
             }
             TourBeginning::KIND => {
                 let beginning: TourBeginning = read(stored)?;
                 self.draws(&beginning.layout)?;
                 let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
-                self.tell(&mut beginning.driver(&layout), trace);
+                let look = |machine: &Driver, painter: &mut Painter, now| {
+                    painter.paint_alone(machine, &BTreeMap::new(), now, Timestamp::ZERO);
+                };
+                self.tell(&mut beginning.driver(&layout), trace, Painter::new, look, |notice| {
+                    of_driver(&notice)
+                });
             }
-            // A calibration looks for its train and has no picture of it.
+            CalibrationBeginning::KIND => {
+                let beginning: CalibrationBeginning = read(stored)?;
+                self.draws(&beginning.layout)?;
+                let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
+                let mut shadow = Shadow::new(&layout);
+                let look = |machine: &Calibrator<'_>, painter: &mut Painter, now| {
+                    painter.paint_alone(shadow.of(machine), &BTreeMap::new(), now, Timestamp::ZERO);
+                };
+                let mut calibrator = beginning.calibrator(&layout);
+                let heard = |notice| Some(Shown::Calibration(notice));
+                self.calibrated = Some((layout.clone(), calibrator.locator().train()));
+                self.tell(&mut calibrator, trace, Painter::following, look, heard);
+            }
             _ => {}
         }
         Ok(())
+    }
+
+    /// Takes in what a calibration said.
+    fn hear(&self, board: &Board, painter: &mut Painter, at: Timestamp, notice: &CalibrationNotice) {
+        let Some((layout, train)) = &self.calibrated else { return };
+        let line = calibration_line(layout, notice);
+        painter.hear_calibration(layout, at, *train, notice, line.as_deref().unwrap_or_default());
+        if let Some(line) = line {
+            board.say((at - Timestamp::ZERO).as_s(), &line);
+        }
     }
 
     fn draws(&mut self, layout: &str) -> anyhow::Result<()> {
@@ -118,34 +134,42 @@ impl Walked {
     }
 
     /// Tells a machine what it was told then, and looks at it between.
-    fn tell<M: Seen>(&mut self, machine: &mut M, trace: &[Traced]) {
+    fn tell<M: Listener>(
+        &mut self,
+        machine: &mut M,
+        trace: &[Traced],
+        paints: impl Fn(&Arc<Board>) -> Painter,
+        mut look: impl FnMut(&M, &mut Painter, Timestamp),
+        shown: impl Fn(M::Notice) -> Option<Shown>,
+    ) {
         let told = || trace.iter().filter(|row| row.side == Side::Input);
         let (Some(first), Some(last)) = (told().next(), told().next_back()) else { return };
         let even = TimeSpan::from_ns((last.time - first.time).as_ns() / MOST_PICTURES);
         let between = BETWEEN.max(even);
         let board = Board::new(0);
-        let mut painter = Painter::new(&board);
+        let mut painter = paints(&board);
         let mut next = first.time;
         for row in told() {
             // A row that this program cannot read ends what can be looked at.
             let Ok(input) = Input::read(&row.kind, &row.text) else { break };
             while next < row.time {
-                machine.show(&mut painter, next);
+                look(machine, &mut painter, next);
                 self.pictures.push(board.pictures().borrow().to_string());
                 next += between;
             }
             machine.handle_input(row.time, &input);
             while let Some(output) = machine.poll_output() {
                 let Output::Notice(notice) = output else { continue };
-                match M::shown(notice) {
+                match shown(notice) {
                     Some(Shown::Line(text)) => board.say((row.time - Timestamp::ZERO).as_s(), &text),
                     Some(Shown::Passed(passed)) => painter.passed(passed),
                     Some(Shown::Alarm(alarm)) => painter.alarm(row.time, &alarm),
+                    Some(Shown::Calibration(notice)) => self.hear(&board, &mut painter, row.time, &notice),
                     None => {}
                 }
             }
         }
-        machine.show(&mut painter, last.time);
+        look(machine, &mut painter, last.time);
         self.pictures.push(board.pictures().borrow().to_string());
         let (happened, _) = board.happened_from(0);
         self.happened.extend(

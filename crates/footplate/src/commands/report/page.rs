@@ -2,8 +2,8 @@
 
 use super::data::{ReportData, TrainReport};
 use super::tables;
-use crate::commands::web_page::WebPage;
 use crate::commands::web_page::markup::{Table, text};
+use crate::commands::web_page::{Language, WebPage};
 
 const CHARTS: &str = include_str!("../../../assets/report/trains.js");
 
@@ -21,7 +21,14 @@ pub(super) fn page(data: &ReportData) -> serde_json::Result<String> {
     main.push_str("<section aria-labelledby=\"recordings\"><h2 id=\"recordings\">Recordings</h2>\n");
     main.push_str(&tables::polling(&data.polling));
     main.push_str("</section>\n");
-    let page = WebPage { title: &title, introduction: INTRODUCTION, main: &main, style: "", script: CHARTS };
+    let page = WebPage {
+        language: Language::English,
+        title: &title,
+        introduction: INTRODUCTION,
+        main: &main,
+        style: "",
+        script: CHARTS,
+    };
     page.html(data)
 }
 

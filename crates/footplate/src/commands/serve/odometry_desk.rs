@@ -10,14 +10,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Path, State};
+use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use serde::Deserialize;
 use serde_json::json;
 
 use super::desk::Desk;
 use crate::commands::odometry::uploaded_page;
+use crate::commands::web_page::Language;
 use crate::dashboard::Routes;
 
 /// The largest recording that is taken: an hour of two tachometers at 20 Hz is four megabytes as text.
@@ -53,11 +55,23 @@ pub(crate) fn odometry_routes() -> Routes {
     )
 }
 
-async fn walk(State(desk): State<OdometryDesk>, Path(name): Path<String>, bytes: Bytes) -> Response {
+/// How the page shall be written.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Wished {
+    language: String,
+}
+
+async fn walk(
+    State(desk): State<OdometryDesk>,
+    Path(name): Path<String>,
+    Query(wished): Query<Wished>,
+    bytes: Bytes,
+) -> Response {
     let pages = Arc::clone(&desk.pages);
     desk.desk
         .answer(move || {
-            let page = uploaded_page(&name, &bytes)?;
+            let page = uploaded_page(&name, &bytes, Language::of_code(&wished.language))?;
             let mut pages = pages.lock().unwrap_or_else(PoisonError::into_inner);
             let number = pages.next;
             pages.next += 1;

@@ -4,7 +4,7 @@ use footplate_core::control::calibrate::{CalibrationNotice, Done, Experiment, Mi
 use footplate_core::track::Layout;
 
 /// A line that is worth keeping; nothing for what only moves a bar.
-pub(super) fn line(layout: &Layout, notice: &CalibrationNotice) -> Option<String> {
+pub(in crate::commands) fn line(layout: &Layout, notice: &CalibrationNotice) -> Option<String> {
     Some(match notice {
         CalibrationNotice::Found { node, step } => {
             format!("found: it passed {} at step {step}", layout.node_name(*node))

@@ -64,6 +64,18 @@ pub(super) struct SeriesForm {
     marks: BTreeMap<&'static str, Vec<(f64, f64, &'static str)>>,
 }
 
+impl SeriesForm {
+    /// The values of a line, one a time, if it has any.
+    pub(super) fn line(&self, name: &str) -> Option<&[Option<f64>]> {
+        self.lines.get(name).map(Vec::as_slice)
+    }
+
+    /// Since the first period (s).
+    pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        self.time_s.iter().copied()
+    }
+}
+
 impl RunSeries {
     /// A run that has not begun, for lines of at most so many points.
     pub(in crate::commands::odometry) fn new(vehicle: &Vehicle, most_points: usize) -> Self {

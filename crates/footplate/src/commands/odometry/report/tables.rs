@@ -5,35 +5,66 @@ use footplate_store::odometry::{OdometryScore, RunSummary};
 use super::super::recording::{WalkedRecording, WalkedRun};
 use super::super::walked::{Walked, leaves_bounds};
 use super::MOST_RUNS;
+use crate::commands::web_page::Language;
 use crate::commands::web_page::markup::{Table, text};
 use crate::counted::counted;
 
-/// The charts from top to bottom: what each is called in the script, its heading, and what it shows.
-const CHARTS: [(&str, &str, &str); 5] = [
-    (
-        "speed",
-        "Speed",
-        "The estimate, the interval in which the speed lies, and the true speed where it is known.",
-    ),
-    (
-        "wheels",
-        "Wheels",
-        "How fast each wheel turned by its pulses, as the mean of five periods, beside the estimate. Shaded: where a \
-         wheelset is said to slip, to slide or not to be believed, the first in the upper half, the second in the lower.",
-    ),
-    ("shares", "Shares and mode", "What each source had in the estimate. The strip at the top is the mode."),
-    (
-        "distance",
-        "Distance",
-        "With the truth: the distance estimated less the true one, and the interval less the true distance, which holds \
-         nought as long as the bounds are right. Without: how wide the interval is, and by how much at most the distance \
-         is over- and under-read.",
-    ),
-    (
-        "acceleration",
-        "Acceleration",
-        "The estimate, what an accelerometer said, and the command: −100 % full brake, 100 % full traction.",
-    ),
+/// A chart: what it is called in the script, and its heading and what it shows in both languages.
+struct Chart {
+    kind: &'static str,
+    heading: [&'static str; 2],
+    caption: [&'static str; 2],
+}
+
+/// The charts from top to bottom.
+const CHARTS: [Chart; 5] = [
+    Chart {
+        kind: "speed",
+        heading: ["Speed", "Tempo"],
+        caption: [
+            "The estimate, the interval in which the speed lies, and the true speed where it is known.",
+            "Die Schätzung, das Intervall, in dem das Tempo liegt, und das wahre Tempo, wo es bekannt ist.",
+        ],
+    },
+    Chart {
+        kind: "wheels",
+        heading: ["Wheels", "Räder"],
+        caption: [
+            "How fast each wheel turned by its pulses, as the mean of five periods, beside the estimate. Shaded: where a \
+             wheelset is said to slip, to slide or not to be believed, the first in the upper half, the second in the lower.",
+            "Wie schnell sich jedes Rad nach seinen Impulsen drehte, als Mittel von fünf Perioden, neben der Schätzung. \
+             Getönt: wo ein Radsatz schleudern oder gleiten soll oder nicht geglaubt wird, der erste in der oberen Hälfte, der \
+             zweite in der unteren.",
+        ],
+    },
+    Chart {
+        kind: "shares",
+        heading: ["Shares and mode", "Anteile und Betriebsart"],
+        caption: [
+            "What each source had in the estimate. The strip at the top is the mode.",
+            "Was jede Quelle zur Schätzung beitrug. Der Streifen oben ist die Betriebsart.",
+        ],
+    },
+    Chart {
+        kind: "distance",
+        heading: ["Distance", "Weg"],
+        caption: [
+            "With the truth: the distance estimated less the true one, and the interval less the true distance, which holds \
+             nought as long as the bounds are right. Without: how wide the interval is, and by how much at most the distance \
+             is over- and under-read.",
+            "Mit der Wahrheit: der geschätzte Weg weniger dem wahren und das Intervall weniger dem wahren Weg, in dem die Null \
+             liegt, solange die Grenzen stimmen. Ohne: wie breit das Intervall ist, und um wie viel der Weg höchstens zu lang \
+             und zu kurz gelesen wird.",
+        ],
+    },
+    Chart {
+        kind: "acceleration",
+        heading: ["Acceleration", "Beschleunigung"],
+        caption: [
+            "The estimate, what an accelerometer said, and the command: −100 % full brake, 100 % full traction.",
+            "Die Schätzung, was ein Beschleunigungsmesser sagte, und der Befehl: −100 % volle Bremse, 100 % volle Zugkraft.",
+        ],
+    },
 ];
 
 /// What a run is called where there may be several recordings.
@@ -53,26 +84,40 @@ pub(super) fn introduction(walked: &Walked) -> String {
         .flat_map(|recording| &recording.runs)
         .map(|run| run.odometry.summary().periods)
         .sum();
-    let mut html = format!(
-        "<p>Vehicle: {}. Preset: {}. {}, {}.</p>\n",
-        text(&walked.vehicle),
-        walked.preset.key(),
-        counted(runs, "run"),
-        counted(periods, "period"),
-    );
+    let (vehicle, preset) = (text(&walked.vehicle), walked.preset.key());
+    let mut html = match walked.language {
+        Language::English => {
+            let (runs, periods) = (counted(runs, "run"), counted(periods, "period"));
+            format!("<p>Vehicle: {vehicle}. Preset: {preset}. {runs}, {periods}.</p>\n")
+        }
+        Language::German => {
+            let (one_run, one_period) = (
+                if runs == 1 { "Fahrt" } else { "Fahrten" },
+                if periods == 1 { "Periode" } else { "Perioden" },
+            );
+            format!(
+                "<p>Fahrzeug: {vehicle}. Voreinstellung: {preset}. {runs} {one_run}, {periods} {one_period}.</p>\n"
+            )
+        }
+    };
     if let Some(scores) = walked.known_scores() {
-        html.push_str(&verdict(&scores.preset(walked.preset)));
+        let score = scores.preset(walked.preset);
+        html.push_str(&match walked.language {
+            Language::English => verdict(&score),
+            Language::German => german_verdict(&score),
+        });
     }
     html
 }
 
+/// Whether the bounds held.
+pub(super) fn held(score: &OdometryScore) -> &'static str {
+    if leaves_bounds(score) { "the truth left the bounds" } else { "the truth stayed within the bounds" }
+}
+
 /// A score in words.
 fn verdict(score: &OdometryScore) -> String {
-    let (class, word) = if leaves_bounds(score) {
-        ("red", "the truth left the bounds")
-    } else {
-        ("green", "the truth stayed within the bounds")
-    };
+    let (class, word) = (if leaves_bounds(score) { "red" } else { "green" }, held(score));
     let mut words = Vec::new();
     if let (Some(rms), Some(worst)) = (score.speed_rms_m_s, score.speed_max_m_s) {
         words.push(format!(
@@ -99,6 +144,39 @@ fn verdict(score: &OdometryScore) -> String {
     format!("<p class=\"verdict\"><span class=\"state {class}\">{word}</span> {}</p>\n", words.join(" "))
 }
 
+/// The same in German.
+fn german_verdict(score: &OdometryScore) -> String {
+    let (class, word) = if leaves_bounds(score) {
+        ("red", "die Wahrheit hat die Grenzen verlassen")
+    } else {
+        ("green", "die Wahrheit blieb in den Grenzen")
+    };
+    let mut words = Vec::new();
+    if let (Some(rms), Some(worst)) = (score.speed_rms_m_s, score.speed_max_m_s) {
+        words.push(format!(
+            "Das Tempo lag um {rms:.3} m/s daneben (quadratisches Mittel), höchstens um {worst:.2} m/s."
+        ));
+    }
+    if let (Some(inside), Some(width)) = (score.speed_inside_pct, score.speed_width_mean_m_s) {
+        words.push(format!(
+            "Es lag in {} aller Perioden in seinen Grenzen; sie waren im Mittel {width:.2} m/s auseinander.",
+            share(inside)
+        ));
+    }
+    if let Some(end) = score.distance_end_m {
+        let way = if end < 0.0 { "kurz" } else { "lang" };
+        let part = score.distance_end_pct.map_or_else(String::new, |pct| format!(" ({:.2} %)", pct.abs()));
+        words.push(format!("Am Ende war der Weg {:.2} m{part} zu {way}.", end.abs()));
+    }
+    if let (Some(inside), Some(width)) = (score.distance_inside_pct, score.distance_width_end_m) {
+        words.push(format!(
+            "Er lag in {} aller Perioden in seinen Grenzen; am Ende waren sie {width:.1} m auseinander.",
+            share(inside)
+        ));
+    }
+    format!("<p class=\"verdict\"><span class=\"state {class}\">{word}</span> {}</p>\n", words.join(" "))
+}
+
 /// Per cent, of which 100 is said only if it is all.
 fn share(pct: f64) -> String {
     if pct >= 100.0 { "100 %".to_owned() } else { format!("{:.2} %", (pct * 100.0).floor() / 100.0) }
@@ -106,24 +184,56 @@ fn share(pct: f64) -> String {
 
 /// The charts' places and the tables.
 pub(super) fn main(walked: &Walked, charted: usize) -> String {
-    let mut html = String::from(
-        "<section aria-label=\"Charts\">\n<p class=\"note\">Drag over a chart to zoom into a stretch of time on all of \
-         them, double-click to see all again. With a chart in focus, arrow keys move along the values, plus and minus \
-         zoom, Escape shows all.</p>\n<p class=\"pick\" id=\"pick\" hidden><label>Run <select></select></label></p>\n",
+    let language = walked.language;
+    let (charts, zooms, run) = match language {
+        Language::English => (
+            "Charts",
+            "Drag over a chart to zoom into a stretch of time on all of them, double-click to see all again. With a chart in \
+             focus, arrow keys move along the values, plus and minus zoom, Escape shows all.",
+            "Run",
+        ),
+        Language::German => (
+            "Diagramme",
+            "Über ein Diagramm ziehen vergrößert ein Stück Zeit auf allen, ein Doppelklick zeigt wieder alles. In einem \
+             gewählten Diagramm gehen Pfeiltasten die Werte entlang, Plus und Minus vergrößern, Escape zeigt alles.",
+            "Fahrt",
+        ),
+    };
+    let mut html = format!(
+        "<section aria-label=\"{charts}\">\n<p class=\"note\">{zooms}</p>\n<p class=\"pick\" id=\"pick\" hidden><label>{run} \
+         <select></select></label></p>\n"
     );
     let runs: usize = walked.recordings.iter().map(|recording| recording.runs.len()).sum();
     if charted < runs {
-        html.push_str(&format!(
-            "<p class=\"note\">The first {MOST_RUNS} of {runs} runs have charts; the table below has all.</p>\n"
-        ));
+        let said = match language {
+            Language::English => {
+                format!("The first {MOST_RUNS} of {runs} runs have charts; the table below has all.")
+            }
+            Language::German => {
+                format!(
+                    "Die ersten {MOST_RUNS} von {runs} Fahrten haben Diagramme; die Tabelle unten hat alle."
+                )
+            }
+        };
+        html.push_str(&format!("<p class=\"note\">{said}</p>\n"));
     }
-    for (kind, heading, caption) in CHARTS {
+    let no_script = language.pick(
+        "This chart needs JavaScript; the tables do without.",
+        "Dieses Diagramm braucht JavaScript; die Tabellen nicht.",
+    );
+    for Chart { kind, heading: [heading, german_heading], caption: [caption, german_caption] } in CHARTS {
+        let (heading, caption) =
+            (language.pick(heading, german_heading), language.pick(caption, german_caption));
         html.push_str(&format!(
             "<h2 id=\"{kind}\">{heading}</h2>\n<figure data-chart=\"{kind}\" aria-labelledby=\"{kind}\"><figcaption>{caption}\
-             </figcaption><noscript><p>This chart needs JavaScript; the tables do without.</p></noscript></figure>\n"
+             </figcaption><noscript><p>{no_script}</p></noscript></figure>\n"
         ));
     }
-    html.push_str("<div id=\"marks\"></div>\n</section>\n<section aria-labelledby=\"runs\">\n<h2 id=\"runs\">Runs</h2>\n");
+    html.push_str(
+        "<div id=\"marks\"></div>\n</section>\n<section aria-labelledby=\"runs\">\n<h2 id=\"runs\">",
+    );
+    html.push_str(language.pick("Runs", "Fahrten"));
+    html.push_str("</h2>\n");
     html.push_str(&runs_table(walked));
     html.push_str(&score_table(walked));
     html.push_str("</section>\n");
@@ -153,7 +263,25 @@ fn runs_table(walked: &Walked) -> String {
         "degraded %",
     ];
     const NUMBERS: &[bool] = &[false, true, true, true, true, true, true, true, true, true, true];
-    let mut table = Table::new("Distance, and the share of periods in each mode", &columns, NUMBERS);
+    let german = [
+        "Fahrt",
+        "Dauer s",
+        "Weg m",
+        "mindestens m",
+        "höchstens m",
+        "Höchsttempo m/s",
+        "normal %",
+        "einer gleitet %",
+        "Korrektur %",
+        "mehrdeutig %",
+        "beeinträchtigt %",
+    ];
+    let mut table = match walked.language {
+        Language::English => Table::new("Distance, and the share of periods in each mode", &columns, NUMBERS),
+        Language::German => {
+            Table::new("Weg, und der Anteil der Perioden in jeder Betriebsart", &german, NUMBERS)
+        }
+    };
     for (name, run) in each_run(walked) {
         let summary = run.odometry.summary();
         let RunSummary { modes, top_speed, .. } = summary;
@@ -194,9 +322,27 @@ fn score_table(walked: &Walked) -> String {
         "noticed after s",
     ];
     const NUMBERS: &[bool] = &[false, false, true, true, true, true, true, true, true];
-    let mut table = Table::new("Against the truth", &columns, NUMBERS);
+    let german = [
+        "Fahrt",
+        "Grenzen",
+        "Tempofehler m/s",
+        "höchstens m/s",
+        "Tempo darin %",
+        "Wegfehler m",
+        "vom Weg %",
+        "Weg darin %",
+        "bemerkt nach s",
+    ];
+    let mut table = match walked.language {
+        Language::English => Table::new("Against the truth", &columns, NUMBERS),
+        Language::German => Table::new("Gegen die Wahrheit", &german, NUMBERS),
+    };
     for (name, score) in scored {
-        let (class, word) = if leaves_bounds(&score) { ("red", "left") } else { ("green", "held") };
+        let (class, word) = if leaves_bounds(&score) {
+            ("red", walked.language.pick("left", "verlassen"))
+        } else {
+            ("green", walked.language.pick("held", "gehalten"))
+        };
         let mut cells = vec![text(&name), format!("<span class=\"state {class}\">{word}</span>")];
         cells.extend([
             decimals(score.speed_rms_m_s, 3),

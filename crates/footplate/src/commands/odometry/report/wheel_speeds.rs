@@ -9,7 +9,7 @@ const PERIODS: usize = 5;
 
 /// How fast both wheels turned, period by period.
 #[derive(Debug, Clone)]
-pub(super) struct WheelSpeeds {
+pub(in crate::commands::odometry) struct WheelSpeeds {
     counter: WayCounter,
     wheels: [RecentWay; 2],
 }
@@ -24,12 +24,12 @@ struct RecentWay {
 }
 
 impl WheelSpeeds {
-    pub(super) fn new(vehicle: &Vehicle) -> Self {
+    pub(in crate::commands::odometry) fn new(vehicle: &Vehicle) -> Self {
         Self { counter: WayCounter::new(vehicle), wheels: Default::default() }
     }
 
     /// The mean speed of each wheel over this period and those before it (m/s); NaN where it was not counted.
-    pub(super) fn see(&mut self, period: &Period) -> [f64; 2] {
+    pub(in crate::commands::odometry) fn see(&mut self, period: &Period) -> [f64; 2] {
         let counted = self.counter.count(period);
         let Some(span) = counted.span else { return [f64::NAN; 2] };
         let mut speeds = [f64::NAN; 2];

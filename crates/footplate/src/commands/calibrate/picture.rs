@@ -1,0 +1,88 @@
+//! What is known of a train, step by step, as a picture: speeds and ways to rest with what is not known of them.
+
+use footplate_core::control::calibrate::StepAccuracy;
+use footplate_core::{Approach, TrainId};
+use footplate_store::{CalibrationFile, TrainForm};
+
+use crate::commands::plot::{HALF_95, Ink, Layer, Panel, Picture, Shape};
+
+/// Points of both sides of a step stand beside each other.
+const APART: f64 = 0.09;
+
+/// A value at a step, and half its 95 % interval.
+#[derive(Debug, Clone, Copy)]
+struct AtStep {
+    step: u8,
+    approach: Approach,
+    value: f64,
+    half: f64,
+}
+
+/// What a calibration from recordings says of a train.
+pub(super) fn of_file(file: &CalibrationFile, train: &TrainForm) -> Picture {
+    let speeds = train.speeds.iter().map(|form| AtStep {
+        step: form.step.get(),
+        approach: form.approach,
+        value: form.speed.value,
+        half: HALF_95 * form.speed.uncertainty,
+    });
+    let mut panels = vec![panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>())];
+    if let Some(stops) = &train.stops {
+        let ways = stops.steps.iter().map(|form| AtStep {
+            step: form.step.get(),
+            approach: Approach::Unknown,
+            value: form.distance.value,
+            half: HALF_95 * form.distance.uncertainty,
+        });
+        panels.push(panel("way to rest (mm)", &ways.collect::<Vec<_>>()));
+    }
+    picture(train.train, &file.layout, "from recordings; bars are 95 % of what is not known", panels)
+}
+
+/// What a calibration of a driven train says.
+pub(super) fn of_session(train: TrainId, layout: &str, accuracy: &[StepAccuracy]) -> Picture {
+    let speeds = accuracy.iter().map(|line| AtStep {
+        step: line.step.get(),
+        approach: line.approach,
+        value: line.speed.value.as_mm_per_s(),
+        half: HALF_95 * line.speed.uncertainty.as_mm_per_s(),
+    });
+    let ways = accuracy.iter().map(|line| AtStep {
+        step: line.step.get(),
+        approach: line.approach,
+        value: line.stop.distance.as_mm(),
+        half: line.stop_within().as_mm(),
+    });
+    let panels = vec![
+        panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>()),
+        panel("way to rest (mm)", &ways.collect::<Vec<_>>()),
+    ];
+    picture(
+        train,
+        layout,
+        "bars: 95 % of what is not known of speeds, and in which 95 of 100 stops end",
+        panels,
+    )
+}
+
+fn picture(train: TrainId, layout: &str, subtitle: &str, mut panels: Vec<Panel>) -> Picture {
+    if let Some(last) = panels.last_mut() {
+        "throttle step".clone_into(&mut last.x);
+    }
+    Picture { title: format!("Train {train} on {layout}"), subtitle: subtitle.to_owned(), panels }
+}
+
+fn panel(y: &str, all: &[AtStep]) -> Panel {
+    let sides = [
+        ("step reached from below", Ink::First, Approach::Below, -APART),
+        ("step reached from above", Ink::Second, Approach::Above, APART),
+        ("side not recorded", Ink::Third, Approach::Unknown, 0.0),
+    ];
+    let layer = |(label, ink, side, aside): (&str, Ink, Approach, f64)| {
+        let own = all.iter().filter(|at| at.approach == side);
+        let points: Vec<_> = own.map(|at| (f64::from(at.step) + aside, at.value, at.half)).collect();
+        (!points.is_empty()).then(|| Layer::new(label, ink, Shape::Points(points)))
+    };
+    let layers = sides.into_iter().filter_map(layer).collect();
+    Panel { y: y.to_owned(), from_nought: true, layers, ..Panel::default() }
+}

@@ -1,0 +1,84 @@
+//! A run as a picture: speed with its bounds and wheels, and how far off the distance is.
+
+use std::path::Path;
+
+use super::run_series::SeriesForm;
+use super::{MOST_POINTS, Walked, tables};
+use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape};
+
+/// The first run of the first recording; nothing if there is none.
+pub(in crate::commands::odometry) fn still(walked: &Walked) -> Option<Picture> {
+    let recording = walked.recordings.first()?;
+    let run = recording.runs.iter().find(|run| run.series.is_some())?;
+    let form = run.series.as_ref()?.form(MOST_POINTS);
+    let file = Path::new(&recording.file)
+        .file_name()
+        .map_or_else(|| recording.file.clone(), |name| name.display().to_string());
+    let runs = recording.runs.len();
+    let which = if runs > 1 { format!(", {} of {runs} runs", run.name) } else { String::new() };
+    let mut subtitle = format!("{}, preset {}", walked.vehicle, walked.preset.key());
+    if let Some(score) =
+        run.odometry.scores().map(|scores| scores.preset(walked.preset)).filter(|score| score.scored > 0)
+    {
+        subtitle.push_str("; ");
+        subtitle.push_str(tables::held(&score));
+    }
+    Some(Picture {
+        title: format!("Odometry of {file}{which}"),
+        subtitle,
+        panels: vec![speed(&form), distance(&form)],
+    })
+}
+
+fn speed(form: &SeriesForm) -> Panel {
+    let mut layers = Vec::new();
+    if let Some(band) = band(form, "speed_low_m_s", "speed_high_m_s") {
+        layers.push(Layer::new("bounds", Ink::First, band));
+    }
+    let lines = [
+        ("wheel_1_m_s", "wheelset 1", Ink::Second),
+        ("wheel_2_m_s", "wheelset 2", Ink::Third),
+        ("speed_m_s", "estimate", Ink::First),
+    ];
+    for (line, label, ink) in lines {
+        layers.extend(points(form, line).map(|points| Layer::new(label, ink, Shape::Line(points))));
+    }
+    layers.extend(
+        points(form, "true_speed_m_s").map(|points| Layer::new("truth", Ink::Plain, Shape::Dashed(points))),
+    );
+    Panel { y: "speed (m/s)".to_owned(), height: Some(3), from_nought: true, layers, ..Panel::default() }
+}
+
+/// Against the truth where it is known, or else how wide the interval is.
+fn distance(form: &SeriesForm) -> Panel {
+    let x = "time since the first period (s)".to_owned();
+    let (y, layers) = match (band(form, "error_low_m", "error_high_m"), points(form, "error_m")) {
+        (Some(bounds), Some(error)) => (
+            "distance beyond the truth (m)",
+            vec![
+                Layer::new("bounds", Ink::First, bounds),
+                Layer::new("estimate", Ink::First, Shape::Line(error)),
+            ],
+        ),
+        _ => {
+            let lines = [
+                ("width_m", "width of the interval", Ink::First),
+                ("over_m", "over-read by at most", Ink::Second),
+                ("under_m", "under-read by at most", Ink::Third),
+            ];
+            let layer = |(line, label, ink)| Some(Layer::new(label, ink, Shape::Line(points(form, line)?)));
+            ("distance (m)", lines.into_iter().filter_map(layer).collect())
+        }
+    };
+    Panel { x, y: y.to_owned(), height: Some(2), from_nought: true, layers }
+}
+
+fn points(form: &SeriesForm, line: &str) -> Option<Vec<(f64, f64)>> {
+    let values = form.line(line)?;
+    Some(form.times().zip(values).map(|(time, value)| (time, value.unwrap_or(f64::NAN))).collect())
+}
+
+fn band(form: &SeriesForm, low: &str, high: &str) -> Option<Shape> {
+    let both = form.times().zip(form.line(low)?.iter().zip(form.line(high)?));
+    Some(Shape::Band(both.filter_map(|(time, (low, high))| Some((time, (*low)?, (*high)?))).collect()))
+}

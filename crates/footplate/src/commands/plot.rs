@@ -1,0 +1,11 @@
+//! Pictures of curves for `--plot`: what they show, drawn the same as SVG and PNG.
+
+mod drawing;
+mod file;
+mod picture;
+
+pub(super) use file::PictureFile;
+pub(super) use picture::{Ink, Layer, Panel, Picture, Shape};
+
+/// Half a 95 % interval is so many standard deviations.
+pub(super) const HALF_95: f64 = 1.959_964;

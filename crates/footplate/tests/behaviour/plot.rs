@@ -1,0 +1,127 @@
+//! `--plot` draws what a command found, as SVG or PNG by the ending of the file, with units on its axes and a legend.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::program::{Run, footplate};
+
+const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
+/// What every file of pixels begins with (PNG specification, third edition, 5.2).
+const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("plot").join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn drawn(arguments: &[&str], picture: &Path) -> Run {
+    footplate(&[arguments, &["--plot", picture.to_str().unwrap()]].concat())
+}
+
+/// All letters of a picture.
+fn words(picture: &Path) -> String {
+    let svg = fs::read_to_string(picture).unwrap();
+    let texts =
+        svg.split("<text ").skip(1).filter_map(|rest| Some(rest.split_once('>')?.1.split_once("</text>")?.0));
+    texts.map(str::trim).collect::<Vec<_>>().join("\n")
+}
+
+fn says(picture: &Path, expected: &[&str]) {
+    let words = words(picture);
+    for word in expected {
+        assert!(words.lines().any(|line| line.contains(word)), "`{word}` in {words}");
+    }
+}
+
+#[test]
+fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
+    let folder = folder("odometry");
+    let recording = format!("{TESTDATA}/tachometer/plain.csv");
+    let svg = folder.join("run.svg");
+    assert_eq!(drawn(&["odometry", &recording], &svg).status, 0);
+    let expected = [
+        "Odometry of plain.csv",
+        "speed (m/s)",
+        "time since the first period (s)",
+        "bounds",
+        "truth",
+        "wheelset 2",
+    ];
+    says(&svg, &expected);
+    let png = folder.join("run.png");
+    assert_eq!(drawn(&["odometry", &recording], &png).status, 0);
+    assert_eq!(fs::read(&png).unwrap()[..8], PNG_SIGNATURE);
+    let run = drawn(&["odometry", &recording], &folder.join("run.gif"));
+    assert_eq!(run.status, 2);
+    assert!(run.errors.contains("should end with .svg or .png"), "{}", run.errors);
+}
+
+#[test]
+fn speeds_and_stops_are_drawn_by_step() {
+    let folder = folder("calibrate");
+    let log = |kind| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_{kind}.csv");
+    let (run, stop) = (log("run"), log("stop"));
+    let svg = folder.join("train.svg");
+    let done = drawn(&["calibrate", "--from", &run, &stop, "--layout", "track-a"], &svg);
+    assert_eq!(done.status, 0, "{}", done.errors);
+    says(
+        &svg,
+        &["Train 24 on track-a", "steady speed (mm/s)", "way to rest (mm)", "throttle step", "from below"],
+    );
+    // Two trains are two pictures.
+    let other = format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train74_run.csv");
+    let done = drawn(&["calibrate", "--from", &run, &other, "--layout", "track-a"], &folder.join("two.svg"));
+    assert_eq!(done.status, 2);
+    assert!(done.errors.contains("choose one with --train"), "{}", done.errors);
+    // A train that is driven is drawn with what its session reached.
+    let svg = folder.join("session.svg");
+    let session = [
+        "calibrate",
+        "--link",
+        "sim:track-a?seed=7",
+        "--layout",
+        "track-a",
+        "--train",
+        "24",
+        "--budget",
+        "90s",
+    ];
+    let done = drawn(&session, &svg);
+    assert_eq!(done.status, 0, "{}", done.errors);
+    says(&svg, &["Train 24 on track-a", "in which 95 of 100 stops end", "from above"]);
+}
+
+#[test]
+fn stops_measured_by_hand_are_drawn_with_their_law() {
+    let folder = folder("measure");
+    let store = folder.join("railway.db");
+    let log = |kind| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_{kind}.csv");
+    let from = [
+        "calibrate",
+        "--from",
+        &log("run"),
+        &log("stop"),
+        "--layout",
+        "track-a",
+        "--store",
+        store.to_str().unwrap(),
+    ];
+    assert_eq!(footplate(&from).status, 0);
+    let svg = folder.join("stops.svg");
+    let measured =
+        ["measure", "stop", "--store", store.to_str().unwrap(), "--train", "24", "--at", "E12+270mm"];
+    let run = drawn(&measured, &svg);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    says(
+        &svg,
+        &[
+            "Stops of train 24",
+            "speed at the command (mm/s)",
+            "way to rest (mm)",
+            "from step 8",
+            "law through all of them",
+        ],
+    );
+}
