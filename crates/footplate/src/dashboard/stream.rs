@@ -21,7 +21,7 @@ struct Watcher {
     next: u64,
     /// What waits to be sent.
     ready: VecDeque<Event>,
-    /// When it was sent a picture.
+    /// When it was sent a picture, or should have been if that was a little late.
     sent: Option<Instant>,
 }
 
@@ -42,7 +42,8 @@ pub(super) fn events(
             if let Some(event) = watcher.ready.pop_front() {
                 return Some((Ok(event), watcher));
             }
-            let due = watcher.sent.map(|sent| sent + watcher.watching.pace());
+            let pace = watcher.watching.pace();
+            let due = watcher.sent.map(|sent| sent + pace);
             let pictures = &mut watcher.pictures;
             let next_picture = async {
                 if let Some(due) = due {
@@ -57,7 +58,9 @@ pub(super) fn events(
                 }
                 changed = next_picture => {
                     changed.ok()?;
-                    watcher.sent = Some(Instant::now());
+                    let now = Instant::now();
+                    // Counted from when it was due: one that is late does not make all others late.
+                    watcher.sent = now.checked_sub(pace).max(due).or(Some(now));
                     let picture = watcher.pictures.borrow_and_update().clone();
                     watcher.ready.push_back(Event::default().event("picture").data(&*picture));
                 }
