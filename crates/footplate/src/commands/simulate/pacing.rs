@@ -20,7 +20,7 @@ use footplate_sim::LivingSwitches;
 use footplate_store::layout_named;
 
 use self::arrive::{Arrived, arrive};
-use self::follow::{Followed, follow};
+use self::follow::{Followed, Kept, follow};
 use self::hold::{Held, hold};
 use self::page::Page;
 use super::super::Outcome;
@@ -60,8 +60,8 @@ pub(super) struct Arguments {
 /// Three trains, in the order in which they would follow each other.
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
 
-/// Gaps between them (s), and for how long each is kept (s).
-const GAPS: [f64; 2] = [1.5, 3.0];
+/// Gaps between them (s or mm), and for how long each is kept (s).
+const GAPS: [(Kept, f64); 3] = [(Kept::Time, 1.5), (Kept::Time, 3.0), (Kept::Length, 150.0)];
 const FOLLOWED_FOR: f64 = 600.0;
 
 /// All of one seed.

@@ -223,26 +223,25 @@ impl DrivenTrain {
         node: NodeId,
         others: &Others,
     ) -> Option<Reference> {
-        let mut leader = others.get(&following.leader)?;
         let located = self.located(ground, now)?;
         let past = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
-        let mut late = match following.gap {
-            Gap::Time(gap) => gap.as_s(),
-            Gap::Way(way) => {
-                let line = LeadLine::of(ground, leader, now, (node, past))?;
-                let behind = (way + leader.reach[1] + self.reach[0]).as_m();
-                let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead));
-                return Some(Reference::of(|ahead| line.place(ahead) - behind, speeds));
+        let (mut late, mut behind) = (0.0, 0.0);
+        let (mut train, mut following) = (self, following);
+        // The first of all, by the sum of what is kept.
+        let first = loop {
+            let leader = others.get(&following.leader)?;
+            match following.gap {
+                Gap::Time(gap) => late += gap.as_s(),
+                Gap::Way(way) => behind += (way + leader.reach[1] + train.reach[0]).as_m(),
+            }
+            match leader.followed() {
+                Some(next) => (train, following) = (leader, *next),
+                None => break leader,
             }
         };
-        // The first of all.
-        while let Some(Following { leader: next, gap: Gap::Time(gap), .. }) = leader.followed() {
-            late += gap.as_s();
-            leader = others.get(next)?;
-        }
-        let line = LeadLine::of(ground, leader, now, (node, past))?;
+        let line = LeadLine::of(ground, first, now, (node, past))?;
         let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead - late));
-        Some(Reference::of(|ahead| line.place(ahead - late), speeds))
+        Some(Reference::of(|ahead| line.place(ahead - late) - behind, speeds))
     }
 
     /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is told to stand at a time

@@ -49,17 +49,38 @@ impl By {
     }
 }
 
+/// What is to be kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kept {
+    /// A time from contact to contact.
+    Time,
+    /// A length from bumper to bumper.
+    Length,
+}
+
+impl Kept {
+    /// A gap of so many seconds or millimetres.
+    fn gap(self, much: f64) -> Gap {
+        match self {
+            Self::Time => Gap::Time(TimeSpan::from_s(much)),
+            Self::Length => Gap::Way(Length::from_mm(much)),
+        }
+    }
+}
+
 /// One train behind another.
 #[derive(Debug, Clone)]
 pub(super) struct Followed {
     pub(super) by: By,
+    pub(super) kept: Kept,
     pub(super) train: TrainId,
     /// Its place behind the first.
     pub(super) place: usize,
-    /// The gap that was asked for first, and the one that was kept (s).
+    /// The gap that was asked for first, and the one that was kept (s or mm).
     pub(super) gaps: [f64; 2],
-    /// How much later than asked the train came by each contact (s).
-    pub(super) late: Vec<f64>,
+    /// How much later than asked the train came by each contact (s), or how much farther behind than asked it was at each
+    /// look (mm).
+    pub(super) off: Vec<f64>,
     /// The least distance from bumper to bumper (mm).
     pub(super) nearest: f64,
     /// How often it was held back.
@@ -69,26 +90,26 @@ pub(super) struct Followed {
     pub(super) trouble: Option<String>,
 }
 
-/// All gaps by everybody, for so long (s).
+/// All gaps by everybody, for so long (s). Who goes up or down by steps keeps times.
 pub(super) fn follow(
     stage: &Rehearsal<'_>,
     way: &Way,
     trains: &[TrainId],
-    (gaps, lasts): (&[f64], f64),
+    (gaps, lasts): (&[(Kept, f64)], f64),
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Followed>> {
     let seed = choice.between(0.0, 1e9) as u64;
     let start = (choice.between(0.0, 1e6) as usize) % way.nodes.len().max(1);
     let mut all = Vec::new();
-    for gap in gaps {
-        for by in By::ALL {
+    for (kept, gap) in gaps {
+        for by in By::ALL.into_iter().filter(|by| *by == By::Driver || *kept == Kept::Time) {
             let mut stage = stage.clone();
             for (nth, train) in trains.iter().enumerate() {
                 let at = start + APART * (trains.len() - nth);
                 let node = *way.nodes.get(at % way.nodes.len()).context("a way without a contact")?;
                 stage.put(*train, node, Length::from_mm(60.0))?;
             }
-            let row = Row::new(stage, trains, *gap, by, Choice::new(seed));
+            let row = Row::new(stage, trains, (*kept, *gap), by, Choice::new(seed));
             all.extend(row.run(lasts));
         }
     }
@@ -100,6 +121,7 @@ struct Row<'a, 'l> {
     stage: Rehearsal<'l>,
     counted: Counted,
     trains: &'a [TrainId],
+    kept: Kept,
     gap: f64,
     by: By,
     choice: Choice,
@@ -112,17 +134,24 @@ struct Row<'a, 'l> {
 }
 
 impl<'a, 'l> Row<'a, 'l> {
-    fn new(stage: Rehearsal<'l>, trains: &'a [TrainId], gap: f64, by: By, choice: Choice) -> Self {
+    fn new(
+        stage: Rehearsal<'l>,
+        trains: &'a [TrainId],
+        (kept, gap): (Kept, f64),
+        by: By,
+        choice: Choice,
+    ) -> Self {
         let mut counted = Counted::new(stage.driver());
         for train in trains {
             counted.driver.set_reach(*train, Length::from_mm(AHEAD), Length::from_mm(BEHIND));
         }
         let followed = (1..trains.len()).map(|place| Followed {
             by,
+            kept,
             train: trains[place],
             place,
             gaps: [gap; 2],
-            late: Vec::new(),
+            off: Vec::new(),
             nearest: f64::INFINITY,
             held_back: 0,
             seconds: 0.0,
@@ -136,6 +165,7 @@ impl<'a, 'l> Row<'a, 'l> {
             stage,
             counted,
             trains,
+            kept,
             gap,
             by,
             choice,
@@ -190,12 +220,15 @@ impl<'a, 'l> Row<'a, 'l> {
         }
         let now = self.now();
         let mut order = |gap: f64| {
-            let gap = Gap::Time(TimeSpan::from_s(gap));
+            let gap = self.kept.gap(gap);
             self.counted.driver.order(now, Order::Follow { train, leader, gap })
         };
         let mut taken = order(self.gap);
-        if let Err(Refusal::GapTooShort { shortest: Gap::Time(shortest), .. }) = &taken {
-            let offered = 1.05 * shortest.as_s();
+        if let Err(Refusal::GapTooShort { shortest, .. }) = &taken {
+            let offered = match shortest {
+                Gap::Time(shortest) => 1.05 * shortest.as_s(),
+                Gap::Way(shortest) => 1.05 * shortest.as_mm(),
+            };
             taken = order(offered);
             self.followed[place - 1].gaps[1] = offered;
         }
@@ -281,8 +314,8 @@ impl Followed {
             let led = passes(leader).rfind(|led| led.sensor == pass.sensor && led.at <= pass.at);
             let Some(led) = led else { continue };
             common = Some(led.odometer_mm - pass.odometer_mm);
-            if pass.at >= since {
-                self.late.push((pass.at - led.at).as_s() - self.gaps[1]);
+            if pass.at >= since && self.kept == Kept::Time {
+                self.off.push((pass.at - led.at).as_s() - self.gaps[1]);
             }
         }
         let (Some(ahead), Some(engine), Some(own)) = (common, truth.engine(leader), truth.engine(self.train))
@@ -294,7 +327,12 @@ impl Followed {
         for (lead, follow) in
             both.into_iter().flat_map(|(one, other)| one.since(since).zip(other.since(since)))
         {
-            self.nearest = self.nearest.min(lead.1 - follow.1 - ahead - between);
+            let way = lead.1 - follow.1 - ahead;
+            self.nearest = self.nearest.min(way - between);
+            if self.kept == Kept::Length {
+                // By the lengths that the driver has been told.
+                self.off.push(way - AHEAD - BEHIND - self.gaps[1]);
+            }
         }
     }
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Scored;
 use super::arrive::{self, Arrived};
 use super::figures::{quantile, root_mean_square, shown, within_pct};
-use super::follow::{self, Followed};
+use super::follow::{self, Followed, Kept};
 use super::hold::{By, Held};
 
 const HEAD: &str = "\
@@ -45,6 +45,11 @@ safe one and 5 % kept instead. *Nearest* is truly from bumper to bumper (never l
 beside it runs at the step nearest to its leader's speed, and one up or down while it is off by more than 100 ms.
 ";
 
+const FOLLOW_BY_LENGTH: &str = "\
+The same with a gap in length, from the rear of the train ahead to the front of the follower, as long as the driver was told that
+trains are; *off* is what that differs from the one kept, twenty times a second.
+";
+
 /// What is asked of a mean speed (%), ...
 const MEAN_WITHIN: f64 = 0.5;
 /// ... and of a position (mm).
@@ -76,40 +81,64 @@ impl Page<'_> {
     }
 
     fn write_followed(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(
-            output,
-            "| driven by | asked s | follower | runs | kept s | off ms | mean ms | 95th percentile ms | nearest mm | held \
-             back | failed | commands a second |\n\
-             | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-        )?;
-        let rows = super::GAPS.into_iter().flat_map(|gap| follow::By::ALL.map(|by| (gap, by)));
-        for (gap, by, place) in rows.flat_map(|(gap, by)| [(gap, by, 1), (gap, by, 2)]) {
-            let all = self.scored.iter().flat_map(|scored| &scored.followed);
-            let all =
-                all.filter(|run| run.by == by && run.place == place && (run.gaps[0] - gap).abs() < 1e-9);
-            let all: Vec<&Followed> = all.collect();
-            let late = || all.iter().flat_map(|run| &run.late).map(|late| 1e3 * late);
-            let count = late().count().max(1) as f64;
-            let kept = all.iter().map(|run| run.gaps[1]);
-            let [least, most] = [kept.clone().fold(f64::INFINITY, f64::min), kept.fold(0.0, f64::max)];
-            let commands: usize = all.iter().map(|run| run.commands).sum();
-            let seconds: f64 = all.iter().map(|run| run.seconds).sum();
+        for (kept, unit, off_in) in [(Kept::Time, "s", "ms"), (Kept::Length, "mm", "mm")] {
             writeln!(
                 output,
-                "| {} | {gap} | {} | {} | {least:.1} to {most:.1} | {} | {} | {} | {} | {} | {} | {:.2} |",
-                by.key(),
-                ["first", "second"][place - 1],
-                all.len(),
-                shown(root_mean_square(late()), 0),
-                shown(Some(late().sum::<f64>() / count), 0),
-                shown(quantile(late().map(f64::abs), 0.95), 0),
-                shown(quantile(all.iter().map(|run| run.nearest), 0.0), 0),
-                all.iter().map(|run| run.held_back).sum::<usize>(),
-                all.iter().filter(|run| run.trouble.is_some()).count(),
-                commands as f64 / seconds.max(1.0),
+                "| driven by | asked {unit} | follower | runs | kept {unit} | off {off_in} | mean {off_in} | 95th percentile \
+                 {off_in} | nearest mm | held back | failed | commands a second |\n\
+                 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
             )?;
+            let gaps = super::GAPS.into_iter().filter(|(of, _)| *of == kept);
+            let rows = gaps.flat_map(|(_, gap)| follow::By::ALL.map(|by| (gap, by)));
+            for (gap, by, place) in rows.flat_map(|(gap, by)| [(gap, by, 1), (gap, by, 2)]) {
+                self.write_gap(output, (kept, gap), by, place)?;
+            }
+            if kept == Kept::Time {
+                writeln!(output, "\n{FOLLOW_BY_LENGTH}")?;
+            }
         }
         Ok(())
+    }
+
+    fn write_gap(
+        &self,
+        output: &mut dyn Write,
+        (kept, gap): (Kept, f64),
+        by: follow::By,
+        place: usize,
+    ) -> io::Result<()> {
+        let is_of = |run: &&Followed| {
+            (run.kept, run.by, run.place) == (kept, by, place) && (run.gaps[0] - gap).abs() < 1e-9
+        };
+        let all: Vec<&Followed> =
+            self.scored.iter().flat_map(|scored| &scored.followed).filter(is_of).collect();
+        if all.is_empty() {
+            return Ok(());
+        }
+        let (scale, digits) = match kept {
+            Kept::Time => (1e3, 1),
+            Kept::Length => (1.0, 0),
+        };
+        let off = || all.iter().flat_map(|run| &run.off).map(|off| scale * off);
+        let count = off().count().max(1) as f64;
+        let gaps = all.iter().map(|run| run.gaps[1]);
+        let [least, most] = [gaps.clone().fold(f64::INFINITY, f64::min), gaps.fold(0.0, f64::max)];
+        let commands: usize = all.iter().map(|run| run.commands).sum();
+        let seconds: f64 = all.iter().map(|run| run.seconds).sum();
+        writeln!(
+            output,
+            "| {} | {gap} | {} | {} | {least:.digits$} to {most:.digits$} | {} | {} | {} | {} | {} | {} | {:.2} |",
+            by.key(),
+            ["first", "second"][place - 1],
+            all.len(),
+            shown(root_mean_square(off()), 0),
+            shown(Some(off().sum::<f64>() / count), 0),
+            shown(quantile(off().map(f64::abs), 0.95), 0),
+            shown(quantile(all.iter().map(|run| run.nearest), 0.0), 0),
+            all.iter().map(|run| run.held_back).sum::<usize>(),
+            all.iter().filter(|run| run.trouble.is_some()).count(),
+            commands as f64 / seconds.max(1.0),
+        )
     }
 
     fn arrived(&self, by: arrive::By, from_rest: bool) -> impl Iterator<Item = &Arrived> {
@@ -216,11 +245,16 @@ impl Page<'_> {
         });
         let followed = self.scored.iter().flat_map(|scored| {
             scored.followed.iter().map(move |run| {
+                let (kept, scale) = match run.kept {
+                    Kept::Time => ("s", 1e3),
+                    Kept::Length => ("mm", 1.0),
+                };
+                let off = || run.off.iter().map(|off| scale * off);
                 json!({
-                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_s": run.gaps[0],
-                    "kept_s": run.gaps[1], "rms_ms": root_mean_square(run.late.iter().map(|late| 1e3 * late)),
-                    "mean_ms": 1e3 * run.late.iter().sum::<f64>() / run.late.len().max(1) as f64,
-                    "contacts": run.late.len(), "nearest_mm": run.nearest, "held_back": run.held_back,
+                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_in": kept,
+                    "gap": run.gaps[0], "kept": run.gaps[1], "rms_ms_or_mm": root_mean_square(off()),
+                    "mean_ms_or_mm": off().sum::<f64>() / run.off.len().max(1) as f64, "looks": run.off.len(),
+                    "nearest_mm": run.nearest, "held_back": run.held_back,
                     "commands_per_s": run.commands as f64 / run.seconds.max(1.0), "trouble": run.trouble,
                 })
             })
