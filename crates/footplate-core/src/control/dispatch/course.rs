@@ -63,6 +63,18 @@ impl GrantedRun {
     pub(super) fn taken_from(&self, layout: &Layout, from: Length) -> Footprint {
         self.way.footprint(layout, from, self.end)
     }
+
+    /// Whether a train that stands on it, with its pickup there, is on points that lie for another leg than it came from.
+    pub(super) fn is_on_points_that_gave_way(
+        &self,
+        layout: &Layout,
+        turnouts: &TurnoutStates,
+        at: Length,
+        room: Room,
+    ) -> bool {
+        let mut trailed = self.way.trailed(layout, at - room.behind, at + room.ahead);
+        trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
+    }
 }
 
 /// The runs of an itinerary on the track; `None` where the track ends too soon for one of them.
@@ -71,6 +83,7 @@ pub(super) fn granted(
     turnouts: &TurnoutStates,
     itinerary: &Itinerary,
     room: Room,
+    frozen: &[TurnoutNeed],
 ) -> Option<Vec<GrantedRun>> {
     let mut runs: Vec<GrantedRun> = Vec::new();
     for run in &itinerary.runs {
@@ -100,6 +113,18 @@ pub(super) fn granted(
         }
         // What it takes beyond its stop may need a turnout otherwise than its way does: it would be thrown to and fro.
         if contradicts(layout, &granted.needs) {
+            return None;
+        }
+        // Where points give way to it it does not stop: it could not go back.
+        let frozen = if runs.is_empty() { frozen } else { &[] };
+        let known = || frozen.iter().chain(&granted.needs);
+        let lies_otherwise =
+            |need: &TurnoutNeed| known().any(|known| known.turnout == need.turnout && known.leg != need.leg);
+        if granted
+            .way
+            .trailed(layout, stop - room.behind - room.overrun, end)
+            .any(|need| lies_otherwise(&need))
+        {
             return None;
         }
         runs.push(granted);

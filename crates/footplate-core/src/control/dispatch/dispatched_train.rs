@@ -71,6 +71,8 @@ pub(super) struct DispatchedTrain {
     pub(super) skipped: BTreeSet<TurnoutId>,
     /// Where it can stand, and whether clear of all turnouts.
     pub(super) parking: Vec<(Position, bool)>,
+    /// It stands on points that lie for another leg than it came from.
+    pub(super) gave_way: bool,
     /// How often others stepped aside for it since it set out last.
     pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
@@ -103,6 +105,7 @@ impl DispatchedTrain {
             kept: Footprint::empty(),
             skipped: BTreeSet::new(),
             parking: Vec::new(),
+            gave_way: false,
             rooms_made: 0,
             no_room_until: Timestamp::ZERO,
             unobstructed_s: None,

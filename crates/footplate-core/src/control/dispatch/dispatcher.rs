@@ -132,6 +132,7 @@ impl Dispatcher {
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
             known.course.clear();
+            known.gave_way = false;
             known.unobstructed_s = None;
             known.held = Footprint::empty();
         }

@@ -73,9 +73,10 @@ pub(super) struct Start {
     pub(super) pace: Pace,
     /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
     pub(super) frozen: Vec<TurnoutNeed>,
-    /// Who was not seen where it should have been is looked for ahead: it may have come less far, and what is behind it
-    /// then is not what was planned.
-    pub(super) may_turn: bool,
+    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead:
+    /// it may have come less far, and what is behind it then is not what was planned. Who stands on points that gave way to
+    /// it goes on: they would not give way to it when it comes back.
+    pub(super) turned: Option<Position>,
 }
 
 impl Dispatcher {
@@ -174,8 +175,9 @@ impl Dispatcher {
         let mut near = self.driver.turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let may_turn = self.driver.unseen(id, now).is_none();
-        Some(Start { place, room, pace: self.pace(id), frozen, may_turn })
+        let may_turn = self.driver.unseen(id, now).is_none() && !train.gave_way;
+        let turned = self.driver.turned_place(id, now).filter(|_| may_turn);
+        Some(Start { place, room, pace: self.pace(id), frozen, turned })
     }
 
     /// The soonest way past obstacles, with what it takes.
@@ -185,26 +187,37 @@ impl Dispatcher {
         targets: &[Position],
         obstacles: &Obstacles,
     ) -> Option<Proposal> {
-        let reached = self.search(start, obstacles).from(start.place, self.turned(start));
-        let itinerary = reached.to(targets.iter().copied())?;
-        self.proposal(start, itinerary)
+        let search = self.search(start, obstacles);
+        let proposed = |search: Search<'_>| {
+            let reached = search.from(start.place, self.turned(start));
+            self.proposal(start, reached.to(targets.iter().copied())?)
+        };
+        proposed(search).or_else(|| proposed(Search { points_give_way: false, ..search }))
     }
 
     pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {
-        let runs = granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start.room)?;
+        let runs =
+            granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start.room, &start.frozen)?;
         Some(Proposal { itinerary, runs })
     }
 
     pub(super) fn search<'a>(&'a self, start: &'a Start, obstacles: &'a Obstacles) -> Search<'a> {
         let clears = start.room.rear + start.room.overrun;
-        Search { layout: self.driver.layout(), pace: start.pace, clears, obstacles, frozen: &start.frozen }
+        Search {
+            layout: self.driver.layout(),
+            pace: start.pace,
+            clears,
+            obstacles,
+            frozen: &start.frozen,
+            points_give_way: true,
+        }
     }
 
     /// Where the leading end of the pickup would be if the train turned around; `None` where it would back over points
     /// that lie for the other leg. They gave way when it came, and would not when it goes.
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.driver.layout();
-        let turned = self.driver.turned_place(start.place).filter(|_| start.may_turn)?;
+        let turned = start.turned?;
         let (way, at) = Way::around(layout, self.driver.turnouts(), turned, start.room.behind, Length::ZERO);
         let lies_otherwise = |need: TurnoutNeed| {
             start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)

@@ -55,6 +55,8 @@ pub(super) struct Search<'a> {
     pub(super) obstacles: &'a Obstacles,
     /// Turnouts that cannot be thrown for the first run, because the train stands on them or too near.
     pub(super) frozen: &'a [TurnoutNeed],
+    /// Whether the first run may come from a leg to a turnout that is frozen for the other one.
+    pub(super) points_give_way: bool,
 }
 
 /// How a node was come to.
@@ -204,7 +206,7 @@ impl<'a> Search<'a> {
             let partner = self.layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved());
             needs.iter().all(|known| {
                 // Who comes from a leg gets through whatever way a turnout lies that cannot be thrown.
-                let gives_way = !need.facing && self.frozen.contains(known);
+                let gives_way = self.points_give_way && !need.facing && self.frozen.contains(known);
                 (known.turnout != need.turnout || known.leg == need.leg || gives_way)
                     && !(Some(known.turnout) == partner && known.leg.is_curved())
             })

@@ -81,7 +81,7 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
     /// stand on another edge than was planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.driver.turned_place(self.driver.position(id, now)?)?;
+        let turned = self.driver.turned_place(id, now)?;
         let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
         self.driver.layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
@@ -147,12 +147,18 @@ impl Dispatcher {
     pub(super) fn run_ended(&mut self, now: Timestamp, id: TrainId, unseen: bool, error: Option<Length>) {
         let Some(train) = self.trains.get_mut(&id) else { return };
         let State::Running { rear, confirmed, .. } = train.state else { return };
+        self.look_under(now, id);
+        let Some(train) = self.trains.get_mut(&id) else { return };
         let confirmed = confirmed && !unseen;
         let ended = train.course.pop_front();
         train.caution = 1.0;
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
             return self.halted(now, id, false);
+        }
+        let turns_next = train.course.front().is_some_and(|run| run.turns);
+        if turns_next && train.gave_way {
+            return self.halted(now, id, confirmed);
         }
         if train.course.is_empty() {
             train.state = State::Resting;
@@ -175,6 +181,7 @@ impl Dispatcher {
     /// A train that was told to stop stands.
     pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
         let is_sure = self.driver.position(id, now).is_some();
+        self.look_under(now, id);
         if let Some(train) = self.trains.get_mut(&id) {
             train.course.clear();
             train.state = if is_sure { State::Resting } else { State::Lost };
@@ -190,6 +197,21 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
+    /// Notes whether a train that has come to rest is on points that gave way to it. Off its course it still is if it was.
+    fn look_under(&mut self, now: Timestamp, id: TrainId) {
+        let Some(train) = self.trains.get(&id) else { return };
+        let place = self.driver.position(id, now);
+        let on = train.course.front().zip(place).and_then(|(run, place)| {
+            let from = if let State::Running { rear, .. } = train.state { rear } else { run.start };
+            let at = run.way.find(place, from)?;
+            let (layout, turnouts) = (self.driver.layout(), self.driver.turnouts());
+            Some(run.is_on_points_that_gave_way(layout, turnouts, at, self.room(now, train)))
+        });
+        if let (Some(train), Some(on)) = (self.trains.get_mut(&id), on) {
+            train.gave_way = on;
+        }
+    }
+
     /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
     /// contact has confirmed it keeps what it had, all of it.
     fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<GrantedRun>) {
@@ -199,7 +221,8 @@ impl Dispatcher {
         let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
         let Some(place) = self.driver.position(id, now) else { return };
         let room = self.room(now, train);
-        let Some(at) = run.way.find(place, run.start) else { return };
+        // The way may come round to where it began.
+        let Some(at) = run.way.find(place, rear) else { return };
         let layout = self.driver.layout();
         // What was let go is somebody else's by now.
         let from = (at - room.behind).max(rear);

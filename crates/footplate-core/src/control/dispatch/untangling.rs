@@ -287,6 +287,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = Room::of(lengths, PARKED, start.room.overrun);
-        Some(Start { place: stander.place, room, frozen: Vec::new(), ..start })
+        let turned = self.driver.turned_place_at(stander.place);
+        Some(Start { place: stander.place, room, frozen: Vec::new(), turned, ..start })
     }
 }

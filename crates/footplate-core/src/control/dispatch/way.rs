@@ -129,6 +129,19 @@ impl Way {
         taken
     }
 
+    /// How turnouts lie best whose toes are passed from a leg on an interval of the way.
+    pub(super) fn trailed(
+        &self,
+        layout: &Layout,
+        from: Length,
+        to: Length,
+    ) -> impl Iterator<Item = TurnoutNeed> {
+        self.within(layout, from, to).flat_map(move |(id, [_, to])| {
+            let passes_toe = layout.edge(id).is_some_and(|edge| to >= edge.length);
+            layout.needs_of(id).filter(move |need| passes_toe && !need.facing)
+        })
+    }
+
     /// How turnouts have to lie of which an interval of the way passes the toe, each once, in order.
     pub(super) fn needs(&self, layout: &Layout, from: Length, to: Length) -> Vec<TurnoutNeed> {
         let mut needs: Vec<TurnoutNeed> = Vec::new();

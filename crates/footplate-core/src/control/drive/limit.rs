@@ -12,7 +12,7 @@ use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::felt_way::{counted_from, lap};
 use super::order::OrderId;
-use super::turning::turned_place;
+use super::turning::{trailing_place, turned_as_it_lies, turned_place};
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
@@ -78,13 +78,15 @@ impl Driver {
         train.unseen().or_else(|| train.passed_unheard(ground, &train.located(ground, now)?))
     }
 
-    /// Counts a train at rest from the node behind it, whatever is there: how turnouts further away lie makes no
+    /// Counts a train at rest from the node behind its pickup, whatever is there: how turnouts further away lie makes no
     /// difference from now on.
     pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
         let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
         let at = self.position_at(train, located.at).and_then(|place| {
-            let behind = self.track.layout.edge(place.edge)?.from;
-            self.way_point(train, behind, place)
+            let model = &self.trains.get(&train)?.model;
+            let trailing = trailing_place(self.track.ground(), model, located.at)?;
+            let behind = self.track.layout.edge(trailing.edge)?.from;
+            if behind == located.at.node { None } else { self.way_point(train, behind, place) }
         });
         if let Some(at) = at {
             self.place(now, train, at, located.uncertainty);
@@ -121,11 +123,18 @@ impl Driver {
         Some(WayPoint { way: found.way + round, ..found })
     }
 
-    /// Where the leading end of the pickup will be taken to be when a train at rest at a place has turned around. It is
-    /// counted from the node behind it then: a turnout there has to lie for where it stands.
+    /// Where the leading end of the pickup will be taken to be when a train at rest has turned around. It is counted from
+    /// the node behind it then: a turnout there has to lie for where it stands.
     #[must_use]
-    pub fn turned_place(&self, place: Position) -> Option<Position> {
-        turned_place(self.track.ground(), place)
+    pub fn turned_place(&self, train: TrainId, now: Timestamp) -> Option<Position> {
+        let at = self.locate(train, now)?.at;
+        turned_place(self.track.ground(), &self.trains.get(&train)?.model, at)
+    }
+
+    /// The same for a train that would stand at a place, wherever it came from.
+    #[must_use]
+    pub fn turned_place_at(&self, place: Position) -> Option<Position> {
+        turned_as_it_lies(self.track.ground(), place)
     }
 
     /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads

@@ -19,14 +19,28 @@ pub(super) fn turned(
     model: &MotionModel,
     located: Located,
 ) -> Option<(WayPoint, Length)> {
-    let leading = turned_place(ground, place_of(ground, model, located.at)?)?;
+    let leading = turned_place(ground, model, located.at)?;
     let behind = ground.layout.edge(leading.edge)?.from;
     let way = way_to(ground, model, behind, leading)?;
     let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DOUBT.as_m()));
     Some((WayPoint { node: behind, way }, uncertainty))
 }
 
-/// Where the leading end of the pickup is once a train at rest at a place has turned around.
-pub(super) fn turned_place(ground: Ground<'_>, place: Position) -> Option<Position> {
+/// Where the leading end of the pickup is once a train at rest has turned around.
+pub(super) fn turned_place(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
+    ground.layout.reversed(trailing_place(ground, model, at)?)
+}
+
+/// Where the trailing end of the pickup is, facing as its leading end does: back along the way that the train came, over
+/// points that may lie for another leg by now, or lay for it all the time and gave way.
+pub(super) fn trailing_place(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
+    if at.way >= SHOE {
+        return place_of(ground, model, WayPoint { way: at.way - SHOE, ..at });
+    }
+    ground.layout.reversed(turned_as_it_lies(ground, place_of(ground, model, at)?)?)
+}
+
+/// The same for a train that would stand at a place, wherever it came from.
+pub(super) fn turned_as_it_lies(ground: Ground<'_>, place: Position) -> Option<Position> {
     ground.layout.advance(ground.layout.reversed(place)?, SHOE, ground.turnouts).ok()
 }

@@ -163,6 +163,10 @@ impl<'l> Session<'l> {
             self.came_somewhere(train, now);
         }
         self.tally.mishaps = self.rehearsal.world().mishaps().to_vec();
+        for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
+            eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
+            mishap.train.into_iter().for_each(|train| self.tell_truth(train));
+        }
         self.tally
     }
 
