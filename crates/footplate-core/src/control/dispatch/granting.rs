@@ -113,8 +113,12 @@ impl Dispatcher {
             };
             let free = self.free_way(id, &start, &targets).filter(|free| {
                 let allowed = unobstructed * LONGER + LONGER_BY_S + (now - since).as_s();
-                let spares =
-                    kept_free.as_ref().is_none_or(|wish| !free.runs.iter().any(|run| wish.meets(&run.taken)));
+                // Who stands in the way of the one that is next does best to go.
+                let is_in_the_way =
+                    |wish: &Proposal| self.trains.get(&id).is_some_and(|train| wish.meets(&train.held));
+                let spares = kept_free.as_ref().is_none_or(|wish| {
+                    is_in_the_way(wish) || !free.runs.iter().any(|run| wish.meets(&run.taken))
+                });
                 free.itinerary.seconds <= allowed && spares
             });
             if let Some(free) = free {
