@@ -20,14 +20,16 @@ pub(super) struct Asked {
     pub(super) journey: Journey,
     pub(super) place: Position,
     pub(super) since: Timestamp,
+    /// Since when it has been waiting for its turn: others that came to wait later are looked at later.
+    pub(super) queues: Timestamp,
 }
 
 /// Why a train runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     Journey,
-    /// To make room.
-    Aside,
+    /// To make room for another, or itself.
+    Aside(TrainId),
 }
 
 /// How far a train is.
@@ -73,7 +75,7 @@ pub(super) struct DispatchedTrain {
     pub(super) parking: Vec<(Position, bool)>,
     /// It stands on points that lie for another leg than it came from.
     pub(super) gave_way: bool,
-    /// How often others stepped aside for it since it set out last.
+    /// How often others stepped aside for it since it set out last, or went to the end of the queue.
     pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
     pub(super) no_room_until: Timestamp,

@@ -28,6 +28,9 @@ pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
 /// Trains at rest that wait are looked at again after this long even if nothing has changed.
 const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
 
+/// What follows from what at one moment is followed so far; the rest waits until the next look.
+const MOST_ROUNDS: usize = 50;
+
 /// Keeps trains apart, and sends them on their ways.
 #[derive(Debug, Clone)]
 pub struct Dispatcher {
@@ -158,7 +161,7 @@ impl Dispatcher {
         self.give_back(now, train);
         let order = self.driver.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
-            known.asked = Some(Asked { order, journey, place, since: now });
+            known.asked = Some(Asked { order, journey, place, since: now, queues: now });
             known.waits_said = false;
             known.unobstructed_s = None;
         }
@@ -276,7 +279,7 @@ impl Dispatcher {
         if self.arranged.is_none_or(|last| now - last >= AGAIN) {
             self.is_stirred |= self.trains.values().any(|train| train.rests() && train.asked.is_some());
         }
-        loop {
+        for _ in 0..MOST_ROUNDS {
             while let Some(output) = self.driver.poll_output() {
                 match output {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),

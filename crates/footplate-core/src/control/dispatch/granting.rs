@@ -31,8 +31,6 @@ const LONGER_BY_S: f64 = 10.0;
 const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
 /// When all trains at rest have waited so long and nobody runs, nothing that was looked for will be found.
 const STALLED: TimeSpan = TimeSpan::from_s(20.0);
-/// When others have stepped aside so often for a train that still waits, it is somebody else's turn.
-const ROOMS_IN_A_ROW: u32 = 3;
 /// Who waits is looked at again after this long, whatever happens: much does that is nothing to it.
 const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
 /// From the end of a run until its train is taken to stand, and turning around: commands and margins of time.
@@ -83,18 +81,16 @@ impl Dispatcher {
     /// Looks at all trains at rest that want to go somewhere, those that have waited longest first, unless room was made for
     /// them again and again in vain.
     pub(super) fn arrange(&mut self, now: Timestamp) {
-        let mut waiting: Vec<(u32, Timestamp, TrainId)> = self
+        let mut waiting: Vec<(Timestamp, Timestamp, TrainId)> = self
             .trains
             .values()
             .filter(|train| train.is_ready(now))
-            .filter_map(|train| Some((train.rooms_made / ROOMS_IN_A_ROW, train.asked?.since, train.id)))
+            .filter_map(|train| Some((train.asked?.queues, train.asked?.since, train.id)))
             .collect();
         waiting.sort_unstable();
-        let waiting: Vec<(Timestamp, TrainId)> =
-            waiting.into_iter().map(|(_, since, id)| (since, id)).collect();
         let mut kept_free: Option<Proposal> = None;
         let mut all_wait = !waiting.is_empty();
-        for (since, id) in waiting.iter().copied() {
+        for (queues, since, id) in waiting.iter().copied() {
             if self
                 .trains
                 .get(&id)
@@ -128,16 +124,18 @@ impl Dispatcher {
             let Some(wish) = self.wish(id, &start, &targets) else { continue };
             self.waits(id, &wish);
             self.make_room(now, id, &targets, &wish);
-            // Nothing is kept free for who has nobody to wait for.
-            let somebody_runs = self.trains.values().any(|train| !train.course.is_empty());
-            if now - since >= PATIENCE && kept_free.is_none() && somebody_runs {
+            let mut running = self.trains.values().filter(|train| !train.course.is_empty());
+            let room_is_made = running.clone().any(|train| train.purpose == Purpose::Aside(id));
+            // Nothing is kept free for who waits for trains at rest: they might stand there for ever.
+            let somebody_passes = running.any(|train| wish.meets(&train.held));
+            if kept_free.is_none() && (room_is_made || somebody_passes && now - queues >= PATIENCE) {
                 kept_free = Some(wish);
             }
         }
-        all_wait &= waiting.iter().all(|(since, id)| {
+        all_wait &= waiting.iter().all(|(_, since, id)| {
             now - *since >= STALLED && self.trains.get(id).is_some_and(DispatchedTrain::rests)
         });
-        if let (true, Some((_, id))) = (all_wait, waiting.first()) {
+        if let (true, Some((_, _, id))) = (all_wait, waiting.first()) {
             self.shuffle(now, *id);
         }
     }

@@ -151,7 +151,6 @@ impl Dispatcher {
         let Some(train) = self.trains.get_mut(&id) else { return };
         let confirmed = confirmed && !unseen;
         let ended = train.course.pop_front();
-        train.caution = 1.0;
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
             return self.halted(now, id, false);
@@ -281,6 +280,7 @@ impl Dispatcher {
         let granted_for = train.granted_for.take();
         if let Some(asked) = train.asked.take_if(|asked| Some(asked.order) == granted_for) {
             let took = now - asked.since;
+            train.caution = 1.0;
             self.say(DispatchNotice::Arrived { order: asked.order, train: id, error, took });
         }
     }

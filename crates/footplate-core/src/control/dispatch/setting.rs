@@ -8,7 +8,7 @@ use crate::ids::{TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutNeed};
 
-use super::dispatched_train::State;
+use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
 
 /// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
@@ -44,12 +44,12 @@ impl Dispatcher {
         let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
             return false;
         };
-        let wanted: Vec<TurnoutNeed> = self.with_partners(&run.needs);
-        let skipped = train.skipped.clone();
-        let missing: Vec<TurnoutNeed> = wanted
-            .into_iter()
-            .filter(|need| !self.is_sure(*need) && (need.facing || !skipped.contains(&need.turnout)))
-            .collect();
+        let place = self.driver.position(id, now);
+        let anchors = place.map(|place| self.anchors(now, id, place)).unwrap_or_default();
+        let needs: Vec<TurnoutNeed> =
+            run.needs.iter().filter(|need| !self.gives_way(now, train, need, &anchors)).copied().collect();
+        let wanted = self.with_partners(&needs);
+        let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(|need| !self.is_sure(*need)).collect();
         if missing.is_empty() {
             let ready = ready.unwrap_or(if now == since { now } else { now + MOVES });
             if ready > now {
@@ -57,8 +57,6 @@ impl Dispatcher {
             }
             return ready <= now;
         }
-        let place = self.driver.position(id, now);
-        let anchors = place.map(|place| self.anchors(now, id, place)).unwrap_or_default();
         if self.is_in_its_own_way(now, id, &missing, &anchors) {
             return false;
         }
@@ -120,14 +118,35 @@ impl Dispatcher {
         self.throwing.get(&turnout).is_some_and(|since| now - *since < TOLD_WITHIN)
     }
 
+    /// Whether a train comes from a leg to points that have to give way to it: it stands on them, or on those in the same
+    /// place.
+    fn gives_way(
+        &self,
+        now: Timestamp,
+        train: &DispatchedTrain,
+        need: &TurnoutNeed,
+        anchors: &BTreeSet<TurnoutId>,
+    ) -> bool {
+        if need.facing {
+            return false;
+        }
+        let partner = self.partner(need).filter(|partner| !self.driver.turnouts().allow(*partner));
+        let is_held_down = |turnout| {
+            anchors.contains(&turnout) || self.driver.turnouts_under(train.id, now).contains(&turnout)
+        };
+        train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_held_down(partner.turnout))
+    }
+
+    /// How the turnout in the same place has to lie.
+    fn partner(&self, need: &TurnoutNeed) -> Option<TurnoutNeed> {
+        let turnout =
+            self.driver.layout().never_curved_with(need.turnout).filter(|_| need.leg.is_curved())?;
+        Some(TurnoutNeed { turnout, leg: Leg::Straight, facing: true })
+    }
+
     /// The needs of a run, each turnout after the one in the same place that has to lie straight for it.
     fn with_partners(&self, needs: &[TurnoutNeed]) -> Vec<TurnoutNeed> {
-        let layout = self.driver.layout();
-        let partner = |need: &TurnoutNeed| {
-            let turnout = layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved())?;
-            Some(TurnoutNeed { turnout, leg: Leg::Straight, facing: true })
-        };
-        needs.iter().flat_map(|need| partner(need).into_iter().chain([*need])).collect()
+        needs.iter().flat_map(|need| self.partner(need).into_iter().chain([*need])).collect()
     }
 
     fn is_sure(&self, need: TurnoutNeed) -> bool {

@@ -31,6 +31,9 @@ const SCENES_KEPT: usize = 4;
 /// What was tried in vain is not tried again for so long.
 const IN_VAIN: TimeSpan = TimeSpan::from_s(6.0);
 
+/// When others have stepped aside so often for a train that still waits, it is somebody else's turn.
+const ROOMS_IN_A_ROW: u32 = 4;
+
 /// A train at rest, here or there.
 #[derive(Debug, Clone)]
 struct Stander {
@@ -55,8 +58,10 @@ impl Dispatcher {
     pub(super) fn make_room(&mut self, now: Timestamp, id: TrainId, targets: &[Position], wish: &Proposal) {
         let mut in_the_way = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
         let all_rest = in_the_way.all(|other| other.is_ready(now));
-        let somebody_makes_room =
-            self.trains.values().any(|train| train.purpose == Purpose::Aside && !train.course.is_empty());
+        let somebody_makes_room = self
+            .trains
+            .values()
+            .any(|train| matches!(train.purpose, Purpose::Aside(_)) && !train.course.is_empty());
         if !all_rest || somebody_makes_room {
             return;
         }
@@ -80,6 +85,10 @@ impl Dispatcher {
             self.say(DispatchNotice::Deadlock { train: id, moves });
             if let Some(train) = self.trains.get_mut(&id) {
                 train.rooms_made = train.rooms_made.saturating_add(1);
+                if let Some(asked) = train.asked.as_mut().filter(|_| train.rooms_made >= ROOMS_IN_A_ROW) {
+                    asked.queues = now;
+                    train.rooms_made = 0;
+                }
             }
             self.send_aside(now, first, id, place, proposal);
         }
@@ -132,7 +141,7 @@ impl Dispatcher {
     ) {
         let to = Landmark { node: self.node_before(place), offset: place.offset };
         self.say(DispatchNotice::StepsAside { train: id, makes_room_for, to });
-        self.grant(now, id, Purpose::Aside, proposal);
+        self.grant(now, id, Purpose::Aside(makes_room_for), proposal);
     }
 
     fn obstacles_of_others(&self, id: TrainId) -> Obstacles {

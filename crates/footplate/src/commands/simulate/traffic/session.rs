@@ -165,8 +165,8 @@ impl<'l> Session<'l> {
         self.tally.mishaps = self.rehearsal.world().mishaps().to_vec();
         for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
             eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
-            mishap.train.into_iter().for_each(|train| self.tell_truth(train));
         }
+        self.trains.iter().filter(|_| self.talk).for_each(|train| self.tell_truth(*train));
         self.tally
     }
 
@@ -196,7 +196,10 @@ impl<'l> Session<'l> {
                     self.tally.waits.push((now - since).as_s());
                 }
             }
-            DispatchNotice::Withdrawn { why, .. } => {
+            DispatchNotice::Withdrawn { train, why } => {
+                if self.talk {
+                    self.tell_truth(*train);
+                }
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
             DispatchNotice::Drive(DriveNotice::Done(finished)) => self.check_belief(finished),
@@ -305,7 +308,12 @@ impl<'l> Session<'l> {
         };
         let really = truth.train(train).and_then(|train| train.position).map(place);
         let believed = driver.position(train, self.rehearsal.line.now()).map(place);
-        eprintln!("          really {really:?}, believed {believed:?}");
+        let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
+        let journey = journey.map(|to| to.to_string());
+        eprintln!("          {train} wants to {journey:?}, is really {really:?}, believed {believed:?}");
+        let under = driver.turnouts_under(train, self.rehearsal.line.now()).into_iter();
+        let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
+        eprintln!("          on turnouts {under:?}");
         for (turnout, _) in self.layout.turnouts() {
             let (lies, known) = (self.rehearsal.world().lies(turnout), driver.turnouts().get(turnout));
             if lies != known {
