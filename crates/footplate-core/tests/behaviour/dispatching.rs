@@ -9,19 +9,20 @@ use footplate_core::control::{
     TrainLengths, WatchdogNotice,
 };
 use footplate_core::estimation::WayPoint;
-use footplate_core::track::{Layout, Position, TurnoutStates};
+use footplate_core::track::{Layout, Position};
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
+use crate::toy_body::ToyBody;
 use crate::toy_railway::{ToyRailway, known_model, step, straight};
 
-const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
+pub(crate) const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
 /// Both of these are on the circuit.
 const STARTS: [(&str, f64); 2] = [("D1", 500.0), ("B1", 150.0)];
 const LENGTHS: TrainLengths = TrainLengths { overhang: Length::from_mm(50.0), pickup: Length::from_mm(30.0) };
 /// Destinations: contacts of the circuit, in both directions.
-const PLACES: [&str; 8] = ["A1", "A2", "B1", "B2", "C1", "C2", "D1", "D2"];
+pub(crate) const PLACES: [&str; 8] = ["A1", "A2", "B1", "B2", "C1", "C2", "D1", "D2"];
 /// Places are sums of lengths.
 const ROUNDING: Length = Length::from_mm(0.5);
 
@@ -32,16 +33,17 @@ fn model(train: TrainId) -> MotionModel {
 }
 
 /// Two trains on the toy railway's circuit.
-struct Traffic {
-    world: ToyRailway,
-    dispatcher: Dispatcher,
-    notices: Vec<DispatchNotice>,
+pub(crate) struct Traffic {
+    pub(crate) world: ToyRailway,
+    pub(crate) dispatcher: Dispatcher,
+    pub(crate) notices: Vec<DispatchNotice>,
+    bodies: [ToyBody; 2],
     /// What went wrong, if anything did.
-    wrongs: Vec<String>,
+    pub(crate) wrongs: Vec<String>,
 }
 
 impl Traffic {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with(Dispatcher::new)
     }
 
@@ -64,10 +66,11 @@ impl Traffic {
         for train in TRAINS {
             dispatcher.set_lengths(world.now, train, LENGTHS);
         }
-        Self { world, dispatcher, notices: Vec::new(), wrongs: Vec::new() }
+        let bodies = Default::default();
+        Self { world, dispatcher, notices: Vec::new(), bodies, wrongs: Vec::new() }
     }
 
-    fn go(&mut self, train: TrainId, place: &str) {
+    pub(crate) fn go(&mut self, train: TrainId, place: &str) {
         let target = self.world.layout.landmark(place).expect("a place");
         self.dispatcher.go(self.world.now, train, Journey::to(target)).expect("on the layout");
     }
@@ -94,12 +97,14 @@ impl Traffic {
         }
     }
 
-    fn run(&mut self, seconds: f64) {
+    pub(crate) fn run(&mut self, seconds: f64) {
         let end = self.world.now + TimeSpan::from_s(seconds);
         let mut looks_at = self.world.now;
         self.listen();
         while self.world.now < end && self.wrongs.is_empty() {
-            for event in self.world.tick() {
+            let events = self.world.tick();
+            self.follow();
+            for event in events {
                 self.dispatcher.handle_event(self.world.now.max(event.time), &event);
                 self.listen();
             }
@@ -114,6 +119,14 @@ impl Traffic {
         }
     }
 
+    fn follow(&mut self) {
+        let ToyRailway { layout, turnouts, .. } = &self.world;
+        for (train, body) in TRAINS.into_iter().zip(&mut self.bodies) {
+            let at = self.world.trains.iter().find(|found| found.id == train).expect("on the rails").at;
+            body.follow(layout, turnouts, at, LENGTHS.ahead(), LENGTHS.behind());
+        }
+    }
+
     /// Everything that a train really is on it holds, and nobody holds what another does.
     fn look(&mut self) {
         let [one, two] = TRAINS.map(|train| self.dispatcher.holds(train).expect("dispatched"));
@@ -121,9 +134,11 @@ impl Traffic {
         if one.meets(two) {
             wrongs.push("two trains hold the same track".to_owned());
         }
-        for (train, held) in TRAINS.into_iter().zip([one, two]) {
+        for ((train, held), body) in TRAINS.into_iter().zip([one, two]).zip(&self.bodies) {
             let at = self.world.trains.iter().find(|found| found.id == train).expect("on the rails").at;
-            if !is_within(&self.world.layout, &self.world.turnouts, at, held) {
+            let layout = &self.world.layout;
+            let points = body.points(layout, at, LENGTHS.ahead(), LENGTHS.behind());
+            if !points.into_iter().all(|point| is_held(layout, point, held)) {
                 wrongs.push(format!("train {train} is on track that it does not hold: {at:?} of {held:?}"));
             }
         }
@@ -134,16 +149,6 @@ impl Traffic {
         let here = |notice: &&DispatchNotice| matches!(notice, DispatchNotice::Arrived { train: arrived, .. } if *arrived == train);
         self.notices.iter().filter(here).count()
     }
-}
-
-/// Whether points all along a train are held.
-fn is_within(layout: &Layout, turnouts: &TurnoutStates, at: Position, held: &Footprint) -> bool {
-    let back = layout.reversed(at).expect("on the layout");
-    (0..=8).map(|nth| f64::from(nth) / 8.0).all(|part| {
-        let ahead = layout.advance(at, LENGTHS.ahead() * part, turnouts);
-        let behind = layout.advance(back, LENGTHS.behind() * part, turnouts);
-        [ahead, behind].into_iter().flatten().all(|point| is_held(layout, point, held))
-    })
 }
 
 fn is_held(layout: &Layout, point: Position, held: &Footprint) -> bool {

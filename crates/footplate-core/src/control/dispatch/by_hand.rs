@@ -70,7 +70,8 @@ impl Dispatcher {
             let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
-        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, ahead + room.ahead);
+        let (way, at) =
+            Way::around(layout, self.driver.turnouts(), place, &train.came, room.behind, ahead + room.ahead);
         // Who follows another train shares its track, and that of whom it follows in turn: the driver keeps gaps safe.
         let mut row = alloc::vec![id];
         while let Some(leader) =
@@ -79,7 +80,7 @@ impl Dispatcher {
             row.push(leader);
         }
         let is_free = |end: Length| {
-            let taken = way.footprint(layout, at - room.behind, end + room.ahead);
+            let taken = self.reserved(way.footprint(layout, at - room.behind, end + room.ahead));
             self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
         };
         let reach = (way.length() - room.ahead).min(at + ahead);
@@ -93,8 +94,11 @@ impl Dispatcher {
             self.driver.set_limit(now, id, Some(located.at));
             return;
         }
-        let mut held = way.footprint(layout, at - room.behind, end + room.ahead);
+        let mut held = self.reserved(way.footprint(layout, at - room.behind, end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
+        if self.driver.is_in_doubt(id) {
+            held.add(layout, &train.held);
+        }
         // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:
         // whoever drives by hand sees it.
         let limit = (end < reach).then(|| {

@@ -6,8 +6,10 @@ use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 use super::footprint::Footprint;
+use super::granting::Start;
 use super::itinerary::{Itinerary, Run};
 use super::journey::TrainLengths;
+use super::trail::Trail;
 use super::way::Way;
 
 /// How much more of the track is taken than a train is believed to need: contacts are off their places by 5 mm, edges
@@ -63,18 +65,6 @@ impl GrantedRun {
     pub(super) fn taken_from(&self, layout: &Layout, from: Length) -> Footprint {
         self.way.footprint(layout, from, self.end)
     }
-
-    /// Whether a train that stands on it, with its pickup there, is on points that lie for another leg than it came from.
-    pub(super) fn is_on_points_that_gave_way(
-        &self,
-        layout: &Layout,
-        turnouts: &TurnoutStates,
-        at: Length,
-        room: Room,
-    ) -> bool {
-        let mut trailed = self.way.trailed(layout, at - room.behind, at + room.ahead);
-        trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
-    }
 }
 
 /// The runs of an itinerary on the track; `None` where the track ends too soon for one of them.
@@ -82,13 +72,13 @@ pub(super) fn granted(
     layout: &Layout,
     turnouts: &TurnoutStates,
     itinerary: &Itinerary,
-    room: Room,
-    frozen: &[TurnoutNeed],
+    begins: &Start,
 ) -> Option<Vec<GrantedRun>> {
+    let room = begins.room;
     let mut runs: Vec<GrantedRun> = Vec::new();
     for run in &itinerary.runs {
         let before = runs.last();
-        let (way, start) = way_of(layout, turnouts, run, before, room)?;
+        let (way, start) = way_of(layout, turnouts, run, before, begins)?;
         let stop = stop_on(layout, run, start)?;
         let limit = stop + room.overrun;
         let end = limit + room.front;
@@ -116,7 +106,7 @@ pub(super) fn granted(
             return None;
         }
         // Where points give way to it it does not stop: it could not go back.
-        let frozen = if runs.is_empty() { frozen } else { &[] };
+        let frozen: &[_] = if runs.is_empty() { &begins.frozen } else { &[] };
         let known = || frozen.iter().chain(&granted.needs);
         let lies_otherwise =
             |need: &TurnoutNeed| known().any(|known| known.turnout == need.turnout && known.leg != need.leg);
@@ -150,10 +140,14 @@ fn way_of(
     turnouts: &TurnoutStates,
     run: &Run,
     before: Option<&GrantedRun>,
-    room: Room,
+    begins: &Start,
 ) -> Option<(Way, Length)> {
+    let room = begins.room;
     let (mut way, start) = match before {
-        None => Way::around(layout, turnouts, run.start, room.behind + run.start.offset, Length::ZERO),
+        None => {
+            let behind = room.behind + run.start.offset;
+            Way::around(layout, turnouts, run.start, &begins.came, behind, Length::ZERO)
+        }
         Some(before) => {
             let mut way = Way::default();
             let stops_on = run.start.edge.twin();
@@ -183,7 +177,13 @@ fn stop_on(layout: &Layout, run: &Run, start: Length) -> Option<Length> {
 }
 
 /// What a train at rest takes.
-pub(super) fn standing(layout: &Layout, turnouts: &TurnoutStates, place: Position, room: Room) -> Footprint {
-    let (way, at) = Way::around(layout, turnouts, place, room.behind, room.ahead);
+pub(super) fn standing(
+    layout: &Layout,
+    turnouts: &TurnoutStates,
+    place: Position,
+    came: &Trail,
+    room: Room,
+) -> Footprint {
+    let (way, at) = Way::around(layout, turnouts, place, came, room.behind, room.ahead);
     way.footprint(layout, at - room.behind, at + room.ahead)
 }

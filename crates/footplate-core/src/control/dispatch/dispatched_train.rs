@@ -12,6 +12,7 @@ use crate::units::Length;
 use super::course::GrantedRun;
 use super::footprint::Footprint;
 use super::journey::{Journey, TrainLengths};
+use super::trail::Trail;
 
 /// A journey that was asked for and has not ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,8 +74,8 @@ pub(super) struct DispatchedTrain {
     pub(super) skipped: BTreeSet<TurnoutId>,
     /// Where it can stand, and whether clear of all turnouts.
     pub(super) parking: Vec<(Position, bool)>,
-    /// It stands on points that lie for another leg than it came from.
-    pub(super) gave_way: bool,
+    /// Where it came from.
+    pub(super) came: Trail,
     /// How often others stepped aside for it since it set out last, or went to the end of the queue.
     pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
@@ -107,7 +108,7 @@ impl DispatchedTrain {
             kept: Footprint::empty(),
             skipped: BTreeSet::new(),
             parking: Vec::new(),
-            gave_way: false,
+            came: Trail::default(),
             rooms_made: 0,
             no_room_until: Timestamp::ZERO,
             unobstructed_s: None,

@@ -14,6 +14,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
 use crate::units::Length;
 
+use super::blocks::Blocks;
 use super::course::{Room, standing};
 use super::dispatched_train::{Asked, DispatchedTrain, State};
 use super::footprint::Footprint;
@@ -40,13 +41,17 @@ pub struct Dispatcher {
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
     /// How turnouts were told to lie, and how often and when last since anything said that they lay otherwise.
     pub(super) told: BTreeMap<TurnoutId, Told>,
-    /// Turnouts that were asked for and not told yet, since when.
-    pub(super) throwing: BTreeMap<TurnoutId, Timestamp>,
+    /// Turnouts that were asked for and not told yet, for whom and since when.
+    pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
     pub(super) outputs: VecDeque<Output<DispatchNotice>>,
     /// Whether anything has changed since trains at rest were last looked at.
     pub(super) is_stirred: bool,
     /// How often trains were moved only to have other places to begin from.
     pub(super) shuffled: usize,
+    /// When it last thought hard, and in vain, about who could make room for whom.
+    pub(super) thought: Option<Timestamp>,
+    /// What is taken of a block is all of it; `None` where track is taken to the millimetre.
+    blocks: Option<Blocks>,
     looks_at: Option<Timestamp>,
     /// When it last looked at trains at rest.
     arranged: Option<Timestamp>,
@@ -82,6 +87,8 @@ impl Dispatcher {
             outputs: VecDeque::new(),
             is_stirred: true,
             shuffled: 0,
+            thought: None,
+            blocks: None,
             looks_at: None,
             arranged: None,
         };
@@ -103,6 +110,20 @@ impl Dispatcher {
         }
         if self.trains.get(&train).is_some_and(DispatchedTrain::rests) {
             self.stand(now, train);
+        }
+    }
+
+    /// Takes the track between contacts as a whole from now on, with all turnouts there, as block systems do. Without this,
+    /// and better, trains take what they need to the millimetre.
+    pub fn reserve_blocks(&mut self) {
+        self.blocks = Some(Blocks::of(self.driver.layout()));
+    }
+
+    /// What is taken for a train that needs this.
+    pub(super) fn reserved(&self, needed: Footprint) -> Footprint {
+        match &self.blocks {
+            Some(blocks) => blocks.around(self.driver.layout(), &needed),
+            None => needed,
         }
     }
 
@@ -135,7 +156,6 @@ impl Dispatcher {
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
             known.course.clear();
-            known.gave_way = false;
             known.unobstructed_s = None;
             known.held = Footprint::empty();
         }
@@ -224,7 +244,7 @@ impl Dispatcher {
         let Some(place) = self.driver.position(id, now) else { return };
         let room = self.room(now, train);
         let layout = self.driver.layout();
-        let mut held = standing(layout, self.driver.turnouts(), place, room);
+        let mut held = self.reserved(standing(layout, self.driver.turnouts(), place, &train.came, room));
         self.take_anchors(now, id, place, &mut held);
         // What is another's is not taken for a doubt that has grown: the train is within what it held.
         let is_free = self.trains.values().all(|other| other.id == id || !other.held.meets(&held));
@@ -239,7 +259,12 @@ impl Dispatcher {
     /// not thrown.
     pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Footprint) {
         let layout = self.driver.layout();
-        self.anchors(now, id, place).into_iter().for_each(|turnout| held.take_turnout(layout, turnout));
+        // What was asked for it will be told, whatever it is asked to do since.
+        let asked_for =
+            self.throwing.iter().filter(|(_, (train, _))| *train == id).map(|(turnout, _)| *turnout);
+        let asked_for = asked_for.filter(|turnout| self.is_being_thrown(now, *turnout));
+        let anchors = self.anchors(now, id, place).into_iter();
+        anchors.chain(asked_for).for_each(|turnout| held.take_turnout(layout, turnout));
     }
 
     /// A train at rest that was seen needs no turnouts behind it but the one whose leg it stands on.
@@ -280,6 +305,7 @@ impl Dispatcher {
             self.is_stirred |= self.trains.values().any(|train| train.rests() && train.asked.is_some());
         }
         for _ in 0..MOST_ROUNDS {
+            self.follow(now);
             while let Some(output) = self.driver.poll_output() {
                 match output {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
@@ -308,6 +334,16 @@ impl Dispatcher {
             .values()
             .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.asked.is_some());
         self.looks_at = waits.then_some(now + LOOK);
+    }
+
+    /// Takes note of how trains came to where they are.
+    fn follow(&mut self, now: Timestamp) {
+        let layout = self.driver.layout();
+        for train in self.trains.values_mut() {
+            if let Some(place) = self.driver.position(train.id, now) {
+                train.came.follow(layout, place);
+            }
+        }
     }
 
     /// Tells a train to stop at once.

@@ -18,6 +18,7 @@ use super::footprint::Footprint;
 use super::itinerary::{Itinerary, Pace, Search};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
+use super::trail::Trail;
 use super::way::Way;
 
 /// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
@@ -67,6 +68,7 @@ impl Proposal {
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     pub(super) place: Position,
+    pub(super) came: Trail,
     pub(super) room: Room,
     pub(super) pace: Pace,
     /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
@@ -135,8 +137,9 @@ impl Dispatcher {
         all_wait &= waiting.iter().all(|(_, since, id)| {
             now - *since >= STALLED && self.trains.get(id).is_some_and(DispatchedTrain::rests)
         });
-        if let (true, Some((_, _, id))) = (all_wait, waiting.first()) {
-            self.shuffle(now, *id);
+        if all_wait {
+            let waiting: Vec<TrainId> = waiting.into_iter().map(|(.., id)| id).collect();
+            self.shuffle(now, &waiting);
         }
     }
 
@@ -159,7 +162,7 @@ impl Dispatcher {
     }
 
     /// The places at which a train would have arrived.
-    fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
+    pub(super) fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
         let asked = self.trains.get(&id)?.asked?;
         let other = self.driver.layout().reversed(asked.place).filter(|_| !asked.journey.faces);
         Some([Some(asked.place), other].into_iter().flatten().collect())
@@ -177,9 +180,10 @@ impl Dispatcher {
         let mut near = self.driver.turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let may_turn = self.driver.unseen(id, now).is_none() && !train.gave_way;
+        let may_turn = self.driver.unseen(id, now).is_none() && !self.is_on_points_that_gave_way(now, id);
         let turned = self.driver.turned_place(id, now).filter(|_| may_turn);
-        Some(Start { place, room, pace: self.pace(id), frozen, turned })
+        let came = train.came.clone();
+        Some(Start { place, came, room, pace: self.pace(id), frozen, turned })
     }
 
     /// The soonest way past obstacles, with what it takes.
@@ -198,8 +202,10 @@ impl Dispatcher {
     }
 
     pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {
-        let runs =
-            granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start.room, &start.frozen)?;
+        let mut runs = granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start)?;
+        for run in &mut runs {
+            run.taken = self.reserved(core::mem::take(&mut run.taken));
+        }
         Some(Proposal { itinerary, runs })
     }
 
@@ -220,7 +226,14 @@ impl Dispatcher {
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.driver.layout();
         let turned = start.turned?;
-        let (way, at) = Way::around(layout, self.driver.turnouts(), turned, start.room.behind, Length::ZERO);
+        let (way, at) = Way::around(
+            layout,
+            self.driver.turnouts(),
+            turned,
+            &Trail::default(),
+            start.room.behind,
+            Length::ZERO,
+        );
         let lies_otherwise = |need: TurnoutNeed| {
             start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)
         };
@@ -231,7 +244,7 @@ impl Dispatcher {
     }
 
     /// The way that a train would take if others made room for it in time; those that nobody can find do not.
-    fn wish(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
+    pub(super) fn wish(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
         let mut obstacles = Obstacles::default();
         for other in self.trains.values().filter(|other| other.id != id) {
             let seconds = match other.state {

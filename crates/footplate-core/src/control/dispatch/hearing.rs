@@ -84,6 +84,10 @@ impl Dispatcher {
     /// A train that comes to rest near its destination has arrived.
     fn forgive(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
+        // It may not even have set out.
+        if self.driver.unseen(id, now).is_some() {
+            return;
+        }
         let rest = self.driver.rest_if_stopped(id, now).and_then(|at| self.driver.position_at(id, at));
         let error = rest.and_then(|rest| Some(run.way.find(rest, run.start)? - run.stop));
         if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
@@ -109,8 +113,8 @@ impl Dispatcher {
         let located = self.driver.locate(id, now);
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
-        let (way, at) = Way::around(layout, self.driver.turnouts(), place, room.behind, ahead);
-        let taken = way.footprint(layout, at - room.behind, at + ahead);
+        let (way, at) = Way::around(layout, self.driver.turnouts(), place, &train.came, room.behind, ahead);
+        let taken = self.reserved(way.footprint(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut held = taken;

@@ -12,7 +12,7 @@ use crate::units::{Length, Speed};
 use super::obstacles::Obstacles;
 
 /// Shorter moves are hard to make and say nothing of where a train is: it goes round or comes from the other side.
-const SHORTEST_RUN: Length = Length::from_mm(200.0);
+pub(super) const SHORTEST_RUN: Length = Length::from_mm(200.0);
 /// Ways looked at beyond one turnout on which a train could turn around.
 const MOST_NECKS: usize = 8;
 

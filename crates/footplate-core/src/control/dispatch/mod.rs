@@ -4,6 +4,7 @@
 //! all the track of that way at once, throws the turnouts, runs it from one reversal to the next, and frees what is
 //! behind it. No train is let beyond what it holds; trains at rest in the way of others step aside.
 
+mod blocks;
 mod by_hand;
 mod course;
 mod danger;
@@ -19,6 +20,7 @@ mod obstacles;
 mod parking;
 mod running;
 mod setting;
+mod trail;
 mod untangling;
 mod way;
 

@@ -36,7 +36,7 @@ pub enum DispatchNotice {
     Deadlock {
         /// The train that cannot get through.
         train: TrainId,
-        /// Those that will step aside, in this order.
+        /// Those that will step aside, in this order; none if nothing was found that helps, and one will go anywhere else.
         moves: Vec<TrainId>,
     },
     /// A train is sent out of the way of another.

@@ -6,13 +6,14 @@ use crate::track::{Layout, Position, TurnoutStates};
 use crate::units::Length;
 
 use super::course::{Room, standing};
+use super::trail::Trail;
 
 /// From one place looked at to the next: less than what two trains differ by.
 const EVERY: Length = Length::from_mm(100.0);
 /// What is not known of the place of a train that will have stopped somewhere, one standard deviation.
 pub(super) const PARKED: Length = Length::from_mm(15.0);
 /// What a train is likely to stop off its place by.
-const OFF: Length = Length::from_mm(40.0);
+pub(super) const OFF: Length = Length::from_mm(40.0);
 
 /// All places on a layout where there is room for a train, each once, and whether it is clear of all turnouts there.
 pub(super) fn parking_places(layout: &Layout, room: Room) -> Vec<(Position, bool)> {
@@ -23,7 +24,7 @@ pub(super) fn parking_places(layout: &Layout, room: Room) -> Vec<(Position, bool
         let mut offset = EVERY / 2.0;
         while offset < edge.length {
             let place = Position { edge: id, offset };
-            let taken = standing(layout, &turnouts, place, room);
+            let taken = standing(layout, &turnouts, place, &Trail::default(), room);
             let length: Length = taken.spans().map(|(_, span)| span.to - span.from).sum();
             if length >= room.ahead + room.behind - Length::from_mm(1.0) {
                 places.push((place, taken.turnouts().next().is_none()));

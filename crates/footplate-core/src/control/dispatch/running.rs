@@ -1,5 +1,6 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
+use crate::control::drive::THERE;
 use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -10,7 +11,9 @@ use super::course::{GrantedRun, SLACK};
 use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::footprint::Footprint;
+use super::itinerary::SHORTEST_RUN;
 use super::notice::DispatchNotice;
+use super::way::Way;
 
 /// What could not be done is not tried again for so long.
 const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
@@ -114,10 +117,13 @@ impl Dispatcher {
             let limit = run.way.place(run.limit)?;
             let limit = self.driver.way_point_ahead(id, located.at, limit)?;
             let stop = run.way.place(run.stop)?;
-            (limit.way > located.at.way).then_some((at, limit, stop))
+            let direct = self.driver.way_point(id, located.at.node, stop)?.way - located.at.way;
+            // The way may go round to a place at which it stands already.
+            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
-        let Some((at, limit, stop)) = found else { return self.withdraw(now, id, None) };
+        let Some((at, limit, (stop, next_round))) = found else { return self.withdraw(now, id, None) };
         let layout = self.driver.layout();
         let Some(edge) = layout.edge(stop.edge) else { return self.withdraw(now, id, None) };
         let target = Landmark { node: edge.from, offset: stop.offset };
@@ -125,7 +131,7 @@ impl Dispatcher {
         let aim = train.asked.filter(|_| is_last).map_or(Aim::Median, |asked| asked.journey.aim);
         // Where a train only turns around or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
-        let stop = StopOrder { train: id, target, aim, step, next_round: false };
+        let stop = StopOrder { train: id, target, aim, step, next_round };
         self.driver.set_limit(now, id, Some(limit));
         let taken = self.driver.order(now, Order::Stop(stop));
         let retried = |_| self.driver.order(now, Order::Stop(StopOrder { step: None, ..stop }));
@@ -147,16 +153,16 @@ impl Dispatcher {
     pub(super) fn run_ended(&mut self, now: Timestamp, id: TrainId, unseen: bool, error: Option<Length>) {
         let Some(train) = self.trains.get_mut(&id) else { return };
         let State::Running { rear, confirmed, .. } = train.state else { return };
-        self.look_under(now, id);
+        let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen;
+        let confirmed = confirmed && !unseen && !self.driver.is_in_doubt(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
             return self.halted(now, id, false);
         }
         let turns_next = train.course.front().is_some_and(|run| run.turns);
-        if turns_next && train.gave_way {
+        if turns_next && gave_way {
             return self.halted(now, id, confirmed);
         }
         if train.course.is_empty() {
@@ -180,7 +186,6 @@ impl Dispatcher {
     /// A train that was told to stop stands.
     pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
         let is_sure = self.driver.position(id, now).is_some();
-        self.look_under(now, id);
         if let Some(train) = self.trains.get_mut(&id) {
             train.course.clear();
             train.state = if is_sure { State::Resting } else { State::Lost };
@@ -196,19 +201,15 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
-    /// Notes whether a train that has come to rest is on points that gave way to it. Off its course it still is if it was.
-    fn look_under(&mut self, now: Timestamp, id: TrainId) {
-        let Some(train) = self.trains.get(&id) else { return };
+    /// Whether a train at rest is on points that lie for another leg than it came from: they gave way to it.
+    pub(super) fn is_on_points_that_gave_way(&self, now: Timestamp, id: TrainId) -> bool {
         let place = self.driver.position(id, now);
-        let on = train.course.front().zip(place).and_then(|(run, place)| {
-            let from = if let State::Running { rear, .. } = train.state { rear } else { run.start };
-            let at = run.way.find(place, from)?;
-            let (layout, turnouts) = (self.driver.layout(), self.driver.turnouts());
-            Some(run.is_on_points_that_gave_way(layout, turnouts, at, self.room(now, train)))
-        });
-        if let (Some(train), Some(on)) = (self.trains.get_mut(&id), on) {
-            train.gave_way = on;
-        }
+        let Some((train, place)) = self.trains.get(&id).zip(place) else { return false };
+        let room = self.room(now, train);
+        let (layout, turnouts) = (self.driver.layout(), self.driver.turnouts());
+        let (way, at) = Way::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
+        let mut trailed = way.trailed(layout, at - room.behind, at + room.ahead);
+        trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
     }
 
     /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
@@ -225,7 +226,7 @@ impl Dispatcher {
         let layout = self.driver.layout();
         // What was let go is somebody else's by now.
         let from = (at - room.behind).max(rear);
-        let mut held = run.way.footprint(layout, from, (at + room.ahead).min(run.end));
+        let mut held = self.reserved(run.way.footprint(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
         if let Some(train) = self.trains.get_mut(&id) {
             train.held = held;
@@ -293,7 +294,7 @@ impl Dispatcher {
         for (nth, run) in train.course.iter().enumerate() {
             match train.state {
                 State::Running { rear, .. } if nth == 0 => {
-                    held.add(layout, &run.taken_from(layout, rear));
+                    held.add(layout, &self.reserved(run.taken_from(layout, rear)));
                 }
                 _ => held.add(layout, &run.taken),
             }
@@ -316,6 +317,10 @@ impl Dispatcher {
         let Some(run) = train.course.front() else { return true };
         let layout = self.driver.layout();
         let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
+        // It may have been somebody else, or nobody.
+        if self.driver.is_in_doubt(id) {
+            return true;
+        }
         let rear = rear.max(at - train.lengths.behind() - SLACK);
         if let Some(train) = self.trains.get_mut(&id) {
             train.state = State::Running { order, rear, confirmed: true };

@@ -60,6 +60,7 @@ impl Dispatcher {
         if self.is_in_its_own_way(now, id, &missing, &anchors) {
             return false;
         }
+        let under = self.driver.turnouts_under(id, now);
         for need in missing {
             // Points that are still moving might be left half way by a second word that fails.
             let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
@@ -74,10 +75,12 @@ impl Dispatcher {
             };
             match taken {
                 Ok(_) => {
-                    self.throwing.insert(need.turnout, now);
+                    self.throwing.insert(need.turnout, (id, now));
                 }
                 // It stands on the points, and they give way to it.
-                Err(_) if !need.facing => {
+                Err(_)
+                    if !need.facing && (under.contains(&need.turnout) || anchors.contains(&need.turnout)) =>
+                {
                     if let Some(train) = self.trains.get_mut(&id) {
                         train.skipped.insert(need.turnout);
                     }
@@ -114,8 +117,8 @@ impl Dispatcher {
     }
 
     /// Whether a turnout was asked for and may still be told. What got lost on the line is asked for again.
-    fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
-        self.throwing.get(&turnout).is_some_and(|since| now - *since < TOLD_WITHIN)
+    pub(super) fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
+        self.throwing.get(&turnout).is_some_and(|(_, since)| now - *since < TOLD_WITHIN)
     }
 
     /// Whether a train comes from a leg to points that have to give way to it: it stands on them, or on those in the same
@@ -155,7 +158,12 @@ impl Dispatcher {
 
     /// A turnout has been told how to lie.
     pub(super) fn turnout_told(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
-        self.throwing.remove(&turnout);
+        let asked_for = self.throwing.remove(&turnout);
+        if let Some((id, _)) =
+            asked_for.filter(|(id, _)| self.trains.get(id).is_some_and(DispatchedTrain::rests))
+        {
+            self.stand(now, id);
+        }
         let leg = Leg::from_curved(curved);
         let times = self.told.get(&turnout).filter(|told| told.leg == leg).map_or(0, |told| told.times);
         self.told.insert(turnout, Told { leg, times: times.saturating_add(1), last: now });

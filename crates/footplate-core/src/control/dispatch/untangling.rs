@@ -18,21 +18,34 @@ use super::footprint::Footprint;
 use super::granting::{Proposal, Start};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
-use super::parking::PARKED;
+use super::parking::{OFF, PARKED};
+use super::trail::Trail;
 
-/// How many ways one search may try before it gives up until something else has changed.
-const MOST_TRIED: usize = 150;
-/// Moves that one sequence may take.
-const MOST_MOVES: usize = 2;
-/// Of all places for a train to step aside to, so many are tried, the soonest reached.
-const PLACES_TRIED: usize = 6;
-/// Of all scenes after a move that does not help by itself, so many are looked at further.
-const SCENES_KEPT: usize = 4;
+/// How much is tried before a search gives up until something else has changed.
+#[derive(Debug, Clone, Copy)]
+struct Effort {
+    /// Ways looked for.
+    tried: usize,
+    /// Moves that one sequence may take.
+    moves: usize,
+    /// Of all places for a train to step aside to, so many are tried, the soonest reached.
+    places: usize,
+    /// Of all scenes after a move that does not help by itself, so many are looked at further.
+    kept: usize,
+}
+
+/// While others run: a few milliseconds.
+const USUAL: Effort = Effort { tried: 150, moves: 2, places: 6, kept: 4 };
+/// When nobody runs, and nobody would for ever: a tenth of a second does not matter.
+const THOROUGH: Effort = Effort { tried: 1_500, moves: 4, places: 12, kept: 16 };
 /// What was tried in vain is not tried again for so long.
 const IN_VAIN: TimeSpan = TimeSpan::from_s(6.0);
 
 /// When others have stepped aside so often for a train that still waits, it is somebody else's turn.
 const ROOMS_IN_A_ROW: u32 = 4;
+
+/// When that was in vain, it is not tried again for so long.
+const THINKS_AGAIN: TimeSpan = TimeSpan::from_s(15.0);
 
 /// A train at rest, here or there.
 #[derive(Debug, Clone)]
@@ -68,18 +81,29 @@ impl Dispatcher {
         if self.trains.get(&id).is_none_or(|train| now < train.no_room_until) {
             return;
         }
-        let found = self.untangled(now, id, targets, wish).and_then(|moves| {
+        if !self.untangle(now, id, targets, wish, USUAL)
+            && let Some(train) = self.trains.get_mut(&id)
+        {
+            train.no_room_until = now + IN_VAIN;
+        }
+    }
+
+    /// Looks for moves after which a train has a free way, and begins with the first; whether there are any.
+    fn untangle(
+        &mut self,
+        now: Timestamp,
+        id: TrainId,
+        targets: &[Position],
+        wish: &Proposal,
+        effort: Effort,
+    ) -> bool {
+        let found = self.untangled(now, id, targets, wish, effort).and_then(|moves| {
             let (first, place) = moves.first().copied()?;
             let start = self.start(now, first)?;
             let proposal = self.propose(&start, &self.both_ways(place), &self.obstacles_of_others(first))?;
             self.is_free(first, &proposal).then_some((moves, place, proposal))
         });
-        let Some((moves, place, proposal)) = found else {
-            if let Some(train) = self.trains.get_mut(&id) {
-                train.no_room_until = now + IN_VAIN;
-            }
-            return;
-        };
+        let Some((moves, place, proposal)) = found else { return false };
         let moves: Vec<TrainId> = moves.into_iter().map(|(train, _)| train).collect();
         if let Some(first) = moves.first().copied() {
             self.say(DispatchNotice::Deadlock { train: id, moves });
@@ -92,13 +116,27 @@ impl Dispatcher {
             }
             self.send_aside(now, first, id, place, proposal);
         }
+        true
     }
 
-    /// Nobody runs and no sequence of moves was found that helps: the trains at rest take turns in going somewhere else,
-    /// so that the next search begins from other places.
-    pub(super) fn shuffle(&mut self, now: Timestamp, id: TrainId) {
+    /// Nobody runs and no sequence of moves was found that helps: more is tried for each of those that wait in turn; and if
+    /// that is in vain, too, trains take turns in going somewhere else, so that the next search begins from other places.
+    pub(super) fn shuffle(&mut self, now: Timestamp, waiting: &[TrainId]) {
         if self.trains.values().any(|train| !train.course.is_empty()) {
             return;
+        }
+        let turn = self.shuffled.checked_rem(waiting.len()).and_then(|turn| waiting.get(turn));
+        let Some(id) = turn.copied() else { return };
+        let is_due = self.thought.is_none_or(|last| now - last >= THINKS_AGAIN);
+        if is_due
+            && let Some((targets, start)) = self.targets(id).zip(self.start(now, id))
+            && let Some(wish) = self.wish(id, &start, &targets)
+        {
+            self.shuffled += 1;
+            if self.untangle(now, id, &targets, &wish, THOROUGH) {
+                return;
+            }
+            self.thought = Some(now);
         }
         let ready: Vec<TrainId> =
             self.trains.values().filter(|train| train.is_ready(now)).map(|train| train.id).collect();
@@ -107,7 +145,7 @@ impl Dispatcher {
             let Some(mover) = ready.get(turn).copied() else { continue };
             if let Some((place, proposal)) = self.elsewhere(now, mover) {
                 self.shuffled += nth + 1;
-                self.say(DispatchNotice::Deadlock { train: id, moves: alloc::vec![mover] });
+                self.say(DispatchNotice::Deadlock { train: id, moves: Vec::new() });
                 self.send_aside(now, mover, id, place, proposal);
                 return;
             }
@@ -170,6 +208,7 @@ impl Dispatcher {
         id: TrainId,
         targets: &[Position],
         wish: &Proposal,
+        effort: Effort,
     ) -> Option<Vec<(TrainId, Position)>> {
         let resting = self.trains.values().filter(|train| train.rests());
         let standers = resting.filter_map(|train| {
@@ -183,7 +222,7 @@ impl Dispatcher {
         let is_fixed_free = |taken: &Footprint| moving().all(|train| !train.held.meets(taken));
         let mut tried = 0;
         let mut scenes = alloc::vec![Scene { standers: standers.collect(), moves: Vec::new(), seconds: 0.0 }];
-        for _ in 0..MOST_MOVES {
+        for _ in 0..effort.moves {
             let mut next: Vec<Scene> = Vec::new();
             let mut best: Option<Scene> = None;
             for scene in &scenes {
@@ -192,12 +231,12 @@ impl Dispatcher {
                     if !is_in_the_way && scenes.len() == 1 && best.is_some() {
                         continue;
                     }
-                    for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish) {
+                    for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish, effort.places) {
                         if !is_fixed_free(&held) {
                             continue;
                         }
                         tried += 1;
-                        if tried > MOST_TRIED {
+                        if tried > effort.tried {
                             return best.map(|best| best.moves);
                         }
                         let mut after = scene.clone();
@@ -222,7 +261,7 @@ impl Dispatcher {
                 return Some(best.moves);
             }
             next.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
-            next.truncate(SCENES_KEPT);
+            next.truncate(effort.kept);
             scenes = next;
         }
         None
@@ -236,6 +275,7 @@ impl Dispatcher {
         nth: usize,
         fixed: &Obstacles,
         wish: &Proposal,
+        places_tried: usize,
     ) -> Vec<(Position, Footprint, f64)> {
         let Some(mover) = scene.standers.get(nth) else { return Vec::new() };
         let Some(start) = self.hypothetical(now, mover) else { return Vec::new() };
@@ -246,13 +286,15 @@ impl Dispatcher {
         let layout = self.driver.layout();
         let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
         let room = Room::of(train.lengths, PARKED, start.room.overrun);
+        let room = Room { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
         // Out of the way first, then off the turnouts, then the soonest.
         let mut places: Vec<(bool, Position, Footprint, f64)> = Vec::new();
         for (place, is_clear) in train.parking.iter().copied() {
             let ways = self.both_ways(place);
             let soonest = ways.iter().filter_map(|place| reached.seconds_to(*place)).reduce(f64::min);
             let Some(seconds) = soonest else { continue };
-            let held = standing(layout, self.driver.turnouts(), place, room);
+            let held =
+                self.reserved(standing(layout, self.driver.turnouts(), place, &Trail::default(), room));
             if !held.meets(&mover.held) {
                 let seconds = if is_clear { seconds } else { seconds + ON_TURNOUT_S };
                 places.push((wish.meets(&held), place, held, seconds));
@@ -268,7 +310,7 @@ impl Dispatcher {
             own.for_each(|need| held.take_turnout(layout, need.turnout));
             others().all(|other| !proposal.meets(&other.held)).then_some((place, held, seconds))
         };
-        places.into_iter().filter_map(can_go).take(PLACES_TRIED).collect()
+        places.into_iter().filter_map(can_go).take(places_tried).collect()
     }
 
     /// How long a train takes to its destination in a scene; `None` if it cannot go there.
@@ -297,6 +339,13 @@ impl Dispatcher {
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = Room::of(lengths, PARKED, start.room.overrun);
         let turned = self.driver.turned_place_at(stander.place);
-        Some(Start { place: stander.place, room, frozen: Vec::new(), turned, ..start })
+        Some(Start {
+            place: stander.place,
+            room,
+            frozen: Vec::new(),
+            turned,
+            came: Trail::default(),
+            ..start
+        })
     }
 }

@@ -7,6 +7,7 @@ use crate::track::{Layout, Leg, NodeKind, Position, TurnoutNeed, TurnoutStates, 
 use crate::units::Length;
 
 use super::footprint::Footprint;
+use super::trail::Trail;
 
 /// No way leads over more edges: some rounds of any layout in use.
 const MOST_EDGES: usize = 1_000;
@@ -44,20 +45,24 @@ impl Way {
         self.edges.iter().map(|(id, _)| *id)
     }
 
-    /// The track behind and before a place, as the turnouts lie; shorter where the track ends. Gives where the place is.
+    /// The track behind and before a place, as the turnouts lie where the train did not come from there; shorter where the
+    /// track ends. Gives where the place is.
     pub(super) fn around(
         layout: &Layout,
         turnouts: &TurnoutStates,
         place: Position,
+        came: &Trail,
         behind: Length,
         ahead: Length,
     ) -> (Self, Length) {
         let mut before = Vec::new();
         let mut left = behind - place.offset;
         let mut edge = place.edge;
+        let mut came = came.before(place.edge);
         while left > Length::ZERO && before.len() < MOST_EDGES {
-            let Some(next) = next_edge(layout, turnouts, edge.twin()) else { break };
-            edge = next.twin();
+            let as_it_lies = |edge: EdgeId| Some(next_edge(layout, turnouts, edge.twin())?.twin());
+            let Some(next) = came.next().or_else(|| as_it_lies(edge)) else { break };
+            edge = next;
             before.push(edge);
             left -= layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         }

@@ -99,6 +99,13 @@ impl Attribution {
         self.doubt.take_if(|doubt| doubt.otherwise.iter().any(|branch| branch.train == train));
     }
 
+    /// Whether a train may be elsewhere than it is believed to be, because a contact that it passed or did not pass is in
+    /// doubt.
+    pub(super) fn doubts(&self, train: TrainId) -> bool {
+        let otherwise = self.doubt.iter().flat_map(|doubt| &doubt.otherwise);
+        otherwise.into_iter().any(|branch| branch.train == train)
+    }
+
     /// A command to a train has left: those that it may be hear it, too.
     pub(super) fn command_left(
         &mut self,

@@ -78,6 +78,12 @@ impl Driver {
         train.unseen().or_else(|| train.passed_unheard(ground, &train.located(ground, now)?))
     }
 
+    /// Whether it is not sure which contacts a train has passed: it may be where it would be otherwise.
+    #[must_use]
+    pub fn is_in_doubt(&self, train: TrainId) -> bool {
+        self.attribution.doubts(train)
+    }
+
     /// Counts a train at rest from the node behind its pickup, whatever is there: how turnouts further away lie makes no
     /// difference from now on.
     pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {

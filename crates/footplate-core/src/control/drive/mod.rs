@@ -31,3 +31,4 @@ pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedArrival, Pla
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use pacing::ArrivalProfile;
 pub use refusal::Refusal;
+pub(in crate::control) use stop_planning::THERE;

@@ -29,7 +29,7 @@ const NEWS: TimeSpan = TimeSpan::from_ms(1);
 /// An overshoot that is less than any stop scatters is no news either.
 const OVERSHOOT: Length = Length::from_mm(5.0);
 /// A train that stands this near to where it should is there.
-const THERE: Length = Length::from_mm(1.0);
+pub(in crate::control) const THERE: Length = Length::from_mm(1.0);
 
 impl DrivenTrain {
     /// Takes an order to stop somewhere.

@@ -169,6 +169,9 @@ impl Tongue<'_> {
             DispatchNotice::Waits { train, on } => {
                 format!("train {train} waits for track that is held by {}", trains(on))
             }
+            DispatchNotice::Deadlock { train, moves } if moves.is_empty() => {
+                format!("train {train} cannot get through, nor can anybody else: one will go somewhere else")
+            }
             DispatchNotice::Deadlock { train, moves } => {
                 format!("train {train} cannot get through: {} will step aside", trains(moves))
             }

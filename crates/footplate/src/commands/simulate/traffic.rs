@@ -9,6 +9,7 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use footplate_core::TimeSpan;
+use footplate_core::track::Layout;
 use footplate_store::layout_named;
 
 use self::page::Page;
@@ -41,6 +42,9 @@ pub(super) struct Arguments {
     /// Track time that the calibration of each train may take, in seconds.
     #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
     budget: u16,
+    /// The same again with the track between contacts reserved as a whole, as block systems do, to compare with.
+    #[arg(long)]
+    baseline: bool,
     /// Tell everything that happens while it happens.
     #[arg(long)]
     talk: bool,
@@ -63,16 +67,15 @@ impl Arguments {
             trains: usize::from(self.trains),
             time: TimeSpan::from_s(self.hours * 3600.0),
             budget: TimeSpan::from_s(f64::from(self.budget)),
+            by_blocks: false,
         };
-        let threads = self.threads.unwrap_or_else(all_cores);
-        let tallies = with_progress("traffic", seeds.len(), |done| {
-            spread(seeds.len(), threads, |at| {
-                let tally = Session::new(&layout, seeds[at], asked, self.talk)?.run(asked.time);
-                done.fetch_add(1, Ordering::Relaxed);
-                anyhow::Ok(tally)
-            })
-        })?;
-        let page = Page { tallies: &tallies, asked: self.asked() };
+        let tallies = self.tallies(&layout, &seeds, asked)?;
+        let by_blocks = if self.baseline {
+            self.tallies(&layout, &seeds, Asked { by_blocks: true, ..asked })?
+        } else {
+            Vec::new()
+        };
+        let page = Page { tallies: &tallies, by_blocks: &by_blocks, asked: self.asked() };
         if self.json {
             page.write_json(output)?;
         } else if self.markdown {
@@ -82,6 +85,17 @@ impl Arguments {
         }
         let failed: Vec<FailedRun> = tallies.iter().filter_map(|tally| self.failed(tally)).collect();
         Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    fn tallies(&self, layout: &Layout, seeds: &[u64], asked: Asked) -> anyhow::Result<Vec<Tally>> {
+        let threads = self.threads.unwrap_or_else(all_cores);
+        with_progress("traffic", seeds.len(), |done| {
+            spread(seeds.len(), threads, |at| {
+                let tally = Session::new(layout, seeds[at], asked, self.talk)?.run(asked.time);
+                done.fetch_add(1, Ordering::Relaxed);
+                anyhow::Ok(tally)
+            })
+        })
     }
 
     /// What must never become of trains, if it did, and how to have it again with all that is said.
@@ -95,7 +109,8 @@ impl Arguments {
             what.push(format!("a train came nowhere for {:.0} s", tally.starved));
         }
         let again = self.asked().replace(&format!("--seeds {}", self.seeds.written()), "");
-        let again = again.replace("--markdown", "").split_whitespace().collect::<Vec<_>>().join(" ");
+        let again = again.replace("--markdown", "").replace("--baseline", "");
+        let again = again.split_whitespace().collect::<Vec<_>>().join(" ");
         (!what.is_empty()).then(|| FailedRun {
             what: format!("seed {}: {}", tally.seed, what.join(", ")),
             again: format!("simulate traffic {again} --seed {} --talk", tally.seed),
@@ -115,6 +130,9 @@ impl Arguments {
         }
         if self.budget != 300 {
             asked = format!("--budget {} {asked}", self.budget);
+        }
+        if self.baseline {
+            asked = format!("--baseline {asked}");
         }
         asked
     }

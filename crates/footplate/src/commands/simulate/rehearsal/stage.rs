@@ -30,8 +30,8 @@ pub(crate) struct Rehearsal<'l> {
 }
 
 impl<'l> Rehearsal<'l> {
-    /// Draws trains and rails from the seed, calibrates each train while the others are lifted, and lifts them all. A hand
-    /// lays all turnouts straight then.
+    /// Draws trains and rails from the seed, calibrates each train while the others are lifted, and lifts them all. A train
+    /// that comes to grief is put elsewhere and calibrated again. A hand lays all turnouts straight then.
     ///
     /// # Errors
     /// When no train can run round on the layout.
@@ -53,12 +53,20 @@ impl<'l> Rehearsal<'l> {
         trains.iter().for_each(|train| station.world_mut().lift(*train));
         let mut line = VirtualLine::open(station)?;
         let mut models = BTreeMap::new();
-        for (train, stood) in trains.iter().zip(stood) {
-            let (position, leads) = stood.with_context(|| format!("there is no room for train {train}"))?;
-            line.station.world_mut().place(*train, position, leads)?;
-            let calibrated = calibrate(layout, &mut line, *train, budget);
-            line.station.world_mut().lift(*train);
-            models.insert(*train, calibrated.model);
+        for (nth, train) in trains.iter().enumerate() {
+            // Nobody knows at first where it runs to. Whoever saw it run off the rails puts it where another began.
+            let begins = stood.iter().cycle().skip(nth).take(trains.len()).flatten();
+            let mut model = None;
+            for (position, leads) in begins {
+                let mishaps = line.station.world().mishaps().len();
+                line.station.world_mut().place(*train, *position, *leads)?;
+                model = Some(calibrate(layout, &mut line, *train, budget).model);
+                line.station.world_mut().lift(*train);
+                if line.station.world().mishaps().len() == mishaps {
+                    break;
+                }
+            }
+            models.insert(*train, model.with_context(|| format!("there is no room for train {train}"))?);
         }
         let mut turnouts = TurnoutStates::unknown();
         for (turnout, _) in layout.turnouts() {

@@ -16,16 +16,20 @@ fail, at the rates of a well-kept laboratory. The simulator's truth is used for 
 ";
 
 const LEGEND: &str = "\
-*Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted.
+*Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted, of
+which one in a thousand may end beyond its track as it was reserved.
 *Waited* is from the order until the way was set, *took* until arrival (mean). *Nowhere* is the longest time that a train
 came to no destination. *Mistaken*: of all rests past a contact those at which the train stood further than four standard
 deviations from where it was believed to. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
-near to the end of a track, for which another was drawn.
+near to the end of a track, for which another was drawn. *By blocks*: the same trains, ways and stops, but whatever lies
+between contacts is reserved as a whole, with all its turnouts, as block systems do.
 ";
 
 /// All that was scored.
 pub(super) struct Page<'r> {
     pub(super) tallies: &'r [Tally],
+    /// The same seeds with whole blocks reserved, if that was asked for.
+    pub(super) by_blocks: &'r [Tally],
     pub(super) asked: String,
 }
 
@@ -49,12 +53,21 @@ impl Page<'_> {
         if self.tallies.len() > 1 {
             row(output, "all", &self.tallies.iter().collect::<Vec<_>>())?;
         }
-        Ok(())
+        if self.by_blocks.is_empty() {
+            return Ok(());
+        }
+        row(output, "all, by blocks", &self.by_blocks.iter().collect::<Vec<_>>())
     }
 
     pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
-        let seeds = self.tallies.iter().map(|tally| {
-            json!({
+        writeln!(output, "{}", json!({ "seeds": seeds(self.tallies), "by_blocks": seeds(self.by_blocks) }))
+    }
+}
+
+/// What is to be said of each seed.
+fn seeds(tallies: &[Tally]) -> Value {
+    let one = |tally: &Tally| {
+        json!({
                 "seed": tally.seed, "hours": tally.hours, "trains": tally.trains, "arrivals": tally.arrivals,
                 "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
                 "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
@@ -63,10 +76,9 @@ impl Page<'_> {
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
                 "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
-            })
-        });
-        writeln!(output, "{}", json!({ "seeds": seeds.collect::<Vec<Value>>() }))
-    }
+        })
+    };
+    tallies.iter().map(one).collect()
 }
 
 fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()> {

@@ -40,6 +40,8 @@ pub(super) struct Asked {
     pub(super) trains: usize,
     pub(super) time: TimeSpan,
     pub(super) budget: TimeSpan,
+    /// Whether the track between contacts is reserved as a whole.
+    pub(super) by_blocks: bool,
 }
 
 /// What came of one.
@@ -108,7 +110,7 @@ impl<'l> Session<'l> {
                 if rehearsal.put(trains[nth], *node, PAST).is_err() {
                     continue;
                 }
-                let dispatcher = dispatcher(&rehearsal);
+                let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
                 let holds = |train: &TrainId| dispatcher.holds(*train);
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
@@ -124,7 +126,7 @@ impl<'l> Session<'l> {
                 bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
             }
         }
-        let dispatcher = dispatcher(&rehearsal);
+        let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
         let began = rehearsal.line.now();
         let tally =
             Tally { seed, trains: trains.len(), hours: asked.time.as_s() / 3600.0, ..Tally::default() };
@@ -146,10 +148,11 @@ impl<'l> Session<'l> {
     pub(super) fn run(mut self, time: TimeSpan) -> Tally {
         let began = self.rehearsal.line.now();
         let end = began + time;
+        let before = self.rehearsal.world().mishaps().len();
         for train in self.trains.clone() {
             self.send(train);
         }
-        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().is_empty() {
+        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
             let until = end.min(self.rehearsal.line.now() + LOOK);
             let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
             match notice {
@@ -162,7 +165,7 @@ impl<'l> Session<'l> {
         for train in self.trains.clone() {
             self.came_somewhere(train, now);
         }
-        self.tally.mishaps = self.rehearsal.world().mishaps().to_vec();
+        self.tally.mishaps = self.rehearsal.world().mishaps().iter().skip(before).copied().collect();
         for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
             eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
         }
@@ -338,9 +341,12 @@ impl<'l> Session<'l> {
     }
 }
 
-fn dispatcher(rehearsal: &Rehearsal<'_>) -> Dispatcher {
+fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
     let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    if by_blocks {
+        dispatcher.reserve_blocks();
+    }
     let trains: Vec<TrainId> = dispatcher.driver().trains().collect();
     for train in trains {
         dispatcher.set_lengths(now, train, LENGTHS);

@@ -1,0 +1,65 @@
+//! Track in blocks, as block systems know it: what lies between contacts is taken as a whole, with all its turnouts.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use crate::ids::{EdgeId, NodeId, StretchId};
+use crate::track::Layout;
+use crate::units::Length;
+
+use super::footprint::Footprint;
+
+/// Who takes less of a block than this only touches it.
+const TOUCHES: Length = Length::from_mm(1.0);
+
+/// The blocks of a layout.
+#[derive(Debug, Clone)]
+pub(super) struct Blocks {
+    of: BTreeMap<StretchId, usize>,
+    whole: Vec<Footprint>,
+}
+
+impl Blocks {
+    pub(super) fn of(layout: &Layout) -> Self {
+        let mut blocks = Self { of: BTreeMap::new(), whole: Vec::new() };
+        for (id, _) in layout.edges() {
+            if !blocks.of.contains_key(&id.stretch()) {
+                blocks.add(layout, id);
+            }
+        }
+        blocks
+    }
+
+    /// Adds the block of an edge: all rails that can be come to without passing a contact.
+    fn add(&mut self, layout: &Layout, first: EdgeId) {
+        let mut whole = Footprint::empty();
+        let mut open = alloc::vec![first];
+        while let Some(id) = open.pop() {
+            let Some(edge) = layout.edge(id) else { continue };
+            if self.of.insert(id.stretch(), self.whole.len()).is_some() {
+                continue;
+            }
+            whole.take(layout, id, Length::ZERO, edge.length);
+            let is_contact = |node: NodeId| {
+                [node, node.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some())
+            };
+            for node in [edge.from, edge.to].into_iter().filter(|node| !is_contact(*node)) {
+                let edges = [node, node.reverse()].into_iter().flat_map(|node| layout.ways(node).edges());
+                open.extend(edges.filter(|next| !self.of.contains_key(&next.stretch())));
+            }
+        }
+        self.whole.push(whole);
+    }
+
+    /// What is taken if a block can only be taken as a whole.
+    pub(super) fn around(&self, layout: &Layout, taken: &Footprint) -> Footprint {
+        let mut around = taken.clone();
+        for (stretch, span) in taken.spans() {
+            let block = self.of.get(&stretch).and_then(|block| self.whole.get(*block));
+            if let Some(block) = block.filter(|_| span.to - span.from >= TOUCHES) {
+                around.add(layout, block);
+            }
+        }
+        around
+    }
+}
