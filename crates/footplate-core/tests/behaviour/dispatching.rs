@@ -23,6 +23,8 @@ const STARTS: [(&str, f64); 2] = [("D1", 500.0), ("B1", 150.0)];
 const LENGTHS: TrainLengths = TrainLengths { overhang: Length::from_mm(50.0), pickup: Length::from_mm(30.0) };
 /// Destinations: contacts of the circuit, in both directions.
 pub(crate) const PLACES: [&str; 8] = ["A1", "A2", "B1", "B2", "C1", "C2", "D1", "D2"];
+/// What is said of a train that is where it may not be.
+pub(crate) const STRAYED: &str = "is on track that it does not hold";
 /// Places are sums of lengths.
 const ROUNDING: Length = Length::from_mm(0.5);
 
@@ -139,7 +141,7 @@ impl Traffic {
             let layout = &self.world.layout;
             let points = body.points(layout, at, LENGTHS.ahead(), LENGTHS.behind());
             if !points.into_iter().all(|point| is_held(layout, point, held)) {
-                wrongs.push(format!("train {train} is on track that it does not hold: {at:?} of {held:?}"));
+                wrongs.push(format!("train {train} {STRAYED}: {at:?} of {held:?}"));
             }
         }
         self.wrongs.extend(wrongs);
