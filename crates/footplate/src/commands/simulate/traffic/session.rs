@@ -117,7 +117,8 @@ impl<'l> Session<'l> {
                 });
                 let is_off_turnouts =
                     holds(&trains[nth]).is_some_and(|held| held.turnouts().next().is_none());
-                if is_apart && is_off_turnouts {
+                // Hardly a block has none.
+                if is_apart && (is_off_turnouts || asked.by_blocks) {
                     is_put = true;
                     break;
                 }
