@@ -44,8 +44,9 @@ pub(super) enum State {
     Turning { order: OrderId },
     /// It runs. Its rear end has certainly come as far as this on the way, and whether a contact has said so.
     Running { order: OrderId, rear: Length, confirmed: bool },
-    /// It was told to stop, and nothing is known of where it will go then; whether a contact said where it is.
-    Halting { confirmed: bool },
+    /// It was told to stop, and nothing is known of where it will go then; whether a contact said where it is, and whether
+    /// that was on track that it had not been granted.
+    Halting { confirmed: bool, strayed: bool },
     /// Somebody drives it by hand.
     ByHand,
     /// Nobody knows where it is.

@@ -358,7 +358,7 @@ impl Dispatcher {
             let confirmed = matches!(train.state, State::Running { confirmed: true, .. });
             train.course.clear();
             train.kept = train.held.clone();
-            train.state = State::Halting { confirmed };
+            train.state = State::Halting { confirmed, strayed: false };
         }
     }
 }

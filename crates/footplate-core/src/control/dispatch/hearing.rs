@@ -35,7 +35,9 @@ impl Dispatcher {
             DriveNotice::Passed { train, passed, .. } => {
                 let node = self.driver.layout().sensor_node(passed.sensor);
                 let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));
-                if !is_on_its_way {
+                let state = self.trains.get(train).map(|train| train.state);
+                let has_strayed = matches!(state, Some(State::Halting { strayed: true, .. }));
+                if !is_on_its_way || has_strayed {
                     self.diverged(now, *train);
                 }
             }
@@ -122,14 +124,19 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id) {
             train.held = held.clone();
             train.kept = held;
-            train.state = State::Halting { confirmed: true };
+            train.state = State::Halting { confirmed: true, strayed: true };
         }
-        let runs = |train: &&TrainId| {
-            let state = self.trains.get(train).map(|train| train.state);
-            matches!(state, Some(State::Running { .. } | State::ByHand))
-        };
-        let stopped: Vec<TrainId> = meets.iter().filter(runs).copied().collect();
-        stopped.iter().for_each(|other| self.halt(now, *other));
+        let mut stopped = Vec::new();
+        for other in meets {
+            match self.trains.get(&other).map(|train| train.state) {
+                Some(State::Running { .. } | State::ByHand | State::Turning { .. }) => {
+                    self.halt(now, other);
+                    stopped.push(other);
+                }
+                Some(State::Setting { .. }) => self.withdraw(now, other, None),
+                _ => {}
+            }
+        }
         self.say(DispatchNotice::Diverged { train: id, stopped });
     }
 }

@@ -35,7 +35,7 @@ impl Dispatcher {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed } if self.driver.stands(id, now) => {
+                State::Halting { confirmed, .. } if self.driver.stands(id, now) => {
                     self.halted(now, id, confirmed);
                 }
                 State::Lost if self.driver.stands(id, now) && self.driver.position(id, now).is_some() => {
