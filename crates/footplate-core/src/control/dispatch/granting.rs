@@ -215,6 +215,8 @@ impl Dispatcher {
             layout: self.driver.layout(),
             pace: start.pace,
             clears,
+            beyond: start.room.overrun + start.room.front,
+            turnouts: self.driver.turnouts(),
             obstacles,
             frozen: &start.frozen,
             points_give_way: true,

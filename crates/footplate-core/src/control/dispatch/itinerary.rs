@@ -6,10 +6,11 @@ use alloc::vec::Vec;
 use core::cmp::Ordering;
 
 use crate::ids::{EdgeId, NodeId};
-use crate::track::{Layout, NodeKind, Position, TurnoutNeed};
+use crate::track::{Layout, NodeKind, Position, TurnoutNeed, TurnoutStates};
 use crate::units::{Length, Speed};
 
 use super::obstacles::Obstacles;
+use super::way::edge_from;
 
 /// Shorter moves are hard to make and say nothing of where a train is: it goes round or comes from the other side.
 pub(super) const SHORTEST_RUN: Length = Length::from_mm(200.0);
@@ -52,6 +53,9 @@ pub(super) struct Search<'a> {
     pub(super) pace: Pace,
     /// How far a train has to run beyond a turnout so that it can be thrown behind it.
     pub(super) clears: Length,
+    /// How far beyond its stop a train may be in the end: over that the way goes on as the turnouts lie.
+    pub(super) beyond: Length,
+    pub(super) turnouts: &'a TurnoutStates,
     pub(super) obstacles: &'a Obstacles,
     /// Turnouts that cannot be thrown for the first run, because the train stands on them or too near.
     pub(super) frozen: &'a [TurnoutNeed],
@@ -186,12 +190,33 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 let stop = Position { edge: id, offset: left };
+                if !self.has_room_beyond(stop) {
+                    continue;
+                }
                 let Pace { start_s, stop_s, turn_s, .. } = self.pace;
                 let seconds = at.seconds + 2.0 * (cost + more) + stop_s + turn_s + start_s;
                 open.push(Open { seconds, node: at.node.reverse(), by: By::Shunt(reached.shunts.len()) });
                 reached.shunts.push(Shunt { merge: at.node, out: longer, stop });
             }
         }
+    }
+
+    /// Whether nobody keeps a train for ever from coming to rest beyond a stop.
+    fn has_room_beyond(&self, stop: Position) -> bool {
+        let (mut id, mut from, mut left) = (stop.edge, stop.offset, self.beyond);
+        for _ in 0..self.layout.edges().len() {
+            let Some(edge) = self.layout.edge(id) else { return false };
+            if self.seconds(id, from, edge.length.min(from + left)).is_none() {
+                return false;
+            }
+            left -= edge.length - from;
+            if left <= Length::ZERO {
+                return true;
+            }
+            let Some(next) = edge_from(self.layout, self.turnouts, edge.to) else { return false };
+            (id, from) = (next, Length::ZERO);
+        }
+        false
     }
 
     /// How long part of an edge takes, waiting for others included.
@@ -264,6 +289,9 @@ impl Reached<'_> {
     fn itinerary(&self, target: Position) -> Option<Itinerary> {
         let layout = self.search.layout;
         let edge = layout.edge(target.edge)?;
+        if !self.search.has_room_beyond(target) {
+            return None;
+        }
         // On the edge that the train stands on it may be ahead of it.
         let direct = [false, true].into_iter().filter_map(|turned| {
             let start = (*self.starts.get(usize::from(turned))?)?;
