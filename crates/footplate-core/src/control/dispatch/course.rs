@@ -88,8 +88,7 @@ pub(super) fn granted(
         let begin = start - room.behind;
         // What it came over matters again only when it goes back.
         let needs = way.needs(layout, if run.turns { begin } else { start }, end);
-        // What it stands on it holds already; another may hold what a doubt that has grown since would add to that.
-        let taken = way.footprint(layout, if runs.is_empty() { start } else { begin }, end);
+        let taken = way.footprint(layout, begin, end);
         let mut granted = GrantedRun { turns: run.turns, way, start, stop, begin, limit, end, needs, taken };
         // Its place is counted from the node behind it once it has turned around.
         if run.turns {
