@@ -53,6 +53,8 @@ pub(super) struct GrantedRun {
     pub(super) stop: Length,
     /// Where its rear end may be in the beginning.
     pub(super) begin: Length,
+    /// From where on its way was looked at for others: what is before that the train holds as it stands on it.
+    pub(super) taken_from: Length,
     /// Its pickup shall not pass this, and nothing of the train what is taken.
     pub(super) limit: Length,
     pub(super) end: Length,
@@ -88,8 +90,11 @@ pub(super) fn granted(
         let begin = start - room.behind;
         // What it came over matters again only when it goes back.
         let needs = way.needs(layout, if run.turns { begin } else { start }, end);
-        let taken = way.footprint(layout, begin, end);
-        let mut granted = GrantedRun { turns: run.turns, way, start, stop, begin, limit, end, needs, taken };
+        // What it stands on it holds already; another may hold what a doubt that has grown since would add to that.
+        let taken_from = if runs.is_empty() { start } else { begin };
+        let taken = way.footprint(layout, taken_from, end);
+        let mut granted =
+            GrantedRun { turns: run.turns, way, start, stop, begin, taken_from, limit, end, needs, taken };
         // Its place is counted from the node behind it once it has turned around.
         if run.turns {
             let edge = run.start.edge;

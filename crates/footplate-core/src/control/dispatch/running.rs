@@ -228,7 +228,8 @@ impl Dispatcher {
         let from = (at - room.behind).max(rear);
         let mut held = self.reserved(run.way.footprint(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
-        if let Some(train) = self.trains.get_mut(&id) {
+        let is_free = self.trains.values().all(|other| other.id == id || !other.held.meets(&held));
+        if let Some(train) = self.trains.get_mut(&id).filter(|_| is_free) {
             train.held = held;
             train.kept = Footprint::empty();
         }
@@ -293,8 +294,9 @@ impl Dispatcher {
         let mut held = train.kept.clone();
         for (nth, run) in train.course.iter().enumerate() {
             match train.state {
-                State::Running { rear, .. } if nth == 0 => {
-                    held.add(layout, &self.reserved(run.taken_from(layout, rear)));
+                State::Running { rear, confirmed, .. } if nth == 0 => {
+                    let from = if confirmed { rear } else { rear.max(run.taken_from) };
+                    held.add(layout, &self.reserved(run.taken_from(layout, from)));
                 }
                 _ => held.add(layout, &run.taken),
             }
@@ -322,6 +324,13 @@ impl Dispatcher {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);
+        // Near to where it began it keeps what it stood on.
+        let body = self.reserved(run.taken_from(layout, rear));
+        if rear < run.taken_from
+            && self.trains.values().any(|other| other.id != id && other.held.meets(&body))
+        {
+            return true;
+        }
         if let Some(train) = self.trains.get_mut(&id) {
             train.state = State::Running { order, rear, confirmed: true };
             train.kept = Footprint::empty();
