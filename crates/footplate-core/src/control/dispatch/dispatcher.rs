@@ -119,6 +119,11 @@ impl Dispatcher {
         self.blocks = Some(Blocks::of(self.driver.layout()));
     }
 
+    /// Whether no other train holds any of what a train would take.
+    pub(super) fn is_free_for(&self, id: TrainId, taken: &Footprint) -> bool {
+        self.trains.values().all(|other| other.id == id || !other.held.meets(taken))
+    }
+
     /// What is taken for a train that needs this.
     pub(super) fn reserved(&self, needed: Footprint) -> Footprint {
         match &self.blocks {
@@ -247,7 +252,7 @@ impl Dispatcher {
         let mut held = self.reserved(standing(layout, self.driver.turnouts(), place, &train.came, room));
         self.take_anchors(now, id, place, &mut held);
         // What is another's is not taken for a doubt that has grown: the train is within what it held.
-        let is_free = self.trains.values().all(|other| other.id == id || !other.held.meets(&held));
+        let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.held.is_empty()) {
             train.held = held;
             train.kept = Footprint::empty();

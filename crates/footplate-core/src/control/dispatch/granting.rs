@@ -263,11 +263,7 @@ impl Dispatcher {
 
     /// A way on which nobody is.
     fn free_way(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
-        let mut obstacles = Obstacles::default();
-        let others = || self.trains.values().filter(|other| other.id != id);
-        others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
-        let found = self.propose(start, targets, &obstacles)?;
-        others().all(|other| !found.meets(&other.held)).then_some(found)
+        self.propose(start, targets, &self.obstacles_of_others(id)).filter(|found| self.is_free(id, found))
     }
 
     /// Sends a train on its way.

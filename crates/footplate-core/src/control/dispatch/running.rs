@@ -228,7 +228,7 @@ impl Dispatcher {
         let from = (at - room.behind).max(rear);
         let mut held = self.reserved(run.way.footprint(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
-        let is_free = self.trains.values().all(|other| other.id == id || !other.held.meets(&held));
+        let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|_| is_free) {
             train.held = held;
             train.kept = Footprint::empty();
@@ -326,9 +326,7 @@ impl Dispatcher {
         let rear = rear.max(at - train.lengths.behind() - SLACK);
         // Near to where it began it keeps what it stood on.
         let body = self.reserved(run.taken_from(layout, rear));
-        if rear < run.taken_from
-            && self.trains.values().any(|other| other.id != id && other.held.meets(&body))
-        {
+        if rear < run.taken_from && !self.is_free_for(id, &body) {
             return true;
         }
         if let Some(train) = self.trains.get_mut(&id) {

@@ -57,10 +57,11 @@ impl Dispatcher {
             }
             return ready <= now;
         }
-        if self.is_in_its_own_way(now, id, &missing, &anchors) {
+        let mut held_down = self.driver.turnouts_under(id, now);
+        held_down.extend(&anchors);
+        if self.is_in_its_own_way(now, id, &missing, &held_down) {
             return false;
         }
-        let under = self.driver.turnouts_under(id, now);
         for need in missing {
             // Points that are still moving might be left half way by a second word that fails.
             let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
@@ -78,9 +79,7 @@ impl Dispatcher {
                     self.throwing.insert(need.turnout, (id, now));
                 }
                 // It stands on the points, and they give way to it.
-                Err(_)
-                    if !need.facing && (under.contains(&need.turnout) || anchors.contains(&need.turnout)) =>
-                {
+                Err(_) if !need.facing && held_down.contains(&need.turnout) => {
                     if let Some(train) = self.trains.get_mut(&id) {
                         train.skipped.insert(need.turnout);
                     }
@@ -102,15 +101,14 @@ impl Dispatcher {
         now: Timestamp,
         id: TrainId,
         missing: &[TurnoutNeed],
-        anchors: &BTreeSet<TurnoutId>,
+        held_down: &BTreeSet<TurnoutId>,
     ) -> bool {
         if missing.iter().any(|need| self.is_being_thrown(now, need.turnout)) {
             return false;
         }
-        let under = self.driver.turnouts_under(id, now);
         let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
-        let is_own = |turnout| under.contains(turnout) || anchors.contains(turnout);
-        let blocked = missing.iter().find(|need| need.facing && is_own(&need.turnout) && !lies(need));
+        let blocked =
+            missing.iter().find(|need| need.facing && held_down.contains(&need.turnout) && !lies(need));
         let Some(turnout) = blocked.map(|need| need.turnout) else { return false };
         self.withdraw(now, id, Some(Refusal::TurnoutOccupied { turnout, train: id }));
         true

@@ -182,15 +182,15 @@ impl Dispatcher {
         self.grant(now, id, Purpose::Aside(makes_room_for), proposal);
     }
 
-    fn obstacles_of_others(&self, id: TrainId) -> Obstacles {
+    pub(super) fn obstacles_of_others(&self, id: TrainId) -> Obstacles {
         let mut obstacles = Obstacles::default();
         let others = self.trains.values().filter(|other| other.id != id);
         others.for_each(|other| obstacles.add(&other.held, f64::INFINITY));
         obstacles
     }
 
-    fn is_free(&self, id: TrainId, proposal: &Proposal) -> bool {
-        self.trains.values().all(|other| other.id == id || !proposal.meets(&other.held))
+    pub(super) fn is_free(&self, id: TrainId, proposal: &Proposal) -> bool {
+        proposal.runs.iter().all(|run| self.is_free_for(id, &run.taken))
     }
 
     fn both_ways(&self, place: Position) -> Vec<Position> {
