@@ -4,7 +4,7 @@ import { colour, dots, line, rounded } from "./chart.js";
 import { LiveChart, barsOf } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get } from "./server.js";
-import { say } from "./words.js";
+import { LANGUAGE, say } from "./words.js";
 
 const SIDES = [["below", "first", -0.12], ["above", "second", 0.12], ["unknown", "third", 0]];
 /** Between two looks at a model that may have become better (ms). */
@@ -115,7 +115,8 @@ export function calibrationPage(root, live, number) {
       `${say(`law-${law.direction.toLowerCase()}`)}: ${law.best.name}, ${shown(law.best.pace.value, 2)} ± ${shown(law.best.pace.uncertainty, 2)} ${law.best.pace.unit}, `
       + say("law-from", law.changes, shown(law.best.held_out_mm)), " ", whyButton(law.direction.toLowerCase() === "up" ? "LAW:up" : "LAW:down"))));
     const before = $("#change").value;
-    $("#change").replaceChildren(...(report?.changes ?? []).map(({ title }, place) => new Option(title, place)));
+    $("#change").replaceChildren(...(report?.changes ?? []).map(({ steps: [from, to], recording, run }, place) =>
+      new Option(say("change-of", from, to, recording, run), place)));
     if (before) $("#change").value = before;
     $("#changes").hidden = !report?.changes.length;
   }
@@ -191,7 +192,7 @@ export function calibrationPage(root, live, number) {
   async function stored() {
     if (!train) return;
     try {
-      report = await get(`/api/trains/${train}/calibration`);
+      report = await get(`/api/trains/${train}/calibration?language=${LANGUAGE}`);
       put($("#stored-answer"), "");
     } catch (error) {
       report = undefined;

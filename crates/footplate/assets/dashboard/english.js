@@ -56,7 +56,7 @@ export const ENGLISH = {
   "note-store": "Worked out from all that the store holds of this train, less what was excluded, by the same fit as `footplate calibrate --store`.",
   "note-stored": "Steady speed by step with its 95 % interval.", "change-shown": "Change of speed shown",
   "note-law": "The law of this change, and the mean speeds between contacts.", "note-beyond": "How far contacts lie beyond the law, with 95 % of what is not known of that.",
-  "law": "law", "law-up": "getting faster", "law-down": "getting slower", "law-from": "from {0} changes, held-out error {1} mm",
+  "law": "law", "change-of": "step {0} to {1}, {2} run {3}", "law-up": "getting faster", "law-down": "getting slower", "law-from": "from {0} changes, held-out error {1} mm",
   "why-so": "Why is this number so?", "number-asked": "Number", "reason": "Reason, to exclude or restore", "reason-first": "Write a reason first.",
   "exclude": "Exclude", "restore": "Restore", "exclude-event": "Exclude event {0}", "restore-event": "Restore event {0}", "thinks": "mark",
   "excluded": "excluded: event {0}; it stays in the store and can be restored", "restored": "restored: event {0}", "marked": "Excluded by a person",

@@ -56,7 +56,7 @@ export const GERMAN = {
   "note-store": "Errechnet aus allem, was der Speicher von diesem Zug hat, ohne das Ausgeschlossene, mit demselben Abgleich wie `footplate calibrate --store`.",
   "note-stored": "Gleichmäßiges Tempo je Stufe mit seinem 95-%-Intervall.", "change-shown": "Gezeigter Tempowechsel",
   "note-law": "Das Gesetz dieses Wechsels und die mittleren Tempi zwischen Kontakten.", "note-beyond": "Wie weit Kontakte jenseits des Gesetzes liegen, mit 95 % dessen, was davon nicht bekannt ist.",
-  "law": "Gesetz", "law-up": "beim Schnellerwerden", "law-down": "beim Langsamerwerden", "law-from": "aus {0} Wechseln, Fehler an Zurückgehaltenem {1} mm",
+  "law": "Gesetz", "change-of": "Stufe {0} auf {1}, {2} Fahrt {3}", "law-up": "beim Schnellerwerden", "law-down": "beim Langsamerwerden", "law-from": "aus {0} Wechseln, Fehler an Zurückgehaltenem {1} mm",
   "why-so": "Warum ist diese Zahl so?", "number-asked": "Zahl", "reason": "Grund, um auszuschließen oder zurückzuholen", "reason-first": "Erst einen Grund schreiben.",
   "exclude": "Ausschließen", "restore": "Zurückholen", "exclude-event": "Ereignis {0} ausschließen", "restore-event": "Ereignis {0} zurückholen", "thinks": "Marke",
   "excluded": "ausgeschlossen: Ereignis {0}; es bleibt im Speicher und kann zurückgeholt werden", "restored": "zurückgeholt: Ereignis {0}", "marked": "Von Menschen ausgeschlossen",

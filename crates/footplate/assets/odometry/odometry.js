@@ -9,8 +9,6 @@ const LISTED = 200;
 /** Height of the strip of modes, as a part of the axis that shows 100 %. */
 const STRIP_OF = 0.09;
 
-/** The one of two texts that is in the page's language. */
-const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
 const WORDS = pick({
   spin: "slips", slide: "slides", excluded: "not believed",
   one_slip: "one slips or slides", degraded: "degraded", correction: "correction", ambiguous: "ambiguous",
@@ -27,7 +25,6 @@ const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST] = pick(
   ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least"],
   ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens"],
 );
-const KEYS_SAID = pick(KEYS, "Pfeiltasten gehen die Werte entlang, Plus und Minus vergrößern, Escape zeigt alles.");
 
 const time = () => ({
   label: TIME,
@@ -100,7 +97,7 @@ const dashed = (series) => ({ ...series, dash: [6, 4] });
 
 function speed(figure, { speed_m_s, speed_low_m_s, speed_high_m_s, true_speed_m_s }) {
   chart(figure, {
-    name: pick("Speed with its bounds", "Tempo mit seinen Grenzen"), keys: KEYS_SAID, x: time(), y: SPEED, sync: SYNC,
+    name: pick("Speed with its bounds", "Tempo mit seinen Grenzen"), x: time(), y: SPEED, sync: SYNC,
     data: [run.time_s, speed_high_m_s, speed_low_m_s, speed_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
     series: [
       bound(AT_MOST, "m/s", 2), bound(AT_LEAST, "m/s", 2), line(ESTIMATE, "first", "m/s", 2),
@@ -124,7 +121,7 @@ function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
   });
   const none = run.time_s.map(() => null);
   chart(figure, {
-    name: pick("Speed of each wheel", "Tempo jedes Rades"), keys: KEYS_SAID, x: time(), y: SPEED, sync: SYNC,
+    name: pick("Speed of each wheel", "Tempo jedes Rades"), x: time(), y: SPEED, sync: SYNC,
     below: [shade(run.marks.wheel_1, 0, 0.5), shade(run.marks.wheel_2, 0.5, 1)],
     data: [run.time_s, wheel_1_m_s ?? none, wheel_2_m_s ?? none, speed_m_s],
     series: [wheel("wheel_1", "second"), wheel("wheel_2", "third"), { ...line(ESTIMATE, "first", "m/s", 2), width: 1.5 }],
@@ -159,7 +156,7 @@ function shares(figure, { share_1, share_1_and_2 }) {
   });
   const mode = (u, _, __, index) => WORDS[markedAt("mode", u.data[0][index ?? 0])] ?? "normal";
   chart(figure, {
-    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des gedachten Sensors, und die Betriebsart"), keys: KEYS_SAID, x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
+    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des gedachten Sensors, und die Betriebsart"), x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
     range: { y: { range: [0, 100 / (1 - STRIP_OF)] } },
     below: [shade(run.marks.mode, 0, STRIP_OF - 0.02, 1)],
     data: [run.time_s, run.time_s.map(() => 100), both, first, run.time_s.map(() => null)],
@@ -180,7 +177,7 @@ function shares(figure, { share_1, share_1_and_2 }) {
 function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m, under_m }) {
   if (error_m) {
     chart(figure, {
-      name: pick("Distance less the true distance, with its bounds", "Weg weniger dem wahren Weg, mit seinen Grenzen"), keys: KEYS_SAID, x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
+      name: pick("Distance less the true distance, with its bounds", "Weg weniger dem wahren Weg, mit seinen Grenzen"), x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
       data: [run.time_s, error_high_m, error_low_m, error_m],
       series: [bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2)],
       bands: [{ series: [1, 2], fill: colour("band") }],
@@ -190,7 +187,7 @@ function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m,
     return;
   }
   chart(figure, {
-    name: pick("Width of the interval of the distance, and amounts of over- and under-reading", "Breite des Intervalls des Weges, und wie viel er zu lang und zu kurz gelesen wird"), keys: KEYS_SAID, x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
+    name: pick("Width of the interval of the distance, and amounts of over- and under-reading", "Breite des Intervalls des Weges, und wie viel er zu lang und zu kurz gelesen wird"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
     series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });
@@ -205,13 +202,13 @@ function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m,
 function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
   const measured = measured_accel_m_s2 && { ...line(pick("accelerometer", "Beschleunigungsmesser"), "third", "m/s²", 2), width: 1, spanGaps: false };
   chart(figure, {
-    name: pick("Acceleration", "Beschleunigung"), keys: KEYS_SAID, x: time(), y: pick("acceleration (m/s²)", "Beschleunigung (m/s²)"), sync: SYNC, height: STRIP + 30, zero: true,
+    name: pick("Acceleration", "Beschleunigung"), x: time(), y: pick("acceleration (m/s²)", "Beschleunigung (m/s²)"), sync: SYNC, height: STRIP + 30, zero: true,
     data: [run.time_s, ...(measured ? [measured_accel_m_s2] : []), accel_m_s2],
     series: [...(measured ? [measured] : []), line(ESTIMATE, "first", "m/s²", 2)],
   });
   if (effort) {
     chart(figure, {
-      name: pick("Effort", "Befehl"), keys: KEYS_SAID, x: time(), y: pick("effort (%)", "Befehl (%)"), sync: SYNC, height: STRIP - 30, zero: true,
+      name: pick("Effort", "Befehl"), x: time(), y: pick("effort (%)", "Befehl (%)"), sync: SYNC, height: STRIP - 30, zero: true,
       range: { y: { range: [-105, 105] } },
       data: [run.time_s, effort.map((part) => (part == null ? null : 100 * part))],
       series: [line(pick("effort", "Befehl"), "second", "%", 0)],

@@ -9,6 +9,8 @@ const [TIGHT, ROOMY] = [18, 30];
 /** Charts drawn so far, by figure, to be taken down when colours change. */
 const drawn = new Map();
 
+/** The one of two texts that is in the page's language. */
+const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const rounded = (value, digits) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
 const withUnit = (unit, digits) => (_, value) => (value == null ? "–" : `${rounded(value, digits)} ${unit}`);
@@ -112,7 +114,10 @@ function zoom(u, part) {
   for (const one of together(u)) one.setScale("x", { min: Math.max(low, first), max: Math.min(high, last) });
 }
 
-const KEYS = "Arrow keys move along the values, plus and minus zoom, Escape shows all.";
+const keysSaid = () => pick(
+  "Arrow keys move along the values, plus and minus zoom, Escape shows all.",
+  "Pfeiltasten gehen die Werte entlang, Plus und Minus vergrößern, Escape zeigt alles.",
+);
 
 function onKey(u, event, zooms) {
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
@@ -133,7 +138,7 @@ function onKey(u, event, zooms) {
 
 /** Puts a chart into a figure; `below` draws between grid and lines. What it shows is zoomed unless something else decides it. */
 function chart(figure, {
-  name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, keys = KEYS,
+  name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, keys = keysSaid(),
 }) {
   const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
   const u = new uPlot({

@@ -4,10 +4,18 @@ const report = JSON.parse(document.getElementById("report").textContent);
 const trains = new Map(report.trains.map((train) => [String(train.calibration.train), train]));
 
 const APPROACHES = [
-  ["below", "reached from below", "first", -0.12],
-  ["above", "reached from above", "second", 0.12],
-  ["unknown", "side not recorded", "third", 0],
+  ["below", pick("reached from below", "von unten erreicht"), "first", -0.12],
+  ["above", pick("reached from above", "von oben erreicht"), "second", 0.12],
+  ["unknown", pick("side not recorded", "Seite nicht festgehalten"), "third", 0],
 ];
+/** What a train did while a forecast was made of it. */
+const PHASES = pick({
+  steady: "steady running", first_lap: "first time over this way or at this step", change: "changing speed",
+}, {
+  steady: "gleichmäßige Fahrt", first_lap: "zum ersten Mal auf diesem Weg oder bei dieser Stufe", change: "Tempowechsel",
+});
+/** What stands on axes and beside lines. */
+const [LAW, CONTACT, SPEED] = pick(["law", "contact", "speed (mm/s)"], ["Gesetz", "Kontakt", "Tempo (mm/s)"]);
 
 function speeds(figure, train) {
   const all = train.calibration.speeds;
@@ -15,14 +23,14 @@ function speeds(figure, train) {
     const own = all.filter((speed) => speed.approach.toLowerCase() === approach);
     const points = own.map(({ step, speed }) => ({ x: step + shift, y: speed.value, dy: speed.uncertainty }));
     const told = new Map(points.map(({ x, dy }, place) =>
-      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} hops`]));
+      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} ${pick("hops", "Strecken")}`]));
     return { label, name, points, told };
   }).filter(({ points }) => points.length > 0);
   const data = uPlot.join(parts.map(({ points }) => [points.map(({ x }) => x), points.map(({ y }) => y)]));
   const steps = all.map(({ step }) => step);
   chart(figure, {
-    name: "Speed by throttle step",
-    x: { label: "throttle step", unit: "", digits: 0 }, y: "speed (mm/s)", data, ticks: [1, 2, 5],
+    name: pick("Speed by throttle step", "Tempo je Fahrstufe"),
+    x: { label: pick("throttle step", "Fahrstufe"), unit: "", digits: 0 }, y: SPEED, data, ticks: [1, 2, 5],
     range: { x: { range: [Math.min(...steps) - 0.6, Math.max(...steps) + 0.6] }, y: { range: (_, __, high) => [0, high * 1.08] } },
     series: parts.map(({ label, name, told }) => dots(label, name, "mm/s", 1, told)),
     bars: parts.map(({ points, name }) => [points, name]),
@@ -31,16 +39,18 @@ function speeds(figure, train) {
 
 function change(figure, train) {
   const key = `change-${train.calibration.train}`;
-  const pick = document.createElement("p");
-  pick.className = "pick";
+  const choice = document.createElement("p");
+  choice.className = "pick";
   const label = document.createElement("label");
-  label.textContent = "Change shown ";
+  label.textContent = pick("Change shown ", "Gezeigter Wechsel ");
   const select = document.createElement("select");
-  train.changes.forEach(({ title }, place) => select.add(new Option(title, place)));
+  train.changes.forEach(({ steps: [from, to], recording, run }, place) => select.add(new Option(
+    pick(`step ${from} to ${to}, ${recording} run ${run}`, `Stufe ${from} auf ${to}, ${recording} Fahrt ${run}`), place,
+  )));
   select.value = figure.dataset.shown ?? train.changes.length - 1;
   label.append(select);
-  pick.append(label);
-  figure.append(pick);
+  choice.append(label);
+  figure.append(choice);
   select.addEventListener("change", () => {
     figure.dataset.shown = select.value;
     redraw(figure);
@@ -51,47 +61,48 @@ function change(figure, train) {
   const { contacts } = shown;
   const times = contacts.map(({ time_s }) => time_s);
   const told = new Map(contacts.map(({ time_s, told_by }) => [time_s, told_by]));
-  const x = { label: "since the command (s)", unit: "s", digits: 2 };
+  const x = { label: pick("since the command (s)", "seit dem Befehl (s)"), unit: "s", digits: 2 };
   // All four charts begin and end together, whatever each of them holds; a zoomed range is taken as it is.
   const [begins, ends] = [shown.time_s[0], shown.time_s.at(-1)];
   const whole = [begins - 0.02 * (ends - begins), ends + 0.02 * (ends - begins)];
   const range = { x: { range: (u, low, high) => (low <= u.data[0][0] && high >= u.data[0].at(-1) ? whole : [low, high]) } };
   const curve = (values) => [shown.time_s, values];
   chart(figure, {
-    name: "Way since the command", x, y: "way (mm)", sync: key, range,
+    name: pick("Way since the command", "Weg seit dem Befehl"), x, y: pick("way (mm)", "Weg (mm)"), sync: key, range,
     data: uPlot.join([curve(shown.way_mm), [times, contacts.map(({ way_mm }) => way_mm)]]),
-    series: [line("law", "first", "mm", 0), dots("contact", "second", "mm", 0, told)],
+    series: [line(LAW, "first", "mm", 0), dots(CONTACT, "second", "mm", 0, told)],
     bars: [[contacts.map(({ time_s, way_mm, doubt_s }) => ({ x: time_s, y: way_mm, dx: doubt_s })), "second"]],
   });
+  const beyond = pick("beyond the law", "jenseits des Gesetzes");
   const reach = 1.15 * Math.max(5, ...contacts.map(({ residual_mm, doubt_mm }) => Math.abs(residual_mm) + doubt_mm));
   chart(figure, {
-    name: "How far contacts lie beyond the law", x, y: "beyond the law (mm)", sync: key, height: STRIP, zero: true,
+    name: pick("How far contacts lie beyond the law", "Wie weit Kontakte jenseits des Gesetzes liegen"), x, y: pick("beyond the law (mm)", "daneben (mm)"), sync: key, height: STRIP, zero: true,
     range: { ...range, y: { range: [-reach, reach] } },
     data: [times, contacts.map(({ residual_mm }) => residual_mm)],
-    series: [dots("beyond the law", "second", "mm", 1, told)],
+    series: [dots(beyond, "second", "mm", 1, told)],
     bars: [[contacts.map(({ time_s, residual_mm, doubt_mm }) => ({ x: time_s, y: residual_mm, dy: doubt_mm })), "second"]],
   });
   const means = contacts.filter(({ mean_speed }) => mean_speed);
   chart(figure, {
-    name: "Speed since the command", x, y: "speed (mm/s)", sync: key, height: STRIP, range,
+    name: pick("Speed since the command", "Tempo seit dem Befehl"), x, y: SPEED, sync: key, height: STRIP, range,
     data: uPlot.join([curve(shown.speed_mm_s), [means.map(({ mean_speed }) => mean_speed[0]), means.map(({ mean_speed }) => mean_speed[1])]]),
-    series: [line("law", "first", "mm/s", 0), dots("mean between two contacts", "second", "mm/s", 0)],
+    series: [line(LAW, "first", "mm/s", 0), dots(pick("mean between two contacts", "Mittel zwischen zwei Kontakten"), "second", "mm/s", 0)],
   });
   chart(figure, {
-    name: "Acceleration since the command", x, y: "acceleration (mm/s²)", sync: key, height: STRIP, range, zero: true,
-    data: curve(shown.acceleration_mm_s2), series: [line("law", "first", "mm/s²", 0)],
+    name: pick("Acceleration since the command", "Beschleunigung seit dem Befehl"), x, y: pick("acceleration (mm/s²)", "Beschleunigung (mm/s²)"), sync: key, height: STRIP, range, zero: true,
+    data: curve(shown.acceleration_mm_s2), series: [line(LAW, "first", "mm/s²", 0)],
   });
 }
 
 function forecasts(figure, train) {
   const points = train.forecasts.filter(({ late_ms }) => late_ms != null);
   if (points.length === 0) {
-    figure.append("Nothing could be forecast yet.");
+    figure.append(pick("Nothing could be forecast yet.", "Noch konnte nichts vorhergesagt werden."));
     return;
   }
   const numbers = points.map((_, place) => place + 1);
   const told = new Map(points.map(({ sensor, step, phase, recording, line: row }, place) =>
-    [place + 1, `${sensor} at step ${step}, ${phase}, ${recording}:${row}`]));
+    [place + 1, `${sensor} ${pick("at step", "bei Stufe")} ${step}, ${PHASES[phase]}, ${recording}:${row}`]));
   for (const [late, half, unit] of [["late_mm", "half_90_mm", "mm"], ["late_ms", "half_90_ms", "ms"]]) {
     const values = points.map((point) => point[late]);
     const widths = points.map((point) => point[half]);
@@ -99,12 +110,12 @@ function forecasts(figure, train) {
     const sizes = points.map((point) => Math.max(Math.abs(point[late]), point[half])).sort((a, b) => a - b);
     const reach = 1.2 * sizes[Math.floor(0.98 * (sizes.length - 1))];
     const digits = unit === "mm" ? 1 : 0;
-    const upper = { ...line("90 % interval", "band", unit, digits), width: 1, value: (_, value) => (value == null ? "–" : `± ${rounded(value, digits)} ${unit}`) };
+    const upper = { ...line(pick("90 % interval", "90-%-Intervall"), "band", unit, digits), width: 1, value: (_, value) => (value == null ? "–" : `± ${rounded(value, digits)} ${unit}`) };
     const lower = { ...upper, class: "unlisted" };
-    const later = dots("later", "first", unit, digits, unit === "mm" ? told : undefined);
+    const later = dots(pick("later", "später"), "first", unit, digits, unit === "mm" ? told : undefined);
     chart(figure, {
-      name: `Forecast error in ${unit}`, zero: true, sync: `forecasts-${train.calibration.train}`, height: unit === "mm" ? HEIGHT : STRIP + 30,
-      x: { label: "forecast number", unit: "", digits: 0 }, y: `later than forecast (${unit})`, ticks: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000],
+      name: pick(`Forecast error in ${unit}`, `Vorhersagefehler in ${unit}`), zero: true, sync: `forecasts-${train.calibration.train}`, height: unit === "mm" ? HEIGHT : STRIP + 30,
+      x: { label: pick("forecast number", "Nummer der Vorhersage"), unit: "", digits: 0 }, y: `${pick("later than forecast", "später")} (${unit})`, ticks: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000],
       range: { y: { range: [-reach, reach] } }, data: [numbers, widths, widths.map((width) => -width), values],
       series: [upper, lower, { ...later, points: { ...later.points, size: 6 } }],
       bands: [{ series: [1, 2], fill: colour("band") }],
@@ -116,17 +127,17 @@ function stops(figure, train) {
   const steps = train.calibration.stops.steps;
   const points = steps.map(({ speed_mm_per_s, distance }) => ({ x: speed_mm_per_s, y: distance.value, dy: distance.uncertainty }));
   const told = new Map(steps.map(({ step, speed_mm_per_s, distance }) =>
-    [speed_mm_per_s, `± ${rounded(distance.uncertainty, 0)}, step ${step}`]));
+    [speed_mm_per_s, `± ${rounded(distance.uncertainty, 0)}, ${pick("step", "Stufe")} ${step}`]));
   points.sort((one, other) => one.x - other.x);
   const law = train.stop_curve;
   const fastest = Math.max(...points.map(({ x }) => x), ...law.map(([speed]) => speed));
   const furthest = Math.max(...points.map(({ y, dy }) => y + dy), ...law.map(([, way]) => way));
   chart(figure, {
-    name: "Stopping distance by speed",
-    x: { label: "speed before the stop (mm/s)", unit: "mm/s", digits: 0 }, y: "distance (mm)",
+    name: pick("Stopping distance by speed", "Anhalteweg nach Tempo"),
+    x: { label: pick("speed before the stop (mm/s)", "Tempo vor dem Halt (mm/s)"), unit: "mm/s", digits: 0 }, y: pick("distance (mm)", "Weg (mm)"),
     range: { x: { range: [0, fastest] }, y: { range: [0, 1.05 * furthest] } },
     data: uPlot.join([[law.map(([speed]) => speed), law.map(([, way]) => way)], [points.map(({ x }) => x), points.map(({ y }) => y)]]),
-    series: [line("law", "first", "mm", 0), dots("measured", "second", "mm", 0, told)],
+    series: [line(LAW, "first", "mm", 0), dots(pick("measured", "gemessen"), "second", "mm", 0, told)],
     bars: [[points, "second"]],
   });
 }

@@ -27,6 +27,7 @@ use crate::link::Address;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
 pub(super) use live::calibration_line;
+pub(super) use picture::draw_calibration;
 
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
@@ -129,14 +130,7 @@ impl Arguments {
             write_calibration(&file, path)?;
         }
         if let Some(plot) = &self.plot {
-            let [train] = file.trains.as_slice() else {
-                bail!(
-                    "{}: a picture is of one train, and there are {}; choose one with --train",
-                    plot.path().display(),
-                    file.trains.len()
-                );
-            };
-            plot.write(&picture::of_file(&file, train))?;
+            draw_calibration(&file, plot)?;
         }
         match &self.explain {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,

@@ -15,6 +15,7 @@ use footplate_wire::{CommandError, LinkNotice};
 
 use self::figures::Figures;
 use super::Outcome;
+use super::plot::PictureFile;
 use crate::link::{Address, Link, Speed, TappedLink, open, session_settings};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 
@@ -39,6 +40,9 @@ pub(crate) struct Arguments {
     /// For how long to listen, in seconds of the station's time.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
+    /// Draw how latencies are spread to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PictureFile>,
     /// Say it as JSON.
     #[arg(long)]
     json: bool,
@@ -68,6 +72,9 @@ impl Arguments {
             Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
         }
         let figures = Figures::of(runtime.link().passed(), ear.lost);
+        if let Some(plot) = &self.plot {
+            plot.write(&figures.picture())?;
+        }
         if self.json {
             writeln!(output, "{}", figures.json())?;
         } else {

@@ -58,6 +58,9 @@ pub(crate) struct Arguments {
     /// Write a page with charts to this file (HTML), to open in any browser without a network.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// The language of that page.
+    #[arg(long, value_enum, default_value_t, requires = "report")]
+    language: Language,
     /// Draw the first run to this file, SVG or PNG by its ending.
     #[arg(long, value_name = "FILE")]
     plot: Option<PictureFile>,
@@ -111,7 +114,7 @@ impl Arguments {
             vehicle: vehicle.name,
             preset,
             recordings,
-            language: Language::English,
+            language: self.language,
             is_scored: self.score,
         };
         if let Some(page) = &self.report {

@@ -3,6 +3,7 @@
 mod figures;
 mod hit_rows;
 mod json;
+mod picture;
 mod report;
 mod tables;
 
@@ -19,6 +20,7 @@ use footplate_store::{CalibrationFile, Recording, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::plot::PictureFile;
 use crate::progress::with_progress;
 
 /// Forecast every next sensor of recorded logs, and score that.
@@ -30,7 +32,8 @@ use crate::progress::with_progress;
 /// `--carry-on` or `--calibration` says otherwise.
 #[derive(Args)]
 #[command(
-    after_help = "Example: footplate predict testdata/sensor-logs/eadanila_2020_track_a.csv --layout track-a"
+    after_help = "Example: footplate predict testdata/sensor-logs/eadanila_2020_track_a.csv --layout track-a\n\
+                  Picture: footplate predict testdata/sensor-logs/*.csv --layout track-a --summary --plot errors.svg"
 )]
 pub(crate) struct Arguments {
     /// Sensor logs, in any of the forms of docs/formats/sensor-log.md.
@@ -51,6 +54,9 @@ pub(crate) struct Arguments {
     /// Keep what one log taught for the next, in the order given.
     #[arg(long)]
     carry_on: bool,
+    /// Draw how far everybody's forecasts were off to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PictureFile>,
     /// Leave out the hits, print only what sums them up.
     #[arg(long)]
     summary: bool,
@@ -68,6 +74,16 @@ impl Arguments {
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
         let calibration = self.calibration.as_deref().map(CalibrationFile::read).transpose()?;
         let scored = self.score(&layout, &recordings, calibration.as_ref())?;
+        if let Some(plot) = &self.plot {
+            let picture = picture::of(&layout, &scored).with_context(|| {
+                format!(
+                    "{}: nothing could be forecast, so there is nothing to draw; a train has to pass three contacts at \
+                     a step",
+                    plot.path().display()
+                )
+            })?;
+            plot.write(&picture)?;
+        }
         if self.json {
             let value = json::scores(&layout, &scored, !self.summary);
             writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;

@@ -3,6 +3,7 @@
 mod charts;
 mod data;
 mod forecasts;
+mod german_law;
 mod health;
 mod page;
 mod tables;
@@ -18,7 +19,9 @@ use footplate_store::{Batch, CalibrationFile, Run, Store, layout_named, write_wh
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::web_page::Language;
 use data::{ReportData, TrainReport};
+use german_law::german_law;
 
 /// Write a page with charts of what recordings show.
 ///
@@ -45,6 +48,9 @@ pub(crate) struct Arguments {
     /// The page to write (HTML).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// The language of the page.
+    #[arg(long, value_enum, default_value_t)]
+    language: Language,
 }
 
 /// The runs of one recording, however they were kept.
@@ -69,20 +75,23 @@ impl Arguments {
                 (recordings.into_iter().map(session).collect(), batch)
             }
         };
-        let data = gather(&layout, &sessions, &batch)?;
-        write_whole(&self.out, page::page(&data)?.as_bytes())
+        let language = self.language;
+        let data = gather(&layout, &sessions, &batch, language)?;
+        write_whole(&self.out, page::page(&data, language)?.as_bytes())
             .with_context(|| format!("writing {}", self.out.display()))?;
         for train in &data.trains {
             let health = &train.health;
             writeln!(
                 output,
-                "train {}: {}, {}",
+                "{} {}: {}, {}",
+                language.pick("train", "Zug"),
                 train.calibration.train,
-                health.state.word(),
+                health.state.word(language),
                 health.summary
             )?;
         }
-        writeln!(output, "{}: open it in a browser", self.out.display())?;
+        let open = language.pick("open it in a browser", "in einem Browser öffnen");
+        writeln!(output, "{}: {open}", self.out.display())?;
         Ok(Outcome::Done)
     }
 }
@@ -106,22 +115,38 @@ fn of_store(layout: &Layout, store: &Store, train: Option<TrainId>) -> anyhow::R
 ///
 /// # Errors
 /// The store cannot be read, or holds nothing of the train.
-pub(super) fn store_report(layout: &Layout, store: &Store, train: TrainId) -> anyhow::Result<String> {
+pub(super) fn store_report(
+    layout: &Layout,
+    store: &Store,
+    train: TrainId,
+    language: Language,
+) -> anyhow::Result<String> {
     let (sessions, batch) = of_store(layout, store, Some(train))?;
-    let data = gather(layout, &sessions, &batch)?;
+    let data = gather(layout, &sessions, &batch, language)?;
     let found = data.trains.into_iter().next();
     Ok(serde_json::to_string(&found.with_context(|| format!("nothing of train {train} was recorded yet"))?)?)
 }
 
-fn gather(layout: &Layout, sessions: &[Session], batch: &Batch) -> anyhow::Result<ReportData> {
+fn gather(
+    layout: &Layout,
+    sessions: &[Session],
+    batch: &Batch,
+    language: Language,
+) -> anyhow::Result<ReportData> {
     let file = CalibrationFile::of(layout, batch);
     let trains = file.trains.iter().map(|form| {
+        let mut calibration = form.clone();
+        if language == Language::German {
+            for law in &mut calibration.laws {
+                law.best.name = german_law(law.best.law);
+            }
+        }
         let forecasts = forecasts::of_train(layout, sessions, form.train)?;
         Ok(TrainReport {
-            health: health::of(form.train, batch, &forecasts),
+            health: health::of(form.train, batch, &forecasts, language),
             changes: charts::changes(batch, form.train),
             stop_curve: form.stops.as_ref().map(charts::stop_curve).unwrap_or_default(),
-            calibration: form.clone(),
+            calibration,
             forecasts,
         })
     });

@@ -42,6 +42,19 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 }
 
 #[test]
+fn a_page_is_read_in_german_where_that_is_asked_for() {
+    let out = folder("german").join("page.html");
+    let out = out.to_str().unwrap();
+    let run = footplate(&["odometry", PLAIN, "--report", out, "--language", "de"]);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let html = fs::read_to_string(out).unwrap();
+    for word in ["lang=\"de\"", "Odometrie von plain.csv", "die Wahrheit hat die Grenzen verlassen"] {
+        assert!(html.contains(word), "{word}");
+    }
+    assert_eq!(footplate(&["odometry", PLAIN, "--report", out, "--language", "fr"]).status, 2);
+}
+
+#[test]
 fn lines_are_the_result_and_bounds_are_no_narrower() {
     let folder = folder("lines");
     let (_, data) = page(PLAIN, &folder.join("page.html"));

@@ -125,3 +125,51 @@ fn stops_measured_by_hand_are_drawn_with_their_law() {
         ],
     );
 }
+
+#[test]
+fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
+    let folder = folder("predict");
+    let log = format!("{TESTDATA}/sensor-logs/eadanila_2020_track_a.csv");
+    let svg = folder.join("errors.svg");
+    let run = drawn(&["predict", &log, "--layout", "track-a", "--summary"], &svg);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    says(
+        &svg,
+        &["eadanila_2020_track_a on track-a", "steady: error at most (mm)", "change: error at most (mm)"],
+    );
+    says(&svg, &["reports (%)", "Footplate", "EWMA 0.1", "oracle"]);
+    // The picture says of how many reports it is; the summary counts the same ones.
+    let counted = run.output.lines().find_map(|line| line.trim().split_once(" forecast")).unwrap().0;
+    let forecast = counted.rsplit(' ').next().unwrap();
+    says(&svg, &[&format!("{forecast} reports that were forecast")]);
+}
+
+#[test]
+fn a_store_is_drawn_as_the_calibration_of_all_that_it_holds() {
+    let folder = folder("store");
+    let store = folder.join("railway.db");
+    let store = store.to_str().unwrap();
+    let log = |train| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train{train}_run.csv");
+    let import = ["store", "import", &log(24), "--layout", "track-a", "--store", store];
+    assert_eq!(footplate(&import).status, 0);
+    let (shown, fitted) = (folder.join("shown.svg"), folder.join("fitted.svg"));
+    assert_eq!(drawn(&["store", "show", "--store", store], &shown).status, 0);
+    assert_eq!(drawn(&["calibrate", "--store", store, "--layout", "track-a"], &fitted).status, 0);
+    assert_eq!(fs::read(&shown).unwrap(), fs::read(&fitted).unwrap());
+    // Two trains are two pictures, and what is drawn is the whole store.
+    assert_eq!(footplate(&["store", "import", &log(74), "--layout", "track-a", "--store", store]).status, 0);
+    let run = drawn(&["store", "show", "--store", store], &folder.join("two.svg"));
+    assert_eq!(run.status, 2);
+    assert!(run.errors.contains("choose one with --train"), "{}", run.errors);
+    assert_eq!(drawn(&["store", "show", "--store", store, "--train", "74"], &shown).status, 0);
+    says(&shown, &["Train 74 on track-a"]);
+    assert_eq!(drawn(&["store", "show", "--store", store, "--recording", "1"], &shown).status, 2);
+}
+
+#[test]
+fn the_latencies_of_a_line_are_drawn() {
+    let svg = folder("doctor").join("line.svg");
+    let run = drawn(&["doctor", "--link", "sim:track-a?seed=7"], &svg);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    says(&svg, &["How fast the line is", "poll period", "first byte", "at most (ms)"]);
+}

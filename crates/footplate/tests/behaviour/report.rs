@@ -158,3 +158,31 @@ fn what_is_wrong_leaves_no_page_and_an_old_one_as_it_was() {
     assert!(store.status == 2 && store.errors.contains("missing.db"), "{}", store.errors);
     assert_eq!(footplate(&["report", "--layout", "track-a", "--out", "x.html"]).status, 2);
 }
+
+#[test]
+fn a_page_is_read_in_german_and_holds_the_same_numbers() {
+    let folder = folder("german");
+    let (english, german) = (folder.join("english.html"), folder.join("german.html"));
+    let log = log("train24_run");
+    report(&log, &english);
+    let asked = ["report", &log, "--layout", "track-a", "--train", "24", "--language", "de", "--out"];
+    let run = footplate(&[&asked[..], &[german.to_str().unwrap()]].concat());
+    assert_eq!(run.status, 0, "{}", run.errors);
+    assert!(run.output.starts_with("Zug 24: "), "{}", run.output);
+    let page = |path: &Path| fs::read_to_string(path).unwrap();
+    let (english, german) = (page(&english), page(&german));
+    for word in ["lang=\"de\"", "Tempo je Fahrstufe", "Vorhersagefehler", "Verdächtige Messungen", "erklärt"]
+    {
+        assert!(german.contains(word), "{word}");
+    }
+    let body = |page: &str| page.split_once("<main>").unwrap().1.split_once("<script").unwrap().0.to_owned();
+    for word in ["speed", "reached", "getting", "survey", "nothing", "mm now"] {
+        assert!(body(&english).contains(word) && !body(&german).contains(word), "{word}");
+    }
+    let digits = |page: &str| {
+        let shown: String =
+            body(page).chars().map(|c| if "0123456789.".contains(c) { c } else { ' ' }).collect();
+        shown.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(digits(&english), digits(&german));
+}

@@ -1,10 +1,11 @@
 //! What is known of a train, step by step, as a picture: speeds and ways to rest with what is not known of them.
 
+use anyhow::bail;
 use footplate_core::control::calibrate::StepAccuracy;
 use footplate_core::{Approach, TrainId};
 use footplate_store::{CalibrationFile, TrainForm};
 
-use crate::commands::plot::{HALF_95, Ink, Layer, Panel, Picture, Shape};
+use crate::commands::plot::{HALF_95, Ink, Layer, Panel, Picture, PictureFile, Shape};
 
 /// Points of both sides of a step stand beside each other.
 const APART: f64 = 0.09;
@@ -18,8 +19,25 @@ struct AtStep {
     half: f64,
 }
 
-/// What a calibration from recordings says of a train.
-pub(super) fn of_file(file: &CalibrationFile, train: &TrainForm) -> Picture {
+/// Draws what a calibration from recordings says of its one train.
+///
+/// # Errors
+/// It is of several trains, or the file cannot be written.
+pub(in crate::commands) fn draw_calibration(
+    calibration: &CalibrationFile,
+    plot: &PictureFile,
+) -> anyhow::Result<()> {
+    let [train] = calibration.trains.as_slice() else {
+        bail!(
+            "{}: a picture is of one train, and there are {}; choose one with --train",
+            plot.path().display(),
+            calibration.trains.len()
+        );
+    };
+    plot.write(&of_file(calibration, train))
+}
+
+fn of_file(file: &CalibrationFile, train: &TrainForm) -> Picture {
     let speeds = train.speeds.iter().map(|form| AtStep {
         step: form.step.get(),
         approach: form.approach,

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use footplate_core::TimeSpan;
 
+use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
 use crate::link::{Passed, Rhythm};
 
 /// Bars of the histogram are as wide as this at most.
@@ -85,6 +86,34 @@ impl Figures {
                 "command       costs {cost:.1} ms of the line (one byte; two cost 5 ms more)"
             ),
             None => writeln!(output, "command       none was seen between two polls"),
+        }
+    }
+
+    /// How periods and latencies are spread.
+    pub(super) fn picture(&self) -> Picture {
+        let curves = [
+            ("first byte", Ink::Second, &self.first_bytes),
+            ("poll period", Ink::First, &self.periods),
+            ("the same with a command in it", Ink::Third, &self.with_command),
+        ];
+        let layers = curves
+            .into_iter()
+            .filter(|(_, _, values)| !values.is_empty())
+            .map(|(label, ink, values)| Layer::new(label, ink, Shape::Line(shares(values.iter().copied()))));
+        let panel = Panel {
+            x: "at most (ms)".to_owned(),
+            y: "share (%)".to_owned(),
+            from_nought: true,
+            layers: layers.collect(),
+            ..Panel::default()
+        };
+        Picture {
+            title: "How fast the line is".to_owned(),
+            subtitle: format!(
+                "{} polls, {} without a whole reply; every curve ends at {SHOWN:.0} % of its own",
+                self.asked, self.lost
+            ),
+            panels: vec![panel],
         }
     }
 

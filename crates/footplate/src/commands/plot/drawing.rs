@@ -19,8 +19,8 @@ const LEFT: u32 = 100;
 /// How wide a piece of a line is in a legend, and how faint a band.
 const SWATCH: i32 = 40;
 const FAINT: f64 = 0.18;
-/// Half as wide as a point is: its error bar looks out of it.
-const DOT: u32 = 4;
+/// Half as wide as a point and the ends of its error bar are.
+const DOT: u32 = 6;
 /// What letters are called and how high they are.
 const FONT: &str = "sans-serif";
 const TITLE: u32 = 34;
@@ -62,17 +62,19 @@ pub(super) fn draw<B: DrawingBackend>(
         at(64),
         (FONT, NUMBERS * scale).into_font().color(&QUIET),
     ))?;
-    let everywhere =
-        picture.panels.iter().flat_map(|panel| &panel.layers).flat_map(|layer| layer.shape.extent());
-    let x = range(everywhere.map(|(x, _)| x), false, 0.015);
     let parts: Vec<u32> = picture.panels.iter().map(|panel| panel.height.unwrap_or(1)).collect();
     let all = parts.iter().sum::<u32>().max(1);
     let high = body.dim_in_pixel().1;
     let mut rest = body;
-    for (panel, part) in picture.panels.iter().zip(&parts) {
-        let (own, below) = rest.split_vertically(high * part / all);
-        draw_panel(&own, panel, &x, scale)?;
-        rest = below;
+    let mut parts = parts.iter();
+    for together in picture.panels.split_inclusive(|panel| !panel.x.is_empty()) {
+        let points = together.iter().flat_map(|panel| &panel.layers).flat_map(|layer| layer.shape.extent());
+        let x = range(points.map(|(x, _)| x), false, 0.015);
+        for (panel, part) in together.iter().zip(&mut parts) {
+            let (own, below) = rest.split_vertically(high * part / all);
+            draw_panel(&own, panel, &x, scale)?;
+            rest = below;
+        }
     }
     Ok(())
 }
@@ -190,19 +192,11 @@ fn draw_panel<B: DrawingBackend>(
                 chart.draw_series(DashedLineSeries::new(known, 14 * scale, 9 * scale, line))?;
             }
             Shape::Points(points) => {
-                let known = || points.iter().filter(|(_, y, half)| y.is_finite() && half.is_finite());
-                chart.draw_series(known().map(|(x, y, half)| {
-                    ErrorBar::new_vertical(
-                        *x,
-                        y - half,
-                        *y,
-                        y + half,
-                        ink.stroke_width(2 * scale),
-                        14 * scale,
-                    )
+                let known = points.iter().filter(|(_, y, half)| y.is_finite() && half.is_finite());
+                let style = ink.filled().stroke_width(2 * scale);
+                chart.draw_series(known.map(|(x, y, half)| {
+                    ErrorBar::new_vertical(*x, y - half, *y, y + half, style, 2 * DOT * scale)
                 }))?;
-                let dots = known().map(|(x, y, _)| Circle::new((*x, *y), pixels(DOT * scale), ink.filled()));
-                chart.draw_series(dots)?;
             }
         }
     }

@@ -6,14 +6,14 @@ pub(in crate::commands) struct Picture {
     pub(in crate::commands) title: String,
     /// What a reader should know beside it, in one line.
     pub(in crate::commands) subtitle: String,
-    /// From top to bottom; all of them show the same stretch of x.
+    /// From top to bottom; those without words for x show the same stretch of it as the next that has them.
     pub(in crate::commands) panels: Vec<Panel>,
 }
 
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(in crate::commands) struct Panel {
-    /// With units, as in `speed (m/s)`; empty where a panel below says it.
+    /// With units, as in `speed (m/s)`; empty where the panel below says it.
     pub(in crate::commands) x: String,
     pub(in crate::commands) y: String,
     /// How high it is beside the others; 1 unless that is said.

@@ -1,7 +1,7 @@
 //! Curves for charts: changes of speed under their law, and the law of stopping distance.
 
 use footplate_core::calibration::Transient;
-use footplate_core::{TimeSpan, TrainId};
+use footplate_core::{SpeedStep, TimeSpan, TrainId};
 use footplate_store::{Batch, StopForm};
 
 use super::data::{ChangeChart, ContactPoint};
@@ -59,9 +59,10 @@ fn chart(batch: &Batch, change: &Transient) -> Option<ChangeChart> {
                 .map_or_else(String::new, |event| format!("{}:{}", run.recording, event.line)),
         });
     }
-    let [from, to] = change.steps;
     Some(ChangeChart {
-        title: format!("step {from} to {to}, {} run {}", run.recording, run.id),
+        steps: change.steps.map(SpeedStep::get),
+        recording: run.recording.clone(),
+        run: run.id.0,
         time_s: times.iter().map(|time| time.as_s()).collect(),
         way_mm: fitted.states.iter().map(|state| state.distance.as_mm()).collect(),
         speed_mm_s: fitted.states.iter().map(|state| state.speed.as_mm_per_s()).collect(),

@@ -3,6 +3,8 @@
 use footplate_store::{PollingForm, TrainForm};
 use serde::Serialize;
 
+use crate::commands::web_page::Language;
+
 /// The whole report.
 #[derive(Debug, Serialize)]
 pub(super) struct ReportData {
@@ -52,11 +54,11 @@ pub(super) enum State {
 
 impl State {
     /// The state for those who see no colours.
-    pub(super) const fn word(self) -> &'static str {
+    pub(super) const fn word(self, language: Language) -> &'static str {
         match self {
-            Self::Green => "good",
-            Self::Amber => "look at it",
-            Self::Red => "wrong",
+            Self::Green => language.pick("good", "gut"),
+            Self::Amber => language.pick("look at it", "ansehen"),
+            Self::Red => language.pick("wrong", "falsch"),
         }
     }
 
@@ -73,7 +75,10 @@ impl State {
 /// A change of speed: its law as curves, and the contacts measured.
 #[derive(Debug, Serialize)]
 pub(super) struct ChangeChart {
-    pub(super) title: String,
+    /// From which step to which.
+    pub(super) steps: [u8; 2],
+    pub(super) recording: String,
+    pub(super) run: u32,
     /// Seconds since the command, mm since the first contact, mm/s, mm/s².
     pub(super) time_s: Vec<f64>,
     pub(super) way_mm: Vec<f64>,
@@ -106,7 +111,8 @@ pub(super) struct ForecastPoint {
     pub(super) line: u64,
     pub(super) sensor: String,
     pub(super) step: u8,
-    pub(super) phase: &'static str,
+    /// Its name in files; the page's script words it.
+    pub(super) phase: Option<&'static str>,
     pub(super) missed: usize,
     pub(super) drift: bool,
     /// Later than forecast, and half the width of the 90 % interval; none where nothing could be forecast.

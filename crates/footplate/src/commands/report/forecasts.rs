@@ -28,12 +28,11 @@ pub(super) fn of_train(
                 let late = hit.forecast.map(|forecast| forecast.contact_error(window.until));
                 let half = hit.forecast.map(|forecast| forecast.spread.half_width(LEVEL));
                 let speed = hit.forecast.map(|forecast| forecast.speed.as_mm_per_s());
-                let phase = match hit.forecast.map(|forecast| forecast.phase) {
-                    Some(Phase::Steady) => "steady running",
-                    Some(Phase::FirstLap) => "first time over this way or at this step",
-                    Some(Phase::Change) => "changing speed",
-                    None => "no forecast",
-                };
+                let phase = hit.forecast.map(|forecast| match forecast.phase {
+                    Phase::Steady => "steady",
+                    Phase::FirstLap => "first_lap",
+                    Phase::Change => "change",
+                });
                 points.push(ForecastPoint {
                     recording: session.name.clone(),
                     run: run.id.0,

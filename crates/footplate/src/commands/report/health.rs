@@ -5,6 +5,7 @@ use footplate_store::Batch;
 use footplate_store::score::Coverage;
 
 use super::data::{Check, ForecastPoint, Health, State};
+use crate::commands::web_page::Language;
 
 /// So many forecasts are "now" (chosen: two laps of the usual loop).
 const NOW: usize = 20;
@@ -18,28 +19,39 @@ const SILENT: [f64; 2] = [0.2, 0.5];
 /// How far below 90 % the interval's share may lie before it is wrong and not only doubtful.
 const COVERAGE_WRONG: f64 = 0.8;
 
-pub(super) fn of(train: TrainId, batch: &Batch, points: &[ForecastPoint]) -> Health {
+pub(super) fn of(train: TrainId, batch: &Batch, points: &[ForecastPoint], language: Language) -> Health {
     let runs = || batch.passages.iter().filter(|run| run.train == train);
     let silent = runs().filter(|run| run.passages.is_empty()).count();
     let checks = vec![
-        error(points),
-        coverage(points),
-        drift(points),
-        misses(points),
+        error(points, language),
+        coverage(points, language),
+        drift(points, language),
+        misses(points, language),
         Check {
-            name: "Runs without a report",
-            found: format!("{silent} of {}", runs().count()),
+            name: language.pick("Runs without a report", "Fahrten ohne Meldung"),
+            found: format!("{silent} {} {}", language.pick("of", "von"), runs().count()),
             state: graded(silent as f64 / runs().count().max(1) as f64, SILENT),
-            says: "the train stalled, or crept for as long as the run lasted",
+            says: language.pick(
+                "the train stalled, or crept for as long as the run lasted",
+                "der Zug blieb liegen oder kroch, solange die Fahrt dauerte",
+            ),
         },
     ];
     let state = checks.iter().map(|check| check.state).max().unwrap_or(State::Green);
     let worst: Vec<String> = checks
         .iter()
         .filter(|check| check.state == state && state != State::Green)
-        .map(|check| format!("{}: {}", check.name.to_lowercase(), check.found))
+        .map(|check| {
+            // Nouns keep their capital in German.
+            let name = match language {
+                Language::English => check.name.to_lowercase(),
+                Language::German => check.name.to_owned(),
+            };
+            format!("{name}: {}", check.found)
+        })
         .collect();
-    let summary = if worst.is_empty() { "nothing out of the usual".to_owned() } else { worst.join("; ") };
+    let usual = language.pick("nothing out of the usual", "nichts Ungewöhnliches");
+    let summary = if worst.is_empty() { usual.to_owned() } else { worst.join("; ") };
     Health { state, summary, checks }
 }
 
@@ -51,7 +63,7 @@ fn graded(value: f64, [amber, red]: [f64; 2]) -> State {
     }
 }
 
-fn error(points: &[ForecastPoint]) -> Check {
+fn error(points: &[ForecastPoint], language: Language) -> Check {
     let off = |points: &[&ForecastPoint]| {
         let mut off: Vec<f64> = points.iter().filter_map(|point| Some(point.late_mm?.abs())).collect();
         off.sort_by(f64::total_cmp);
@@ -61,25 +73,37 @@ fn error(points: &[ForecastPoint]) -> Check {
     let (usual, now) = (off(&known), off(&known[known.len().saturating_sub(NOW)..]));
     let (found, state) = match usual.zip(now) {
         Some((usual, now)) => {
-            (format!("{now:.1} mm now, {usual:.1} mm usually"), graded(now / usual.max(1e-9), WORSE))
+            let found = match language {
+                Language::English => format!("{now:.1} mm now, {usual:.1} mm usually"),
+                Language::German => format!("{now:.1} mm jetzt, {usual:.1} mm sonst"),
+            };
+            (found, graded(now / usual.max(1e-9), WORSE))
         }
-        None => ("nothing could be forecast yet".to_owned(), State::Amber),
+        None => {
+            let none =
+                language.pick("nothing could be forecast yet", "noch konnte nichts vorhergesagt werden");
+            (none.to_owned(), State::Amber)
+        }
     };
     Check {
-        name: "Prediction error",
+        name: language.pick("Prediction error", "Vorhersagefehler"),
         found,
         state,
-        says: "median distance off, of the last 20 forecasts and of all; twice the usual is wrong",
+        says: language.pick(
+            "median distance off, of the last 20 forecasts and of all; twice the usual is wrong",
+            "wie weit die mittlere daneben lag, der letzten 20 Vorhersagen und aller; das Doppelte ist falsch",
+        ),
     }
 }
 
-fn coverage(points: &[ForecastPoint]) -> Check {
+fn coverage(points: &[ForecastPoint], language: Language) -> Check {
     let known = points.iter().filter_map(|point| point.late_ms.zip(point.half_90_ms));
     let (inside, of) =
         known.fold((0, 0), |(inside, of), (late, half)| (inside + usize::from(late.abs() <= half), of + 1));
     let coverage = Coverage { level: 0.9, inside, of };
     let (found, state) = if of == 0 {
-        ("no forecast with an interval".to_owned(), State::Amber)
+        let none = language.pick("no forecast with an interval", "keine Vorhersage mit Intervall");
+        (none.to_owned(), State::Amber)
     } else {
         let (low, high) = coverage.plausible();
         let state = match (low <= 0.9 && 0.9 <= high, coverage.fraction() < COVERAGE_WRONG) {
@@ -87,17 +111,25 @@ fn coverage(points: &[ForecastPoint]) -> Check {
             (false, false) => State::Amber,
             (false, true) => State::Red,
         };
-        (format!("{:.0} % of {of} reports", 100.0 * coverage.fraction()), state)
+        let part = 100.0 * coverage.fraction();
+        let found = match language {
+            Language::English => format!("{part:.0} % of {of} reports"),
+            Language::German => format!("{part:.0} % von {of} Meldungen"),
+        };
+        (found, state)
     };
     Check {
-        name: "Inside the 90 % interval",
+        name: language.pick("Inside the 90 % interval", "Im 90-%-Intervall"),
         found,
         state,
-        says: "good when the count is in keeping with 90 % by chance",
+        says: language.pick(
+            "good when the count is in keeping with 90 % by chance",
+            "gut, wenn die Zahl durch Zufall zu 90 % passt",
+        ),
     }
 }
 
-fn drift(points: &[ForecastPoint]) -> Check {
+fn drift(points: &[ForecastPoint], language: Language) -> Check {
     let alarms = points.iter().filter(|point| point.drift).count();
     let recent = points[points.len().saturating_sub(NOW)..].iter().any(|point| point.drift);
     let state = match (recent, alarms) {
@@ -105,20 +137,34 @@ fn drift(points: &[ForecastPoint]) -> Check {
         (false, 1..) => State::Amber,
         (false, 0) => State::Green,
     };
-    let found = match alarms {
-        0 => "none".to_owned(),
-        _ => format!("{alarms}, {} among the last 20", if recent { "some" } else { "none" }),
+    let found = match (alarms, language) {
+        (0, _) => language.pick("none", "keine").to_owned(),
+        (_, Language::English) => {
+            format!("{alarms}, {} among the last 20", if recent { "some" } else { "none" })
+        }
+        (_, Language::German) => {
+            format!("{alarms}, {} unter den letzten 20", if recent { "auch" } else { "keine" })
+        }
     };
-    Check { name: "Drift alarms", found, state, says: "forecasts went wrong to one side for long" }
+    Check {
+        name: language.pick("Drift alarms", "Alarme wegen Abdrift"),
+        found,
+        state,
+        says: language.pick(
+            "forecasts went wrong to one side for long",
+            "Vorhersagen lagen lange nach einer Seite daneben",
+        ),
+    }
 }
 
-fn misses(points: &[ForecastPoint]) -> Check {
+fn misses(points: &[ForecastPoint], language: Language) -> Check {
     let missed: usize = points.iter().map(|point| point.missed).sum();
     Check {
-        name: "Contacts missed",
-        found: format!("{missed} of {}", missed + points.len()),
+        name: language.pick("Contacts missed", "Verpasste Kontakte"),
+        found: format!("{missed} {} {}", language.pick("of", "von"), missed + points.len()),
         state: graded(missed as f64 / (missed + points.len()).max(1) as f64, MISSES),
-        says: "contacts on the way that never reported",
+        says: language
+            .pick("contacts on the way that never reported", "Kontakte auf dem Weg, die sich nie meldeten"),
     }
 }
 
@@ -133,7 +179,7 @@ mod tests {
             line: 2,
             sensor: "A1".into(),
             step: 8,
-            phase: "steady running",
+            phase: Some("steady"),
             missed,
             drift,
             late_ms: Some(late_mm),
@@ -146,15 +192,15 @@ mod tests {
     #[test]
     fn an_error_that_doubles_is_wrong() {
         let mut points: Vec<ForecastPoint> = (0..100).map(|_| point(4.0, 0, false)).collect();
-        assert_eq!(error(&points).state, State::Green);
+        assert_eq!(error(&points, Language::English).state, State::Green);
         points.extend((0..20).map(|_| point(-7.0, 0, false)));
         assert_eq!(
-            (error(&points).state, error(&points).found.as_str()),
+            (error(&points, Language::English).state, error(&points, Language::English).found.as_str()),
             (State::Amber, "7.0 mm now, 4.0 mm usually")
         );
         points.extend((0..20).map(|_| point(8.5, 0, false)));
-        assert_eq!(error(&points).state, State::Red);
-        assert_eq!(error(&[]).state, State::Amber);
+        assert_eq!(error(&points, Language::English).state, State::Red);
+        assert_eq!(error(&[], Language::English).state, State::Amber);
     }
 
     #[test]
@@ -164,16 +210,19 @@ mod tests {
             (0..of).map(|place| point(if place < inside { 1.0 } else { 20.0 }, 0, false)).collect()
         };
         let states = [(9, 10), (4, 5), (83, 100), (70, 100), (0, 0)]
-            .map(|(inside, of)| coverage(&points(inside, of)).state);
+            .map(|(inside, of)| coverage(&points(inside, of), Language::English).state);
         assert_eq!(states, [State::Green, State::Green, State::Amber, State::Red, State::Amber]);
     }
 
     #[test]
     fn an_alarm_is_red_as_long_as_it_is_fresh() {
         let mut points = vec![point(1.0, 0, true)];
-        assert_eq!(drift(&points).state, State::Red);
+        assert_eq!(drift(&points, Language::English).state, State::Red);
         points.extend((0..20).map(|_| point(1.0, 1, false)));
-        assert_eq!(drift(&points).state, State::Amber);
-        assert_eq!((misses(&points).found.as_str(), misses(&points).state), ("20 of 41", State::Red));
+        assert_eq!(drift(&points, Language::English).state, State::Amber);
+        assert_eq!(
+            (misses(&points, Language::English).found.as_str(), misses(&points, Language::English).state),
+            ("20 of 41", State::Red)
+        );
     }
 }

@@ -2,29 +2,38 @@
 
 use super::data::{ReportData, TrainReport};
 use super::tables;
-use crate::commands::web_page::markup::{Table, text};
+use crate::commands::web_page::markup::{Table, text, without_script};
 use crate::commands::web_page::{Language, WebPage};
 
 const CHARTS: &str = include_str!("../../../assets/report/trains.js");
 
-const INTRODUCTION: &str = "<p>Values are given with one standard deviation. In charts, drag to zoom, double-click or \
-                            press Escape to see all again; arrow keys move along a chart that has the focus, plus and \
-                            minus zoom.</p>";
+const INTRODUCTION: [&str; 2] = [
+    "<p>Values are given with one standard deviation. In charts, drag to zoom, double-click or press Escape to see all \
+     again; arrow keys move along a chart that has the focus, plus and minus zoom.</p>",
+    "<p>Werte haben eine Standardabweichung bei sich. In Diagrammen vergrößert Ziehen, ein Doppelklick oder Escape zeigt \
+     wieder alles; Pfeiltasten gehen ein gewähltes Diagramm entlang, Plus und Minus vergrößern.</p>",
+];
 
-pub(super) fn page(data: &ReportData) -> serde_json::Result<String> {
+pub(super) fn page(data: &ReportData, language: Language) -> serde_json::Result<String> {
     let numbers: Vec<String> = data.trains.iter().map(|train| train.calibration.train.to_string()).collect();
-    let title = format!("Trains {} on {}", numbers.join(", "), data.layout);
-    let mut main = overview(data);
+    let title = match language {
+        Language::English => format!("Trains {} on {}", numbers.join(", "), data.layout),
+        Language::German => format!("Züge {} auf {}", numbers.join(", "), data.layout),
+    };
+    let mut main = overview(data, language);
     for train in &data.trains {
-        main.push_str(&section(train));
+        main.push_str(&section(train, language));
     }
-    main.push_str("<section aria-labelledby=\"recordings\"><h2 id=\"recordings\">Recordings</h2>\n");
-    main.push_str(&tables::polling(&data.polling));
+    main.push_str("<section aria-labelledby=\"recordings\"><h2 id=\"recordings\">");
+    main.push_str(language.pick("Recordings", "Aufzeichnungen"));
+    main.push_str("</h2>\n");
+    main.push_str(&tables::polling(&data.polling, language));
     main.push_str("</section>\n");
+    let [introduction, german_introduction] = INTRODUCTION;
     let page = WebPage {
-        language: Language::English,
+        language,
         title: &title,
-        introduction: INTRODUCTION,
+        introduction: language.pick(introduction, german_introduction),
         main: &main,
         style: "",
         script: CHARTS,
@@ -32,9 +41,13 @@ pub(super) fn page(data: &ReportData) -> serde_json::Result<String> {
     page.html(data)
 }
 
-fn overview(data: &ReportData) -> String {
-    let columns = ["train", "state", "what to know", "prediction error", "steps", "contacts"];
-    let mut table = Table::new("All trains", &columns, &[true, false, false, false, true, true]);
+fn overview(data: &ReportData, language: Language) -> String {
+    let columns = match language {
+        Language::English => ["train", "state", "what to know", "prediction error", "steps", "contacts"],
+        Language::German => ["Zug", "Zustand", "was zu wissen ist", "Vorhersagefehler", "Stufen", "Kontakte"],
+    };
+    let caption = language.pick("All trains", "Alle Züge");
+    let mut table = Table::new(caption, &columns, &[true, false, false, false, true, true]);
     for train in &data.trains {
         let health = &train.health;
         let number = train.calibration.train;
@@ -42,66 +55,81 @@ fn overview(data: &ReportData) -> String {
         steps.dedup();
         table.row_of_markup(&[
             format!("<a href=\"#train-{number}\">{number}</a>"),
-            badge(train),
+            badge(train, language),
             text(&health.summary),
             text(health.checks.first().map_or("", |check| check.found.as_str())),
             steps.len().to_string(),
             train.forecasts.len().to_string(),
         ]);
     }
-    format!("<section aria-label=\"Overview\">\n{}</section>\n", table.end())
+    format!(
+        "<section aria-label=\"{}\">\n{}</section>\n",
+        language.pick("Overview", "Überblick"),
+        table.end()
+    )
 }
 
-fn badge(train: &TrainReport) -> String {
-    format!("<span class=\"state {}\">{}</span>", train.health.state.class(), train.health.state.word())
+fn badge(train: &TrainReport, language: Language) -> String {
+    tables::badge(train.health.state, language)
 }
 
-fn section(train: &TrainReport) -> String {
+fn section(train: &TrainReport, language: Language) -> String {
     let form = &train.calibration;
-    let number = form.train;
+    let (number, name) = (form.train, language.pick("Train", "Zug"));
+    let heading = |english, german| format!("<h3>{}</h3>\n", language.pick(english, german));
     let mut html = format!(
-        "<section id=\"train-{number}\" aria-labelledby=\"name-{number}\">\n<h2 id=\"name-{number}\">Train {number}</h2>\n\
+        "<section id=\"train-{number}\" aria-labelledby=\"name-{number}\">\n<h2 id=\"name-{number}\">{name} {number}</h2>\n\
          <p class=\"health\">{} {}</p>\n",
-        badge(train),
+        badge(train, language),
         text(&train.health.summary)
     );
-    html.push_str(&tables::health(&train.health));
-    html.push_str("<h3>Speed</h3>\n");
-    html.push_str(&chart(train, "speeds", "Speed by throttle step, and the side it was reached from"));
-    html.push_str(&tables::speeds(form));
-    html.push_str("<h3>Changes of speed</h3>\n");
-    html.push_str(&tables::laws(form));
+    html.push_str(&tables::health(&train.health, language));
+    html.push_str(&heading("Speed", "Tempo"));
+    let chart = |kind, english, german| chart(train, kind, language.pick(english, german), language);
+    html.push_str(&chart(
+        "speeds",
+        "Speed by throttle step, and the side it was reached from",
+        "Tempo je Fahrstufe, und die Seite, von der sie erreicht wurde",
+    ));
+    html.push_str(&tables::speeds(form, language));
+    html.push_str(&heading("Changes of speed", "Tempowechsel"));
+    html.push_str(&tables::laws(form, language));
     if !train.changes.is_empty() {
         html.push_str(&chart(
-            train,
             "change",
             "A change of speed: the fitted law, and the contacts measured",
+            "Ein Tempowechsel: das Gesetz dazu, und die gemessenen Kontakte",
         ));
     }
-    html.push_str("<h3>Forecasts</h3>\n");
+    html.push_str(&heading("Forecasts", "Vorhersagen"));
     html.push_str(&chart(
-        train,
         "forecasts",
         "How much later than forecast each contact reported; shaded: the 90 % interval stated beforehand",
+        "Wie viel später als vorhergesagt jeder Kontakt sich meldete; getönt: das vorher genannte 90-%-Intervall",
     ));
     if let Some(stops) = &form.stops {
-        html.push_str("<h3>Stops</h3>\n");
-        html.push_str(&chart(train, "stops", "Stopping distance by speed, and the two-term law"));
-        html.push_str(&tables::stops(stops));
+        html.push_str(&heading("Stops", "Halte"));
+        html.push_str(&chart(
+            "stops",
+            "Stopping distance by speed, and the two-term law",
+            "Anhalteweg nach Tempo, und das Gesetz aus zwei Gliedern",
+        ));
+        html.push_str(&tables::stops(stops, language));
     }
-    html.push_str("<h3>Lengths</h3>\n");
-    html.push_str(&tables::lengths(form));
-    html.push_str("<h3>Suspicious measurements</h3>\n");
-    html.push_str(&tables::suspicious(form));
+    html.push_str(&heading("Lengths", "Längen"));
+    html.push_str(&tables::lengths(form, language));
+    html.push_str(&heading("Suspicious measurements", "Verdächtige Messungen"));
+    html.push_str(&tables::suspicious(form, language));
     html.push_str("</section>\n");
     html
 }
 
 /// The place of a chart; the script draws it.
-fn chart(train: &TrainReport, kind: &str, caption: &str) -> String {
+fn chart(train: &TrainReport, kind: &str, caption: &str, language: Language) -> String {
     format!(
         "<figure data-chart=\"{kind}\" data-train=\"{}\"><figcaption>{caption}</figcaption>\
-         <noscript><p>This chart needs JavaScript; the tables do without.</p></noscript></figure>\n",
-        train.calibration.train
+         <noscript><p>{}</p></noscript></figure>\n",
+        train.calibration.train,
+        without_script(language)
     )
 }

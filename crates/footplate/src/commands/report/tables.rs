@@ -4,27 +4,40 @@ use footplate_core::Approach;
 use footplate_core::calibration::Direction;
 use footplate_store::{PollingForm, Quantity, StopForm, TrainForm};
 
-use super::data::{Check, Health};
+use super::data::{Check, Health, State};
+use crate::commands::web_page::Language;
 use crate::commands::web_page::markup::{Table, text};
 
-pub(super) fn health(health: &Health) -> String {
-    let mut table = Table::new("How it fares", &["check", "found", "state", "meaning"], &[false; 4]);
+/// A state as a word in its colour.
+pub(super) fn badge(state: State, language: Language) -> String {
+    format!("<span class=\"state {}\">{}</span>", state.class(), state.word(language))
+}
+
+pub(super) fn health(health: &Health, language: Language) -> String {
+    let columns = match language {
+        Language::English => ["check", "found", "state", "meaning"],
+        Language::German => ["Prüfung", "gefunden", "Zustand", "Bedeutung"],
+    };
+    let mut table = Table::new(language.pick("How it fares", "Wie es ihm geht"), &columns, &[false; 4]);
     for check in &health.checks {
         let Check { name, found, state, says } = check;
-        let badge = format!("<span class=\"state {}\">{}</span>", state.class(), state.word());
-        table.row_of_markup(&[text(name), text(found), badge, text(says)]);
+        table.row_of_markup(&[text(name), text(found), badge(*state, language), text(says)]);
     }
     table.end()
 }
 
-pub(super) fn speeds(train: &TrainForm) -> String {
-    let columns = ["step", "reached from", "speed", "hops", "runs"];
-    let mut table = Table::new("Speed by throttle step", &columns, &[true, false, true, true, true]);
+pub(super) fn speeds(train: &TrainForm, language: Language) -> String {
+    let columns = match language {
+        Language::English => ["step", "reached from", "speed", "hops", "runs"],
+        Language::German => ["Stufe", "erreicht von", "Tempo", "Strecken", "Fahrten"],
+    };
+    let caption = language.pick("Speed by throttle step", "Tempo je Fahrstufe");
+    let mut table = Table::new(caption, &columns, &[true, false, true, true, true]);
     for speed in &train.speeds {
         let Quantity { measurements, .. } = speed.speed;
         table.row(&[
             speed.step.to_string(),
-            approach(speed.approach).to_owned(),
+            approach(speed.approach, language).to_owned(),
             quantity(&speed.speed),
             measurements.to_string(),
             speed.runs.to_string(),
@@ -33,24 +46,46 @@ pub(super) fn speeds(train: &TrainForm) -> String {
     table.end()
 }
 
-pub(super) fn laws(train: &TrainForm) -> String {
+pub(super) fn laws(train: &TrainForm, language: Language) -> String {
     if train.laws.is_empty() {
-        return "<p>No law of speed change yet: it takes three changes with three contacts each.</p>\n"
-            .to_owned();
+        let none = language.pick(
+            "No law of speed change yet: it takes three changes with three contacts each.",
+            "Noch kein Gesetz für Tempowechsel: es braucht drei Wechsel mit je drei Kontakten.",
+        );
+        return format!("<p>{none}</p>\n");
     }
-    let columns =
-        ["getting", "law", "pace", "begins after the command", "changes", "held-out error", "verdict"];
+    let columns = match language {
+        Language::English => {
+            ["getting", "law", "pace", "begins after the command", "changes", "held-out error", "verdict"]
+        }
+        Language::German => [
+            "wird",
+            "Gesetz",
+            "Maß",
+            "beginnt nach dem Befehl",
+            "Wechsel",
+            "Fehler an Zurückgehaltenem",
+            "Urteil",
+        ],
+    };
     let numbers = &[false, false, true, true, true, true, false];
-    let mut table = Table::new("Laws of speed change", &columns, numbers);
+    let mut table =
+        Table::new(language.pick("Laws of speed change", "Gesetze der Tempowechsel"), &columns, numbers);
     for law in &train.laws {
         let direction = match law.direction {
-            Direction::Up => "faster",
-            Direction::Down => "slower",
+            Direction::Up => language.pick("faster", "schneller"),
+            Direction::Down => language.pick("slower", "langsamer"),
         };
         let verdict = match (law.fits, law.agreed) {
-            (true, true) => "explains the contacts",
-            (true, false) => "explains them; another law forecasts better by a tenth",
-            (false, _) => "no law explains the contacts: the best of those there are",
+            (true, true) => language.pick("explains the contacts", "erklärt die Kontakte"),
+            (true, false) => language.pick(
+                "explains them; another law forecasts better by a tenth",
+                "erklärt sie; ein anderes sagt um ein Zehntel besser vorher",
+            ),
+            (false, _) => language.pick(
+                "no law explains the contacts: the best of those there are",
+                "keines erklärt die Kontakte: das beste von allen",
+            ),
         };
         table.row(&[
             direction.to_owned(),
@@ -65,9 +100,13 @@ pub(super) fn laws(train: &TrainForm) -> String {
     table.end()
 }
 
-pub(super) fn stops(stops: &StopForm) -> String {
-    let columns = ["step", "from", "distance", "time", "stops", "off the law"];
-    let mut table = Table::new("Stops, counted from the command", &columns, &[true; 6]);
+pub(super) fn stops(stops: &StopForm, language: Language) -> String {
+    let columns = match language {
+        Language::English => ["step", "from", "distance", "time", "stops", "off the law"],
+        Language::German => ["Stufe", "aus", "Weg", "Zeit", "Halte", "neben dem Gesetz"],
+    };
+    let caption = language.pick("Stops, counted from the command", "Halte, vom Befehl an gezählt");
+    let mut table = Table::new(caption, &columns, &[true; 6]);
     for step in &stops.steps {
         table.row(&[
             step.step.to_string(),
@@ -79,21 +118,33 @@ pub(super) fn stops(stops: &StopForm) -> String {
         ]);
     }
     let law = stops.law.as_ref().map_or_else(String::new, |law| {
-        format!(
-            "<p>Law: <i>d</i> = <i>τ v</i> + <i>v</i>²/2<i>a</i> with <i>τ</i> = {}, <i>a</i> = {}; it misses the \
-             steps by {:.0} mm (rms).</p>\n",
-            text(&quantity(&law.delay)),
-            text(&quantity(&law.deceleration)),
-            law.rms_mm
-        )
+        let (delay, braking) = (text(&quantity(&law.delay)), text(&quantity(&law.deceleration)));
+        let formula = format!("<i>τ</i> = {delay}, <i>a</i> = {braking}");
+        let said = match language {
+            Language::English => format!("with {formula}; it misses the steps by {:.0} mm (rms)", law.rms_mm),
+            Language::German => {
+                format!(
+                    "mit {formula}; es verfehlt die Stufen um {:.0} mm (quadratisches Mittel)",
+                    law.rms_mm
+                )
+            }
+        };
+        let name = language.pick("Law", "Gesetz");
+        format!("<p>{name}: <i>d</i> = <i>τ v</i> + <i>v</i>²/2<i>a</i> {said}.</p>\n")
     });
     table.end() + &law
 }
 
-pub(super) fn lengths(train: &TrainForm) -> String {
-    let columns = ["from", "to", "surveyed", "to add"];
-    let mut table =
-        Table::new("Between contacts: the survey, and what to add", &columns, &[false, false, true, true]);
+pub(super) fn lengths(train: &TrainForm, language: Language) -> String {
+    let columns = match language {
+        Language::English => ["from", "to", "surveyed", "to add"],
+        Language::German => ["von", "bis", "vermessen", "dazu"],
+    };
+    let caption = language.pick(
+        "Between contacts: the survey, and what to add",
+        "Zwischen Kontakten: die Vermessung, und was dazukommt",
+    );
+    let mut table = Table::new(caption, &columns, &[false, false, true, true]);
     for section in &train.sections {
         let correction = &section.correction;
         table.row(&[
@@ -106,13 +157,21 @@ pub(super) fn lengths(train: &TrainForm) -> String {
     table.end()
 }
 
-pub(super) fn suspicious(train: &TrainForm) -> String {
+pub(super) fn suspicious(train: &TrainForm, language: Language) -> String {
     if train.suspicious.is_empty() {
-        return "<p>No measurement was suspicious.</p>\n".to_owned();
+        let none = language.pick("No measurement was suspicious.", "Keine Messung war verdächtig.");
+        return format!("<p>{none}</p>\n");
     }
-    let columns = ["where", "run", "contact", "late", "in way", "chance"];
+    let columns = match language {
+        Language::English => ["where", "run", "contact", "late", "in way", "chance"],
+        Language::German => ["wo", "Fahrt", "Kontakt", "später", "als Weg", "Zufall"],
+    };
     let numbers = &[false, true, false, true, true, true];
-    let mut table = Table::new("Suspicious measurements, taken out of the fit", &columns, numbers);
+    let caption = language.pick(
+        "Suspicious measurements, taken out of the fit",
+        "Verdächtige Messungen, aus dem Abgleich genommen",
+    );
+    let mut table = Table::new(caption, &columns, numbers);
     for suspicion in &train.suspicious {
         table.row(&[
             format!("{}:{}", suspicion.recording, suspicion.line),
@@ -120,20 +179,27 @@ pub(super) fn suspicious(train: &TrainForm) -> String {
             suspicion.sensor.clone(),
             format!("{} ms", signed(suspicion.late_ms, 0)),
             format!("{} mm", signed(suspicion.late_mm, 0)),
-            format!("1 in {:.0e}", 1.0 / suspicion.probability.max(1e-300)),
+            format!("1 {} {:.0e}", language.pick("in", "zu"), 1.0 / suspicion.probability.max(1e-300)),
         ]);
     }
     table.end()
 }
 
-pub(super) fn polling(recordings: &[PollingForm]) -> String {
-    let columns = ["recording", "idle period", "after a report", "jitter"];
-    let mut table =
-        Table::new("Recordings, and the rhythm of their polls", &columns, &[false, true, true, true]);
+pub(super) fn polling(recordings: &[PollingForm], language: Language) -> String {
+    let columns = match language {
+        Language::English => ["recording", "idle period", "after a report", "jitter"],
+        Language::German => ["Aufzeichnung", "Periode im Leerlauf", "nach einer Meldung", "Schwankung"],
+    };
+    let caption = language
+        .pick("Recordings, and the rhythm of their polls", "Aufzeichnungen, und der Rhythmus ihrer Abfragen");
+    let mut table = Table::new(caption, &columns, &[false, true, true, true]);
     for polling in recordings {
         table.row(&[
             polling.recording.clone(),
-            polling.period.as_ref().map_or_else(|| "no rhythm".to_owned(), quantity),
+            polling
+                .period
+                .as_ref()
+                .map_or_else(|| language.pick("no rhythm", "kein Rhythmus").to_owned(), quantity),
             format!("{:.2} ms", polling.after_report_ms),
             format!("{:.2} ms", polling.jitter_ms),
         ]);
@@ -141,11 +207,11 @@ pub(super) fn polling(recordings: &[PollingForm]) -> String {
     table.end()
 }
 
-pub(super) const fn approach(approach: Approach) -> &'static str {
+const fn approach(approach: Approach, language: Language) -> &'static str {
     match approach {
-        Approach::Below => "below",
-        Approach::Above => "above",
-        Approach::Unknown => "not recorded",
+        Approach::Below => language.pick("below", "unten"),
+        Approach::Above => language.pick("above", "oben"),
+        Approach::Unknown => language.pick("not recorded", "nicht festgehalten"),
     }
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use axum::Json;
 use axum::extract::rejection::JsonRejection;
-use axum::extract::{Path, State};
+use axum::extract::{Path, Query, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -25,7 +25,7 @@ use footplate_store::{Batch, EventKey, MarkKind, RecordingKey, Store};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::desk::Desk;
+use super::desk::{Desk, Wished};
 use crate::clock::{now, rfc3339};
 use crate::commands::calibrate::Question;
 use crate::commands::replay::pictures;
@@ -112,8 +112,14 @@ async fn recorded_pictures(State(archive): State<Archive>, Path(recording): Path
         .await
 }
 
-async fn calibration(State(archive): State<Archive>, Path(train): Path<String>) -> Response {
-    archive.answer(move |layout, store| store_report(layout, &store, train_of(&train)?)).await
+async fn calibration(
+    State(archive): State<Archive>,
+    Path(train): Path<String>,
+    Query(wished): Query<Wished>,
+) -> Response {
+    archive
+        .answer(move |layout, store| store_report(layout, &store, train_of(&train)?, wished.language()))
+        .await
 }
 
 async fn why(State(archive): State<Archive>, Path((train, number)): Path<(String, String)>) -> Response {

@@ -5,8 +5,11 @@ use std::sync::Arc;
 use axum::Json;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
 use serde_json::json;
 use tokio::sync::Semaphore;
+
+use crate::commands::web_page::Language;
 
 /// Works out one answer after the other: on a small machine the control loop wants the other core.
 #[derive(Debug, Clone)]
@@ -43,5 +46,18 @@ impl Desk {
                 "this could not be worked out: the terminal says more",
             ),
         }
+    }
+}
+
+/// How an answer shall be written.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Wished {
+    language: String,
+}
+
+impl Wished {
+    pub(super) fn language(&self) -> Language {
+        Language::of_code(&self.language)
     }
 }

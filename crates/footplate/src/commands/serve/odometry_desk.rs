@@ -14,12 +14,10 @@ use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use serde::Deserialize;
 use serde_json::json;
 
-use super::desk::Desk;
+use super::desk::{Desk, Wished};
 use crate::commands::odometry::uploaded_page;
-use crate::commands::web_page::Language;
 use crate::dashboard::Routes;
 
 /// The largest recording that is taken: an hour of two tachometers at 20 Hz is four megabytes as text.
@@ -55,13 +53,6 @@ pub(crate) fn odometry_routes() -> Routes {
     )
 }
 
-/// How the page shall be written.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct Wished {
-    language: String,
-}
-
 async fn walk(
     State(desk): State<OdometryDesk>,
     Path(name): Path<String>,
@@ -71,7 +62,7 @@ async fn walk(
     let pages = Arc::clone(&desk.pages);
     desk.desk
         .answer(move || {
-            let page = uploaded_page(&name, &bytes, Language::of_code(&wished.language))?;
+            let page = uploaded_page(&name, &bytes, wished.language())?;
             let mut pages = pages.lock().unwrap_or_else(PoisonError::into_inner);
             let number = pages.next;
             pages.next += 1;

@@ -1,23 +1,31 @@
 //! `footplate store show`: what is in a store, as of today or any other date.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
-use footplate_core::{EventKind, SensorId, Timestamp};
+use footplate_core::track::Layout;
+use footplate_core::{EventKind, SensorId, Timestamp, TrainId};
 use footplate_store::{
-    RecordingKey, SensorNames, Store, StoredEvent, StoredRecording, StoredRun, layout_named,
+    Batch, CalibrationFile, RecordingKey, SensorNames, Store, StoredEvent, StoredRecording, StoredRun,
+    layout_named,
 };
 use serde_json::{Value, json};
 
 use crate::clock::{Moment, local, now, rfc3339};
 use crate::commands::Outcome;
+use crate::commands::calibrate::draw_calibration;
+use crate::commands::plot::PictureFile;
 use crate::counted::counted;
 
 /// Show what is in the store, and look whether the file is sound.
 #[derive(Args)]
-#[command(after_help = "Example: footplate store show --recording 3 --events --as-of 2026-11-20")]
+#[command(after_help = "\
+Examples:
+  footplate store show --recording 3 --events --as-of 2026-11-20
+  footplate store show --plot train24.svg --train 24")]
 pub(super) struct Arguments {
     /// The runs of this recording.
     #[arg(long, value_name = "N")]
@@ -28,6 +36,15 @@ pub(super) struct Arguments {
     /// As it was at this date.
     #[arg(long, value_name = "DATE")]
     as_of: Option<Moment>,
+    /// Draw what the whole store says of a train, speeds and stops by step, to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE", conflicts_with = "recording")]
+    plot: Option<PictureFile>,
+    /// The train that is drawn, if there are several.
+    #[arg(long, value_name = "N", requires = "plot")]
+    train: Option<u16>,
+    /// The layout of the recordings that are drawn, if they are of several or it is a file.
+    #[arg(long, value_name = "LAYOUT", requires = "plot")]
+    layout: Option<String>,
     /// Write JSON.
     #[arg(long)]
     json: bool,
@@ -39,6 +56,11 @@ impl Arguments {
         store.check()?;
         let as_of = self.as_of.map_or_else(now, |moment| moment.0);
         let recordings = store.recordings(as_of)?;
+        if let Some(plot) = &self.plot {
+            let layout = self.layout_drawn(&recordings)?;
+            let batch = Batch::of_store(&layout, &store, as_of, self.train.map(TrainId))?;
+            draw_calibration(&CalibrationFile::of(&layout, &batch), plot)?;
+        }
         let Some(key) = self.recording.map(RecordingKey) else {
             if self.json {
                 let list: Vec<Value> = recordings.iter().map(recording_value).collect();
@@ -67,6 +89,26 @@ impl Arguments {
             }
         }
         Ok(Outcome::Done)
+    }
+
+    /// The layout that the recordings are of: the only one, unless it is named.
+    fn layout_drawn(&self, recordings: &[StoredRecording]) -> anyhow::Result<Layout> {
+        if let Some(named) = &self.layout {
+            return Ok(layout_named(named)?.layout);
+        }
+        let layouts: BTreeSet<&str> = recordings.iter().map(|recording| recording.layout.as_str()).collect();
+        match layouts.iter().copied().collect::<Vec<_>>().as_slice() {
+            [] => bail!("the store held no recording, so there is nothing to draw"),
+            [only] => Ok(layout_named(only)
+                .with_context(|| {
+                    format!("the recordings are of the layout {only}: give its file with --layout FILE")
+                })?
+                .layout),
+            several => bail!(
+                "a picture is of one layout, and the recordings are of {}; choose one with --layout",
+                several.join(", ")
+            ),
+        }
     }
 }
 

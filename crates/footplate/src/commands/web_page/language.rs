@@ -1,10 +1,14 @@
 //! The language that a page is read in.
 
+use clap::ValueEnum;
+
 /// A language that pages are written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum Language {
     #[default]
+    #[value(name = "en")]
     English,
+    #[value(name = "de")]
     German,
 }
 

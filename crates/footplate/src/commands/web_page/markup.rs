@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use super::Language;
+
 /// Text as it may stand in an element or a quoted attribute.
 pub(in crate::commands) fn text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -22,6 +24,14 @@ pub(in crate::commands) fn text(text: &str) -> String {
 pub(in crate::commands) fn json(json: &str) -> String {
     // Outside its strings JSON has none of these, and inside an escape means the same.
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+/// What stands in the place of a chart where no scripts run.
+pub(in crate::commands) const fn without_script(language: Language) -> &'static str {
+    language.pick(
+        "This chart needs JavaScript; the tables do without.",
+        "Dieses Diagramm braucht JavaScript; die Tabellen nicht.",
+    )
 }
 
 /// A table. The first column names its row, columns in `numbers` stand to the right.

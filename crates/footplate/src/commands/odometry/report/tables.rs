@@ -6,7 +6,7 @@ use super::super::recording::{WalkedRecording, WalkedRun};
 use super::super::walked::{Walked, leaves_bounds};
 use super::MOST_RUNS;
 use crate::commands::web_page::Language;
-use crate::commands::web_page::markup::{Table, text};
+use crate::commands::web_page::markup::{Table, text, without_script};
 use crate::counted::counted;
 
 /// A chart: what it is called in the script, and its heading and what it shows in both languages.
@@ -217,10 +217,7 @@ pub(super) fn main(walked: &Walked, charted: usize) -> String {
         };
         html.push_str(&format!("<p class=\"note\">{said}</p>\n"));
     }
-    let no_script = language.pick(
-        "This chart needs JavaScript; the tables do without.",
-        "Dieses Diagramm braucht JavaScript; die Tabellen nicht.",
-    );
+    let no_script = without_script(language);
     for Chart { kind, heading: [heading, german_heading], caption: [caption, german_caption] } in CHARTS {
         let (heading, caption) =
             (language.pick(heading, german_heading), language.pick(caption, german_caption));

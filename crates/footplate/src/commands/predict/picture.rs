@@ -1,0 +1,61 @@
+//! How far forecasts were off as a picture: for everybody the share of reports within so many millimetres, phase by phase.
+
+use footplate_core::TimeSpan;
+use footplate_core::track::Layout;
+use footplate_store::score::{Rival, ScoredHit, ScoredRecording};
+
+use super::figures::{Hits, PHASES, only};
+use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
+
+/// How a curve is drawn.
+type Drawn = fn(Vec<(f64, f64)>) -> Shape;
+
+/// Who stands beside us: what courses use, what clubs use, and what could be known at best.
+const BESIDE: [(Rival, Ink, Drawn); 3] = [
+    (Rival::ConstantTable, Ink::Second, Shape::Line),
+    (Rival::MiddleAverage, Ink::Third, Shape::Line),
+    (Rival::Oracle, Ink::Plain, Shape::Dashed),
+];
+
+/// The forecasts of all recordings; nothing where none could be made.
+pub(super) fn of(layout: &Layout, recordings: &[ScoredRecording]) -> Option<Picture> {
+    let all: Hits<'_> = recordings.iter().flat_map(|recording| &recording.hits).collect();
+    let scored = only(&all, |hit| hit.late().is_some()).len();
+    let phases = PHASES.iter().filter_map(|(phase, name, _)| {
+        let hits = only(&all, |hit| hit.phase() == Some(*phase));
+        (!hits.is_empty()).then(|| panel(name, &hits))
+    });
+    let panels: Vec<Panel> = phases.collect();
+    if panels.is_empty() {
+        return None;
+    }
+    let logs = match recordings {
+        [only] => only.name.clone(),
+        several => format!("{} logs", several.len()),
+    };
+    Some(Picture {
+        title: format!("Forecasts of the next contact, {logs} on {}", layout.name()),
+        subtitle: format!("{scored} reports that were forecast; every curve ends at {SHOWN:.0} % of its own"),
+        panels,
+    })
+}
+
+/// One phase, with those who forecast at least half of what we did: of the others too little is known.
+fn panel(phase: &str, hits: &[&ScoredHit]) -> Panel {
+    let curve = |late: &dyn Fn(&ScoredHit) -> Option<TimeSpan>| {
+        shares(hits.iter().filter_map(|hit| hit.way_mm(late(hit)?)).map(f64::abs))
+    };
+    let often = |rival| 2 * only(hits, |hit| hit.late_by(rival).is_some()).len() >= hits.len();
+    let rivals = BESIDE.iter().filter(|(rival, ..)| often(*rival)).map(|(rival, ink, shape)| {
+        Layer::new(&rival.to_string(), *ink, shape(curve(&|hit| hit.late_by(*rival))))
+    });
+    let mut layers: Vec<Layer> = rivals.collect();
+    layers.push(Layer::new("Footplate", Ink::First, Shape::Line(curve(&ScoredHit::late))));
+    Panel {
+        x: format!("{phase}: error at most (mm)"),
+        y: "reports (%)".to_owned(),
+        from_nought: true,
+        layers,
+        ..Panel::default()
+    }
+}

@@ -1,0 +1,24 @@
+//! What laws of speed change are called in German; their English names come with them.
+
+use footplate_core::calibration::{Constant, LawKind};
+use footplate_core::kinematics::SpeedLaw;
+
+pub(super) fn german_law(kind: LawKind) -> String {
+    let family = match kind {
+        LawKind::StepRamp => return "linear in der Stufe (Massensimulation)".to_owned(),
+        LawKind::Table => return "Tabelle".to_owned(),
+        LawKind::Family(family) => family,
+    };
+    let shape = match family.law {
+        SpeedLaw::MidStep => "Sprung in der Mitte",
+        SpeedLaw::ConstantAcceleration => "gleichmäßige Beschleunigung",
+        SpeedLaw::ConstantJerk => "gleichmäßiger Ruck (S-Kurve)",
+        SpeedLaw::Smooth => "weich (kubisches Tempo)",
+        SpeedLaw::Lag => return "Verzögerung erster Ordnung".to_owned(),
+    };
+    let constant = match family.constant {
+        Constant::Acceleration => "gleich schnell bei allen Wechseln",
+        Constant::Time => "gleich lang bei allen Wechseln",
+    };
+    format!("{shape}, {constant}")
+}
