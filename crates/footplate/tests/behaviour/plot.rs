@@ -135,7 +135,7 @@ fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
     assert_eq!(run.status, 0, "{}", run.errors);
     says(
         &svg,
-        &["eadanila_2020_track_a on track-a", "steady: error at most (mm)", "change: error at most (mm)"],
+        &["eadanila_2020_track_a on track-a", "steady: error at most (mm)", "first lap: error at most (mm)"],
     );
     says(&svg, &["reports (%)", "Footplate", "EWMA 0.1", "oracle"]);
     // The picture says of how many reports it is; the summary counts the same ones.
