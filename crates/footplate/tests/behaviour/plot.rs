@@ -131,7 +131,7 @@ fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
     let folder = folder("predict");
     let log = format!("{TESTDATA}/sensor-logs/eadanila_2020_track_a.csv");
     let svg = folder.join("errors.svg");
-    let run = drawn(&["predict", &log, "--layout", "track-a", "--summary"], &svg);
+    let run = drawn(&["predict", &log, "--layout", "track-a", "--summary", "--json"], &svg);
     assert_eq!(run.status, 0, "{}", run.errors);
     says(
         &svg,
@@ -139,8 +139,8 @@ fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
     );
     says(&svg, &["reports (%)", "Footplate", "EWMA 0.1", "oracle"]);
     // The picture says of how many reports it is; the summary counts the same ones.
-    let counted = run.output.lines().find_map(|line| line.trim().split_once(" forecast")).unwrap().0;
-    let forecast = counted.rsplit(' ').next().unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&run.output).unwrap();
+    let forecast = &summary["overall"]["scored"];
     says(&svg, &[&format!("{forecast} reports that were forecast")]);
 }
 
