@@ -44,7 +44,7 @@ export const ENGLISH = {
   "later": "later", "stop-95": "95 % of stops", "stop-way": "way to rest", "stop-measured": "measured",
   "stops-made": "Stops made", "order-given": "order", "rests-at": "rests at", "error-mm": "off (mm)", "promised": "promised (mm)",
   "truth-mm": "in truth (mm)", "did-stop": "stop", "did-move": "move", "did-arrive": "arrive", "did-speed": "speed",
-  "did-reverse": "turn", "did-hold": "hold", "did-follow": "follow",
+  "did-go": "go", "did-reverse": "turn", "did-hold": "hold", "did-follow": "follow",
 
   // calibration
   "calibration": "Calibration", "of-train": "Train", "driven-with": "What it is driven with",
@@ -141,8 +141,9 @@ export const ENGLISH = {
   "chart-recorded": "Prediction errors of the sessions", "axis-session": "time since its first picture (s)",
 
   // odometry
-  "odometry": "Odometry", "drop-here": "Drop a recording of a tachometer here: CSV or Parquet.", "or-choose": "Or choose a file:",
-  "note-odometry": "Columns t_s, pulses_1, pulses_2 and more; it is walked as by `footplate odometry`, for two powered wheelsets of 80 teeth. At most 64 MB.",
+  "odometry": "Odometry", "drop-here": "Drop a recording of a tachometer here: CSV or Parquet, and the file of its vehicle: TOML.", "or-choose": "Or choose files:",
+  "note-odometry": "Columns t_s, pulses_1, pulses_2 and more; it is walked as by `footplate odometry`, for two powered wheelsets of 80 teeth unless a vehicle is given. At most 64 MB.",
+  "vehicle-is": "Vehicle: {0}", "recording-wanted": "{0} is kept; now the recording",
   "walking-file": "{0} is walked …", "odometry-of": "Odometry of {0}", "too-large": "{0} is too large: {1} MB; at most 64 MB are taken",
   "watch-slide": "Watch a simulated slide",
   "note-watch-slide": "A full-size train of the simulator slips or slides while the odometer counts the pulses of two wheelsets. The truth comes from the simulator; it is drawn and scored, and the odometer never sees it. The same seed shows the same run.",

@@ -44,7 +44,7 @@ export const GERMAN = {
   "later": "später", "stop-95": "95 % der Halte", "stop-way": "Weg bis zum Stand", "stop-measured": "gemessen",
   "stops-made": "Gemachte Halte", "order-given": "Auftrag", "rests-at": "steht bei", "error-mm": "daneben (mm)", "promised": "versprochen (mm)",
   "truth-mm": "in Wahrheit (mm)", "did-stop": "Halt", "did-move": "Vorrücken", "did-arrive": "Ankunft", "did-speed": "Tempo",
-  "did-reverse": "Wenden", "did-hold": "Halten", "did-follow": "Folgen",
+  "did-go": "Fahrt nach", "did-reverse": "Wenden", "did-hold": "Halten", "did-follow": "Folgen",
 
   // calibration
   "calibration": "Kalibrierung", "of-train": "Zug", "driven-with": "Womit er gefahren wird",
@@ -141,8 +141,9 @@ export const GERMAN = {
   "chart-recorded": "Vorhersagefehler der Sitzungen", "axis-session": "Zeit seit ihrem ersten Bild (s)",
 
   // odometry
-  "odometry": "Odometrie", "drop-here": "Die Aufzeichnung eines Wegimpulsgebers hierher ziehen: CSV oder Parquet.", "or-choose": "Oder eine Datei wählen:",
-  "note-odometry": "Spalten t_s, pulses_1, pulses_2 und mehr; sie wird durchlaufen wie von `footplate odometry`, für zwei angetriebene Radsätze mit 80 Zähnen. Höchstens 64 MB.",
+  "odometry": "Odometrie", "drop-here": "Die Aufzeichnung eines Wegimpulsgebers hierher ziehen, CSV oder Parquet, und die Datei ihres Fahrzeugs, TOML.", "or-choose": "Oder Dateien wählen:",
+  "note-odometry": "Spalten t_s, pulses_1, pulses_2 und mehr; sie wird durchlaufen wie von `footplate odometry`, für zwei angetriebene Radsätze mit 80 Zähnen, wenn kein Fahrzeug dabei ist. Höchstens 64 MB.",
+  "vehicle-is": "Fahrzeug: {0}", "recording-wanted": "{0} ist gemerkt; nun die Aufzeichnung",
   "walking-file": "{0} wird durchlaufen …", "odometry-of": "Odometrie von {0}", "too-large": "{0} ist zu groß: {1} MB; höchstens 64 MB werden genommen",
   "watch-slide": "Einem simulierten Gleiten zusehen",
   "note-watch-slide": "Ein großer Zug des Simulators gleitet oder schleudert, während der Wegmesser die Impulse zweier Radsätze zählt. Die Wahrheit kommt vom Simulator; sie wird gezeichnet und gewertet, der Wegmesser sieht sie nie. Dieselbe Startzahl zeigt dieselbe Fahrt.",

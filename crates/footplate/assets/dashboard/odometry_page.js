@@ -12,13 +12,28 @@ export function odometryPage(root) {
   const $ = (selector) => root.querySelector(selector);
   const place = $("#drop");
   const slide = new SlideView(root);
+  /** The vehicle that was given last, as its file says it, and the recording. */
+  let [vehicle, recording] = [];
+
+  async function take(files) {
+    const given = [...files];
+    const described = given.find(({ name }) => /\.toml$/i.test(name));
+    if (described) {
+      vehicle = await described.text();
+      put($("#vehicle"), say("vehicle-is", described.name));
+      $("#vehicle").hidden = false;
+    }
+    recording = given.find((file) => file !== described) ?? recording;
+    if (recording) await walk(recording);
+    else if (described) put($("#answer"), say("recording-wanted", described.name));
+  }
 
   async function walk(file) {
-    if (!file) return;
     if (file.size > LARGEST) return put($("#answer"), say("too-large", file.name, Math.round(file.size / 1e6)));
     put($("#answer"), say("walking-file", file.name));
     try {
-      const { page } = await send(`/api/odometry/${encodeURIComponent(file.name)}?language=${LANGUAGE}`, file);
+      const wished = new URLSearchParams({ language: LANGUAGE, ...(vehicle && { vehicle }) });
+      const { page } = await send(`/api/odometry/${encodeURIComponent(file.name)}?${wished}`, file);
       $("#result").hidden = false;
       $("#result").title = say("odometry-of", file.name);
       $("#result").src = withToken(page);
@@ -29,7 +44,7 @@ export function odometryPage(root) {
     }
   }
 
-  $("#file").addEventListener("change", (event) => walk(event.target.files[0]));
+  $("#file").addEventListener("change", (event) => take(event.target.files));
   place.addEventListener("dragover", (event) => {
     event.preventDefault();
     place.classList.add("over");
@@ -38,7 +53,7 @@ export function odometryPage(root) {
   place.addEventListener("drop", (event) => {
     event.preventDefault();
     place.classList.remove("over");
-    walk(event.dataTransfer.files[0]);
+    take(event.dataTransfer.files);
   });
   return { close: () => slide.close() };
 }

@@ -1,6 +1,8 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
 const SVG = "http://www.w3.org/2000/svg";
+/** How wide a letter of a name is, in units of the drawing. */
+const LETTER = 0.95;
 /** Trains have so many colours. */
 export const COLOURS = 6;
 
@@ -64,12 +66,30 @@ export class Track {
         this.#contacts.set(node.number, spot);
       }
       const text = node.kind === "contact" ? node.name : `⟨${node.number}⟩`;
-      named.set(key, { x, y, texts: [...(named.get(key)?.texts ?? []), text] });
+      named.set(key, { x, y, kind: node.kind, texts: [...(named.get(key)?.texts ?? []), text] });
     }
-    for (const { x, y, texts } of named.values()) {
-      const name = element("text", { x, y: y - this.#unit * 1.1, "font-size": this.#unit * 1.7, "stroke-width": this.#unit * 0.5, class: "name" }, marks);
-      name.textContent = texts.join(" ");
+    // Contacts first: they are what people name places by.
+    const [contacts, others] = [[], []];
+    for (const name of named.values()) (name.kind === "contact" ? contacts : others).push(name);
+    const written = [];
+    for (const { x, y, texts } of [...contacts, ...others]) {
+      const text = texts.join(" ");
+      const half = text.length * this.#unit * LETTER / 2;
+      const [dx, dy] = this.#room(x, y, half, written);
+      written.push([x + dx - half, x + dx + half, y + dy]);
+      const name = element("text", { x: x + dx, y: y + dy, "font-size": this.#unit * 1.7, "stroke-width": this.#unit * 0.5, class: "name" }, marks);
+      name.textContent = text;
     }
+  }
+
+  /** Where a name so wide goes beside its point: above it, or where no other name is in the way. */
+  #room(x, y, half, written) {
+    const aside = half + this.#unit * 1.2;
+    const places = [[0, -1.1], [0, 2.4], [aside, 0.6], [-aside, 0.6], [0, -2.9], [0, 4.2]]
+      .map(([dx, dy]) => [dx, dy * this.#unit]);
+    const isFree = ([dx, dy]) => written.every(([left, right, foot]) =>
+      x + dx + half < left || x + dx - half > right || Math.abs(y + dy - foot) > this.#unit * 1.7);
+    return places.find(isFree) ?? places[0];
   }
 
   /** The point of an edge at an offset. */

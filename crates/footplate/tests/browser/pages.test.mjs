@@ -117,9 +117,14 @@ test("a recording of a tachometer is walked, and one that is none says what is w
   const frame = page.frameLocator("#result");
   await frame.locator(".uplot").first().waitFor({ timeout: PATIENCE });
   await page.screenshot({ path: join(AT, "odometry.png"), fullPage: true });
+  const vehicle = readFileSync(recording.replace(/csv$/, "toml"), "utf8").replace(/^name = .*$/m, 'name = "the one that was dropped"');
+  await page.setInputFiles("#file", { name: "train.toml", mimeType: "application/toml", buffer: Buffer.from(vehicle) });
+  await frame.getByText("Vehicle: the one that was dropped.").waitFor({ timeout: PATIENCE });
   await page.setInputFiles("#file", { name: "broken.csv", mimeType: "text/csv", buffer: Buffer.from("t_s,pulses_1\n0.1,3\n") });
   await until(page, () => /pulses_2/.test(document.querySelector("#answer").textContent));
   assert.match(await text(page, "#answer"), /^broken\.csv/);
+  await page.setInputFiles("#file", { name: "train.toml", mimeType: "application/toml", buffer: Buffer.from("name = 3") });
+  await until(page, () => /^the vehicle's file/.test(document.querySelector("#answer").textContent));
   assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
   await page.close();
 });

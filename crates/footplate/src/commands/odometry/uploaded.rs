@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::{Context, bail};
-use footplate_store::default_vehicle;
 use footplate_store::odometry::{Preset, RunContext};
+use footplate_store::{VehicleFile, default_vehicle, parse_vehicle};
 
 use super::recording::OpenRecording;
 use super::report;
@@ -30,11 +30,20 @@ impl Drop for Passing {
     }
 }
 
-/// The page of a recording: CSV or Parquet by the ending of its name, the vehicle as when none is named.
+/// The page of a recording: CSV or Parquet by the ending of its name; `vehicle` is the text of a vehicle file.
 ///
 /// # Errors
-/// What is wrong with the recording, with its place.
-pub(crate) fn uploaded_page(name: &str, bytes: &[u8], language: Language) -> anyhow::Result<String> {
+/// What is wrong with the recording or the vehicle, with its place.
+pub(crate) fn uploaded_page(
+    name: &str,
+    bytes: &[u8],
+    vehicle: Option<&str>,
+    language: Language,
+) -> anyhow::Result<String> {
+    let vehicle = match vehicle {
+        Some(text) => parse_vehicle("the vehicle's file", text.as_bytes())?,
+        None => default_vehicle()?,
+    };
     let name = Path::new(name).file_name().and_then(|name| name.to_str()).unwrap_or_default();
     if !(name.ends_with(".csv") || name.ends_with(".parquet")) {
         bail!("`{name}` should be a recording whose name ends with .csv or .parquet");
@@ -46,15 +55,14 @@ pub(crate) fn uploaded_page(name: &str, bytes: &[u8], language: Language) -> any
     let folder = Passing(folder);
     let file = folder.0.join(name);
     fs::File::create_new(&file)?.write_all(bytes)?;
-    walked_page(&file, language).map_err(|error| {
+    walked_page(&file, vehicle, language).map_err(|error| {
         // Where it passed through is nobody's concern.
         let said = format!("{error:#}").replace(&file.display().to_string(), name);
         anyhow::Error::msg(said)
     })
 }
 
-fn walked_page(path: &Path, language: Language) -> anyhow::Result<String> {
-    let vehicle = default_vehicle()?;
+fn walked_page(path: &Path, vehicle: VehicleFile, language: Language) -> anyhow::Result<String> {
     let preset = Preset::Recommended;
     let recording = OpenRecording::open(path, false)?;
     let context = RunContext { vehicle: vehicle.vehicle, preset, score: recording.has_truth() };

@@ -14,6 +14,7 @@ use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use serde::Deserialize;
 use serde_json::json;
 
 use super::desk::{Desk, Wished};
@@ -53,16 +54,25 @@ pub(crate) fn odometry_routes() -> Routes {
     )
 }
 
+/// The train that a recording is of.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct OfTrain {
+    /// The text of a vehicle file.
+    vehicle: Option<String>,
+}
+
 async fn walk(
     State(desk): State<OdometryDesk>,
     Path(name): Path<String>,
     Query(wished): Query<Wished>,
+    Query(of_train): Query<OfTrain>,
     bytes: Bytes,
 ) -> Response {
     let pages = Arc::clone(&desk.pages);
     desk.desk
         .answer(move || {
-            let page = uploaded_page(&name, &bytes, wished.language())?;
+            let page = uploaded_page(&name, &bytes, of_train.vehicle.as_deref(), wished.language())?;
             let mut pages = pages.lock().unwrap_or_else(PoisonError::into_inner);
             let number = pages.next;
             pages.next += 1;
