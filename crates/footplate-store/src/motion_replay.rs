@@ -3,22 +3,31 @@
 //! The events are the truth and a model is what follows from them, so a session that was killed loses nothing: the next one
 //! replays what was written down and goes on from there. Events that a person has excluded are left out, and where a run
 //! ends the chain of what the train did is broken.
+//!
+//! A fit to hours of running takes its time, and most of what is replayed has been replayed before. So the store keeps how far
+//! the last replay came behind its last run, with a fingerprint of all that it follows from: the next one goes on from there,
+//! to the same numbers to the last bit. Where anything differs, be it one excluded event, all is replayed.
 
+mod fingerprint;
+
+use fingerprint::Fingerprint;
 use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::MotionFit;
 use footplate_core::calibration::motion::StepUse;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
+use serde::{Deserialize, Serialize};
+
 use crate::recording::Run;
-use crate::store::{Store, StoreError};
+use crate::store::{KeptReplay, Store, StoreError};
 
 /// How often the model is fitted anew on the way, at starts from rest: what is thought of a command depends on whether the
 /// train stood, and so on how fast it is known to stop.
 const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 
 /// What sessions told of one train.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MotionReplay {
     /// What follows from it, fitted.
     pub fit: MotionFit,
@@ -40,25 +49,61 @@ impl MotionReplay {
     /// Replays everything that a store held at a date of a train on a layout; `highest` is the highest step of its
     /// decoder. Recordings that were read from files count as well.
     ///
+    /// It goes on from where the last replay of the train came, if nothing of that has changed, and keeps how far it came.
+    ///
     /// # Errors
     /// The store cannot be read.
     pub fn of_store(
         layout: &Layout,
-        store: &Store,
+        store: &mut Store,
         train: TrainId,
         highest: SpeedStep,
         as_of: Timestamp,
     ) -> Result<Self, StoreError> {
-        let mut replay = Self::empty(train, highest);
-        let sections = SectionIndex::of(layout);
+        let mut runs: Vec<(String, Run)> = Vec::new();
         for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
-            for stored in store.runs(recording.key, as_of)? {
-                replay.take(layout, &sections, &recording.name, &stored.accepted());
-            }
+            let stored = store.runs(recording.key, as_of)?;
+            runs.extend(stored.iter().map(|run| (recording.name.clone(), run.accepted())));
+        }
+        let mut fingerprint = Fingerprint::of(layout, train, highest);
+        let behind: Vec<Fingerprint> = runs
+            .iter()
+            .map(|(recording, run)| {
+                fingerprint = fingerprint.with(recording, run);
+                fingerprint
+            })
+            .collect();
+        let (mut replay, gone) =
+            Self::kept(store, layout, train, &behind)?.unwrap_or_else(|| (Self::empty(train, highest), 0));
+        let sections = SectionIndex::of(layout);
+        for (recording, run) in runs.iter().skip(gone) {
+            replay.take(layout, &sections, recording, run);
+        }
+        if !replay.is_empty() && gone < runs.len() {
+            replay.keep(store, layout, fingerprint);
         }
         replay.fit.refit(&sections);
         replay.note_steps(highest);
         Ok(replay)
+    }
+
+    /// How far the last replay came, and behind how many of the runs that was; `behind` are their fingerprints.
+    fn kept(
+        store: &Store,
+        layout: &Layout,
+        train: TrainId,
+        behind: &[Fingerprint],
+    ) -> Result<Option<(Self, usize)>, StoreError> {
+        let Some(kept) = store.kept_replay(train, layout.name())? else { return Ok(None) };
+        let Some(last) = behind.iter().position(|of| of.to_string() == kept.of) else { return Ok(None) };
+        Ok(serde_json::from_str(&kept.body).ok().map(|replay| (replay, last + 1)))
+    }
+
+    fn keep(&self, store: &mut Store, layout: &Layout, of: Fingerprint) {
+        let Ok(body) = serde_json::to_string(self) else { return };
+        let kept = KeptReplay { of: of.to_string(), body };
+        // Where it cannot be kept, because another program is writing, the next replay takes as long as this one did.
+        let _ = store.keep_replay(self.fit.model().train(), layout.name(), &kept);
     }
 
     fn empty(train: TrainId, highest: SpeedStep) -> Self {

@@ -55,6 +55,7 @@ pub struct TurnoutNeed {
 
 /// The leg for which each turnout lies, for those of which it is known.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnoutStates {
     /// By the turnout's number; what lies beyond the end is unknown.
     legs: Vec<Option<Leg>>,

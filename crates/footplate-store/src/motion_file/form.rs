@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::calibration_file::Quantity;
 
-/// Names the formulas that made the numbers: it changes when the same events would give others.
+/// Names the formulas that made the numbers. Raise it when the same events come to other numbers: with every change of what
+/// `calibration::motion` of core makes of them, or of what [`MotionReplay`](crate::MotionReplay) tells it. Models and replays
+/// that stores keep are then made anew from the events; a test knows the numbers of every version.
 pub const MOTION_MODEL_VERSION: &str = "1";
 
 /// All that is known of how one train moves on one layout.

@@ -16,6 +16,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/1_begin.sql"),
     include_str!("migrations/2_motion.sql"),
     include_str!("migrations/3_decisions.sql"),
+    include_str!("migrations/4_replays.sql"),
 ];
 
 /// How long we wait for another process to finish writing, chosen: an import of a million events takes less.

@@ -12,6 +12,7 @@
 //! history       reading back what was there at a date, and what changed between two
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
+//! replays       how far a replay of all sessions came, so that the next one goes on from there
 //! salvage       what can still be read of a damaged file, into a new one
 //! ```
 
@@ -23,6 +24,7 @@ mod history;
 mod journal;
 mod marks;
 mod recordings;
+mod replays;
 mod row;
 mod salvage;
 
@@ -34,4 +36,5 @@ pub use history::{Change, StoredEvent, StoredRecording, StoredRun};
 pub use journal::{Journal, JournalEntry};
 pub use marks::{Mark, MarkKind};
 pub use recordings::{EventKey, Import, RecordingKey, RunKey};
+pub(crate) use replays::KeptReplay;
 pub use salvage::{Salvaged, SalvagedTable, salvage};

@@ -33,7 +33,7 @@ pub struct SalvagedTable {
     pub stand_ins: u64,
 }
 
-/// Tables with what they belong to, parents first.
+/// Tables with what they belong to, parents first. How far replays came is not among them: it follows from the rest.
 const TABLES: [(&str, Option<Parent>); 10] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),

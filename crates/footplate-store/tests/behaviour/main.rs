@@ -17,6 +17,7 @@ mod metro_trips;
 mod no_look_ahead;
 mod real_logs;
 mod recordings;
+mod replays_go_on;
 mod running_times;
 mod scored_loop;
 mod store_damaged;

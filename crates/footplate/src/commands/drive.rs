@@ -116,14 +116,14 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let written = self.layout()?;
         let layout = &written.layout;
-        let store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
+        let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
         if let Address::Simulated(simulated) = &self.railway.link {
             named.extend(&simulated.trains);
         }
         let known = KnownTrains::gather(
             layout,
-            &Sources { files: &self.railway.models, store: store.as_ref(), named },
+            Sources { files: &self.railway.models, store: store.as_mut(), named },
         )?;
         drop(store);
         let beginning = self.beginning(&written, known)?;

@@ -117,9 +117,9 @@ fn every_acknowledged_event_is_in_the_store_after_a_kill_and_learning_goes_on_fr
 
 fn replayed(store: &Path, train: TrainId) -> MotionReplay {
     let layout = built_in("track-a").unwrap().layout;
-    let store = Store::open(store).unwrap();
+    let mut store = Store::open(store).unwrap();
     let highest = SpeedStep::new(14).unwrap();
-    MotionReplay::of_store(&layout, &store, train, highest, Timestamp::from_ns(i64::MAX)).unwrap()
+    MotionReplay::of_store(&layout, &mut store, train, highest, Timestamp::from_ns(i64::MAX)).unwrap()
 }
 
 #[test]

@@ -214,8 +214,8 @@ impl Session<'_> {
         let Some(path) = self.store.filter(|path| path.exists() && !self.is_afresh) else {
             return Ok(nothing);
         };
-        let store = Store::open(path)?;
-        let replay = MotionReplay::of_store(layout, &store, self.train, highest, now())?;
+        let mut store = Store::open(path)?;
+        let replay = MotionReplay::of_store(layout, &mut store, self.train, highest, now())?;
         if replay.is_empty() {
             return Ok(nothing);
         }

@@ -31,7 +31,7 @@ pub(super) struct KnownTrains {
 pub(super) struct Sources<'s> {
     /// Files of motion models.
     pub(super) files: &'s [PathBuf],
-    pub(super) store: Option<&'s Store>,
+    pub(super) store: Option<&'s mut Store>,
     /// Trains to drive whether or not anything is known of them.
     pub(super) named: BTreeSet<TrainId>,
 }
@@ -39,17 +39,17 @@ pub(super) struct Sources<'s> {
 impl KnownTrains {
     /// # Errors
     /// A file or the store cannot be read, a model is of another layout, or there is no train at all.
-    pub(super) fn gather(layout: &Layout, sources: &Sources<'_>) -> anyhow::Result<Self> {
+    pub(super) fn gather(layout: &Layout, sources: Sources<'_>) -> anyhow::Result<Self> {
         let mut known = Self::default();
         for path in sources.files {
             let file = MotionFile::read(path)?;
             known.add(layout, &file, &path.display().to_string())?;
         }
-        for train in ADDRESSES.map(TrainId) {
-            if let Some(store) = sources.store
-                && !known.models.contains_key(&train)
-            {
-                known.add_of_store(layout, store, train, sources.named.contains(&train))?;
+        if let Some(store) = sources.store {
+            for train in ADDRESSES.map(TrainId) {
+                if !known.models.contains_key(&train) {
+                    known.add_of_store(layout, store, train, sources.named.contains(&train))?;
+                }
             }
         }
         for train in &sources.named {
@@ -87,7 +87,7 @@ impl KnownTrains {
     fn add_of_store(
         &mut self,
         layout: &Layout,
-        store: &Store,
+        store: &mut Store,
         train: TrainId,
         is_named: bool,
     ) -> anyhow::Result<()> {

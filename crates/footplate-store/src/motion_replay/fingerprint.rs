@@ -1,0 +1,36 @@
+//! The fingerprint of all that a replay follows from, run by run: what comes behind a run does not change that of the run.
+
+use std::fmt;
+
+use footplate_core::track::Layout;
+use footplate_core::{SpeedStep, TrainId};
+
+use crate::content_hash::ContentHash;
+use crate::motion_file::MOTION_MODEL_VERSION;
+use crate::recording::Run;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Fingerprint(ContentHash);
+
+impl Fingerprint {
+    /// Before the first run: of the formulas, the track and the train.
+    ///
+    /// What they are made of is written as programmers see it, which has every number to its last bit. Another compiler may
+    /// write it otherwise; then all is replayed once.
+    pub(super) fn of(layout: &Layout, train: TrainId, highest: SpeedStep) -> Self {
+        let program = env!("CARGO_PKG_VERSION");
+        let all = format!("{MOTION_MODEL_VERSION} {program} {train} {highest} {layout:?}");
+        Self(ContentHash::of(all.as_bytes()))
+    }
+
+    /// Behind one more run.
+    pub(super) fn with(self, recording: &str, run: &Run) -> Self {
+        Self(ContentHash::of(format!("{self} {recording:?} {run:?}").as_bytes()))
+    }
+}
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
