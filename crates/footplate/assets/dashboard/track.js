@@ -17,7 +17,7 @@ function element(name, attributes, parent) {
 export const colourOf = (place) => `var(--t${place % COLOURS})`;
 
 export class Track {
-  #nodes = new Map(); #edges = new Map(); #legs = []; #contacts = new Map(); #layer; #trains = new Map(); #unit; #picked;
+  #nodes = new Map(); #edges = new Map(); #legs = []; #contacts = new Map(); #layer; #numbers; #trains = new Map(); #unit; #picked;
 
   constructor(svg, layout) {
     const drawn = layout.nodes.filter((node) => node.point);
@@ -47,6 +47,8 @@ export class Track {
     this.#layer = element("g", {}, svg);
     const marks = element("g", {}, svg);
     this.#mark(drawn, marks);
+    // Which train it is has to be read whatever lies there.
+    this.#numbers = element("g", {}, svg);
     this.#picked = element("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, svg);
     this.#picked.style.display = "none";
   }
@@ -139,7 +141,7 @@ export class Track {
         rests: element("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
         body: element("path", { class: "body", stroke, "stroke-width": wide * 1.4 }, this.#layer),
         target: element("circle", { class: "target", stroke, "stroke-width": wide * 0.4, r: wide * 1.2 }, this.#layer),
-        number: element("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#layer),
+        number: element("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#numbers),
       };
       parts.number.textContent = String(train.train);
       this.#trains.set(train.train, parts);

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Json;
 use axum::body::Bytes;
+use axum::extract::rejection::BytesRejection;
 use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -67,8 +68,15 @@ async fn walk(
     Path(name): Path<String>,
     Query(wished): Query<Wished>,
     Query(of_train): Query<OfTrain>,
-    bytes: Bytes,
+    bytes: Result<Bytes, BytesRejection>,
 ) -> Response {
+    let bytes = match bytes {
+        Ok(bytes) => bytes,
+        Err(rejection) => {
+            let says = format!("{}; at most {} MB are taken", rejection.body_text(), LARGEST >> 20);
+            return (rejection.status(), Json(json!({ "error": says }))).into_response();
+        }
+    };
     let pages = Arc::clone(&desk.pages);
     desk.desk
         .answer(move || {
