@@ -4,9 +4,27 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// How many threads work at once where nobody says so: a thread for each core.
-pub(crate) fn all_cores() -> NonZeroUsize {
-    thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
+use crate::progress::with_progress;
+
+/// Does `work` for each of the jobs, on so many threads at once or on one for each core, and shows how far it is; the results
+/// stand in the order of the jobs.
+///
+/// # Errors
+/// That of the work: the first, and no more work is begun.
+pub(crate) fn each<J: Sync, T: Send, E: Send>(
+    what: &'static str,
+    jobs: &[J],
+    threads: Option<NonZeroUsize>,
+    work: impl Fn(&J) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let all_cores = || thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    with_progress(what, jobs.len(), |done| {
+        spread(jobs.len(), threads.unwrap_or_else(all_cores), |at| {
+            let result = work(&jobs[at])?;
+            done.fetch_add(1, Ordering::Relaxed);
+            Ok(result)
+        })
+    })
 }
 
 /// Does `work` for every number below `count`; the results stand in the order of the numbers. After an error no more
@@ -14,7 +32,7 @@ pub(crate) fn all_cores() -> NonZeroUsize {
 ///
 /// # Errors
 /// That of the work.
-pub(crate) fn spread<T: Send, E: Send>(
+fn spread<T: Send, E: Send>(
     count: usize,
     threads: NonZeroUsize,
     work: impl Fn(usize) -> Result<T, E> + Sync,

@@ -8,7 +8,6 @@ mod scene;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::sync::atomic::Ordering;
 
 use anyhow::ensure;
 use clap::Args;
@@ -24,8 +23,7 @@ use self::scene::{OTHER, Outcomes, Scene, TRAIN};
 use super::super::Outcome;
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use crate::spread::each;
 
 /// A third train, for telling trains apart.
 const THIRD: TrainId = TrainId(63);
@@ -70,14 +68,7 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let seeds: Vec<u64> = self.seeds.iter().collect();
         let budget = TimeSpan::from_s(f64::from(self.budget));
-        let threads = self.threads.unwrap_or_else(all_cores);
-        let scored = with_progress("disasters", seeds.len(), |done| {
-            spread(seeds.len(), threads, |at| {
-                let scored = score(&layout, seeds[at], budget);
-                done.fetch_add(1, Ordering::Relaxed);
-                scored
-            })
-        })?;
+        let scored = each("disasters", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
         if self.json {
             page.write_json(output)?;

@@ -9,7 +9,6 @@ mod trial;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::sync::atomic::Ordering;
 
 use clap::Args;
 use footplate_core::TimeSpan;
@@ -29,8 +28,7 @@ use super::rehearsal::{Calibrated, calibrate};
 use super::seeds::Seeds;
 use crate::counted::counted;
 use crate::link::law_named;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use crate::spread::each;
 
 /// Calibrate random trains from nothing known, drive them to exact stops, and score both by the truth.
 ///
@@ -77,15 +75,7 @@ impl Arguments {
             .filter(|(_, law)| self.is_asked(*law))
             .collect();
         let budget = TimeSpan::from_s(f64::from(self.budget));
-        let threads = self.threads.unwrap_or_else(all_cores);
-        let trains = with_progress("driving", jobs.len(), |done| {
-            spread(jobs.len(), threads, |at| {
-                let (seed, law) = jobs[at];
-                let scored = score(&layout, seed, law, budget);
-                done.fetch_add(1, Ordering::Relaxed);
-                scored
-            })
-        })?;
+        let trains = each("driving", &jobs, self.threads, |(seed, law)| score(&layout, *seed, *law, budget))?;
         let page = Page { trains: &trains, asked: self.asked() };
         if self.json {
             page.write_json(output)?;

@@ -9,7 +9,6 @@ mod world;
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -24,8 +23,7 @@ use self::scored_run::{ScoredRun, score};
 use self::world::{Scenarios, World};
 use super::super::Outcome;
 use super::seeds::Seeds;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use crate::spread::each;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent), as `footplate odometry` asks for.
 const SPEED_INSIDE_PCT: f64 = 99.99;
@@ -167,15 +165,7 @@ impl Arguments {
         worlds: &[World],
         work: impl Fn(Job, &World) -> anyhow::Result<T> + Sync,
     ) -> anyhow::Result<Vec<T>> {
-        let jobs = self.jobs(worlds.len());
-        let threads = self.threads.unwrap_or_else(all_cores);
-        with_progress(what, jobs.len(), |done| {
-            spread(jobs.len(), threads, |at| {
-                let result = work(jobs[at], &worlds[jobs[at].world]);
-                done.fetch_add(1, Ordering::Relaxed);
-                result
-            })
-        })
+        each(what, &self.jobs(worlds.len()), self.threads, |job| work(*job, &worlds[job.world]))
     }
 
     fn write_files(

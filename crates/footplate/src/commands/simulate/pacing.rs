@@ -10,7 +10,6 @@ mod tracked;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::sync::atomic::Ordering;
 
 use anyhow::ensure;
 use clap::Args;
@@ -28,8 +27,7 @@ use super::again::{FailedRun, name_failed};
 use super::driving::choice::Choice;
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use crate::spread::each;
 
 /// Let calibrated trains hold speeds that none of their steps has, arrive in time and follow each other, and score them by the truth.
 ///
@@ -77,14 +75,7 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let seeds: Vec<u64> = self.seeds.iter().collect();
         let budget = TimeSpan::from_s(f64::from(self.budget));
-        let threads = self.threads.unwrap_or_else(all_cores);
-        let scored = with_progress("pacing", seeds.len(), |done| {
-            spread(seeds.len(), threads, |at| {
-                let scored = score(&layout, seeds[at], budget);
-                done.fetch_add(1, Ordering::Relaxed);
-                scored
-            })
-        })?;
+        let scored = each("pacing", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
         if self.json {
             page.write_json(output)?;

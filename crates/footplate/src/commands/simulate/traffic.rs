@@ -5,7 +5,6 @@ mod session;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::sync::atomic::Ordering;
 
 use clap::Args;
 use footplate_core::TimeSpan;
@@ -17,8 +16,7 @@ use self::session::{Asked, Session, Tally};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::seeds::Seeds;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use crate::spread::each;
 
 /// A train that comes to no destination for so long starves: ten journeys of those that wait longest.
 const STARVES: TimeSpan = TimeSpan::from_ms(1_500_000);
@@ -88,13 +86,8 @@ impl Arguments {
     }
 
     fn tallies(&self, layout: &Layout, seeds: &[u64], asked: Asked) -> anyhow::Result<Vec<Tally>> {
-        let threads = self.threads.unwrap_or_else(all_cores);
-        with_progress("traffic", seeds.len(), |done| {
-            spread(seeds.len(), threads, |at| {
-                let tally = Session::new(layout, seeds[at], asked, self.talk)?.run(asked.time);
-                done.fetch_add(1, Ordering::Relaxed);
-                anyhow::Ok(tally)
-            })
+        each("traffic", seeds, self.threads, |seed| {
+            Ok(Session::new(layout, *seed, asked, self.talk)?.run(asked.time))
         })
     }
 
