@@ -5,6 +5,9 @@
 
 use crate::time::Timestamp;
 
+/// Half of an interval that holds 95 % of a normal distribution, in standard deviations.
+pub const HALF_95: f64 = 1.959_964;
+
 /// A value, how sure we are of it, how many measurements it rests on, and the date of the newest of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

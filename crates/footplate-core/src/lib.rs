@@ -34,7 +34,7 @@ pub mod track;
 mod units;
 pub mod wheels;
 
-pub use estimate::Estimate;
+pub use estimate::{Estimate, HALF_95};
 pub use event::{Approach, Command, Event, EventKind, Report};
 pub use ids::{EdgeId, NodeId, RunId, SensorId, SpeedStep, StretchId, TrainId, TurnoutId};
 pub use time::{TimeSpan, Timestamp};

@@ -1,5 +1,7 @@
 //! How often stated intervals held what they were to hold, and how sure such a count is.
 
+use footplate_core::HALF_95;
+
 /// A count of reports inside intervals of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coverage {
@@ -10,9 +12,6 @@ pub struct Coverage {
     /// Reports in all, at least one.
     pub of: usize,
 }
-
-/// The standard normal quantile of a two-sided 95 % interval.
-const Z_95: f64 = 1.959_963_984_540_054;
 
 impl Coverage {
     /// The part inside.
@@ -25,7 +24,7 @@ impl Coverage {
     /// holds for small counts and at the ends where the usual ± does not.
     #[must_use]
     pub fn plausible(self) -> (f64, f64) {
-        let (n, p, z) = (self.of as f64, self.fraction(), Z_95);
+        let (n, p, z) = (self.of as f64, self.fraction(), HALF_95);
         let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
         let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
         ((middle - half).max(0.0), (middle + half).min(1.0))

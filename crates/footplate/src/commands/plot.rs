@@ -8,6 +8,3 @@ mod shares;
 pub(super) use file::PictureFile;
 pub(super) use picture::{Ink, Layer, Panel, Picture, Shape};
 pub(super) use shares::{SHOWN, shares};
-
-/// Half a 95 % interval is so many standard deviations.
-pub(super) const HALF_95: f64 = 1.959_964;

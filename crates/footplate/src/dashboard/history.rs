@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use footplate_core::estimation::Located;
-use footplate_core::{Length, SpeedStep};
+use footplate_core::{HALF_95, Length, SpeedStep};
 use serde::Serialize;
 
-use super::picture::{PROMISED, millis, tenths};
+use super::picture::{millis, tenths};
 
 /// Five minutes at ten times a second. Older ones are dropped.
 const MOST_SAMPLES: usize = 3_000;
@@ -33,9 +33,9 @@ impl Sample {
     pub(super) fn of(t_s: f64, told: SpeedStep, located: Option<&Located>, way: Option<Length>) -> Self {
         let at = located.zip(way).map(|(located, way)| Where {
             speed: tenths(located.speed.as_mm_per_s()),
-            speed_half: tenths(PROMISED * located.speed_uncertainty.as_mm_per_s()),
+            speed_half: tenths(HALF_95 * located.speed_uncertainty.as_mm_per_s()),
             way: tenths(way.as_mm()),
-            half: tenths(PROMISED * located.uncertainty.as_mm()),
+            half: tenths(HALF_95 * located.uncertainty.as_mm()),
         });
         Self { t_s: millis(t_s), step: told.get(), at }
     }

@@ -1,11 +1,10 @@
 //! How a train moves, as far as is known, for a chart of its speeds and one of its stops.
 
-use footplate_core::Approach;
-use footplate_core::SpeedStep;
 use footplate_core::calibration::motion::{MotionModel, StepUse, StopForecast};
+use footplate_core::{Approach, HALF_95, SpeedStep};
 use serde::Serialize;
 
-use super::picture::{PROMISED, tenths};
+use super::picture::tenths;
 
 /// A motion model, step by step.
 #[derive(Debug, Serialize)]
@@ -61,11 +60,11 @@ impl StepPicture {
             approach: name,
             uses: model.uses(step),
             speed_mm_per_s: tenths(speed.value.as_mm_per_s()),
-            speed_half_mm_per_s: tenths(PROMISED * speed.uncertainty.as_mm_per_s()),
+            speed_half_mm_per_s: tenths(HALF_95 * speed.uncertainty.as_mm_per_s()),
             contacts: speed.count,
             stop_mm: tenths(distance.as_mm()),
-            stop_doubt_half_mm: tenths(PROMISED * doubt.as_mm()),
-            stop_half_mm: tenths(PROMISED * both),
+            stop_doubt_half_mm: tenths(HALF_95 * doubt.as_mm()),
+            stop_half_mm: tenths(HALF_95 * both),
             stop_s: tenths(time.as_s()),
             stops: count,
         }

@@ -9,14 +9,14 @@ use footplate_core::control::calibrate::CalibrationNotice;
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
 use footplate_core::track::Layout;
-use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 
 use super::alarm::{Alarm, Grade};
 use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
-use super::picture::{PROMISED, Picture, TrainTask, millis, paint_train, tenths};
+use super::picture::{Picture, TrainTask, millis, paint_train, tenths};
 use super::spans::{Span, held_spans};
 use super::way_travelled::WayTravelled;
 
@@ -269,7 +269,7 @@ impl Painter {
                 t_s: since(time),
                 window_ms: tenths(passed.window.width().as_ms()),
                 late_ms: passed.late.map(|[late, _]| tenths(late.as_ms())),
-                late_half_ms: passed.late.map(|[_, doubt]| tenths(PROMISED * doubt.as_ms())),
+                late_half_ms: passed.late.map(|[_, doubt]| tenths(HALF_95 * doubt.as_ms())),
                 short_mm: passed.short.map(|short| tenths(short.as_mm())),
                 missed: passed.missed,
                 drift: millis(level),
@@ -278,7 +278,7 @@ impl Painter {
                 next: next.map(|next| DuePicture {
                     contact: layout.sensor_name(next.sensor),
                     t_s: since(next.time),
-                    half_ms: tenths(PROMISED * next.uncertainty.as_ms()),
+                    half_ms: tenths(HALF_95 * next.uncertainty.as_ms()),
                 }),
             },
         );

@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 use footplate_core::control::Driver;
 use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, NodeKind};
-use footplate_core::{Length, SpeedStep, Timestamp, TrainId};
+use footplate_core::{HALF_95, Length, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
 
 use super::calibration_picture::CalibrationPicture;
 use super::spans::{Span, spans};
 
-/// 95 % of a normal distribution lie within so many standard deviations.
-pub(super) const PROMISED: f64 = 1.959_964;
 /// What trains look like whose length nobody said: a short locomotive of the gauge (mm from the pickup's leading end).
 const NOSE: Length = Length::from_mm(20.0);
 const TAIL: Length = Length::from_mm(130.0);
@@ -96,7 +94,7 @@ pub(super) fn paint_train(
     let (layout, turnouts) = (driver.layout(), driver.turnouts());
     let located = driver.locate(train, now);
     let position = driver.position(train, now);
-    let half = located.map(|located| located.uncertainty * PROMISED);
+    let half = located.map(|located| located.uncertainty * HALF_95);
     let around = |behind: Length, ahead: Length| {
         position.map_or_else(Vec::new, |at| spans(layout, turnouts, at, behind, ahead))
     };
@@ -111,7 +109,7 @@ pub(super) fn paint_train(
         step: told.get(),
         speed_mm_per_s: located.map_or(0.0, |located| tenths(located.speed.as_mm_per_s())),
         speed_half_mm_per_s: located
-            .map_or(0.0, |located| tenths(PROMISED * located.speed_uncertainty.as_mm_per_s())),
+            .map_or(0.0, |located| tenths(HALF_95 * located.speed_uncertainty.as_mm_per_s())),
         at: located.and_then(|located| name(driver, train, located.at)),
         half_mm: half.map(|half| tenths(half.as_mm())),
         at_rest: located.is_some_and(|located| located.at_rest),
@@ -135,7 +133,7 @@ fn if_stopped(driver: &Driver, train: TrainId, from: WayPoint, now: Timestamp) -
     (rest.at.node == from.node).then(|| RestPicture {
         at: name(driver, train, rest.at),
         way_mm: tenths((rest.at.way - from.way).as_mm()),
-        half_mm: tenths(PROMISED * libm::hypot(rest.doubt.as_mm(), rest.scatter.as_mm())),
+        half_mm: tenths(HALF_95 * libm::hypot(rest.doubt.as_mm(), rest.scatter.as_mm())),
         in_s: tenths((rest.time - now).as_s()),
     })
 }

@@ -3,13 +3,10 @@
 use alloc::vec::Vec;
 
 use crate::calibration::motion::{MotionModel, StepUse, StopForecast};
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, HALF_95};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::units::{Length, Ratio, Speed};
-
-/// Of a normally distributed error, 95 % are within this many standard deviations.
-const WITHIN_95_PERCENT: f64 = 1.959_963_985;
 
 /// One line of the table of what is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,14 +35,14 @@ impl StepAccuracy {
     #[must_use]
     pub fn stop_within(&self) -> Length {
         let (doubt, scatter) = (self.stop.doubt.as_m(), self.stop.scatter.as_m());
-        Length::from_m(WITHIN_95_PERCENT * libm::hypot(doubt, scatter))
+        Length::from_m(HALF_95 * libm::hypot(doubt, scatter))
     }
 
     /// How far off the speed may be, in 95 of 100 cases, as a part of it.
     #[must_use]
     pub fn speed_within(&self) -> Ratio {
         let (value, uncertainty) = (self.speed.value.as_m_per_s(), self.speed.uncertainty.as_m_per_s());
-        Ratio::from_parts(if value > 0.0 { WITHIN_95_PERCENT * uncertainty / value } else { f64::INFINITY })
+        Ratio::from_parts(if value > 0.0 { HALF_95 * uncertainty / value } else { f64::INFINITY })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use alloc::string::{String, ToString};
 
+use crate::estimate::HALF_95;
 use crate::estimation::{Ground, Located, Rest, WayPoint, landmark_of, way_to_landmark};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
@@ -22,8 +23,6 @@ const SOONEST: TimeSpan = TimeSpan::from_ms(66);
 /// From when a contact closes until what it says has changed a plan: a poll that just missed it, the next one, and the
 /// command's own bytes.
 const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
-/// 95 % of a normal distribution lie within so many standard deviations.
-const PROMISED: f64 = 1.959_964;
 /// A plan that moved by less is no news.
 const NEWS: TimeSpan = TimeSpan::from_ms(1);
 /// An overshoot that is less than any stop scatters is no news either.
@@ -361,7 +360,7 @@ impl DrivenTrain {
     /// Where a rest lies against the target.
     pub(super) fn promise(&self, ground: Ground<'_>, rest: &Rest, at: WayPoint) -> Option<Promise> {
         let median = self.beyond(ground, rest.at, at)?;
-        let half = spread(rest) * PROMISED;
+        let half = spread(rest) * HALF_95;
         Some(Promise { median, low: median - half, high: median + half })
     }
 

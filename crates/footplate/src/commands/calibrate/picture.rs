@@ -2,10 +2,10 @@
 
 use anyhow::bail;
 use footplate_core::control::calibrate::StepAccuracy;
-use footplate_core::{Approach, TrainId};
+use footplate_core::{Approach, HALF_95, TrainId};
 use footplate_store::{CalibrationFile, TrainForm};
 
-use crate::commands::plot::{HALF_95, Ink, Layer, Panel, Picture, PictureFile, Shape};
+use crate::commands::plot::{Ink, Layer, Panel, Picture, PictureFile, Shape};
 
 /// Points of both sides of a step stand beside each other.
 const APART: f64 = 0.09;

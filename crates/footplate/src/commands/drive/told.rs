@@ -5,7 +5,7 @@ use footplate_core::control::{
 };
 use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
-use footplate_core::{SensorId, Timestamp, TrainId};
+use footplate_core::{HALF_95, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
 
@@ -59,12 +59,12 @@ impl Tongue<'_> {
             return format!("train {train}: nobody knows where; it has to pass a contact first");
         };
         let place = self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
-        let half = 1.959_964 * located.uncertainty.as_mm();
+        let half = HALF_95 * located.uncertainty.as_mm();
         let moves = if located.at_rest {
             "at rest".to_owned()
         } else {
             let (speed, doubt) =
-                (located.speed.as_mm_per_s(), 1.959_964 * located.speed_uncertainty.as_mm_per_s());
+                (located.speed.as_mm_per_s(), HALF_95 * located.speed_uncertainty.as_mm_per_s());
             format!("{speed:.0} \u{b1} {doubt:.0} mm/s at step {}", located.step)
         };
         format!("train {train}: {place} \u{b1} {half:.0} mm (95 %), {moves}")
@@ -76,7 +76,7 @@ impl Tongue<'_> {
             let Some(located) = self.driver.locate(train, now) else { return format!("{train} ?") };
             let place =
                 self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
-            let (speed, half) = (located.speed.as_mm_per_s(), 1.959_964 * located.uncertainty.as_mm());
+            let (speed, half) = (located.speed.as_mm_per_s(), HALF_95 * located.uncertainty.as_mm());
             format!("{train} {place} \u{b1}{half:.0} mm {speed:.0} mm/s")
         };
         self.driver.trains().map(train).collect::<Vec<_>>().join(", ")
@@ -260,7 +260,7 @@ impl Tongue<'_> {
             self.at(finished.time),
             finished.train,
             self.place(achieved.at),
-            1.959_964 * achieved.uncertainty.as_mm()
+            HALF_95 * achieved.uncertainty.as_mm()
         );
         if let Some(error) = achieved.error {
             line += &format!(", {:+.1} mm from the target", error.as_mm());

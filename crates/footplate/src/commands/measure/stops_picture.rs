@@ -3,11 +3,11 @@
 use anyhow::Context;
 use footplate_core::calibration::{StopMeasurement, StopTable};
 use footplate_core::track::Layout;
-use footplate_core::{SpeedStep, TrainId};
+use footplate_core::{HALF_95, SpeedStep, TrainId};
 use footplate_store::{Batch, Store};
 
 use crate::clock::now;
-use crate::commands::plot::{HALF_95, Ink, Layer, Panel, Picture, Shape};
+use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape};
 
 /// Points of the curve of the law.
 const SAMPLES: u32 = 120;

@@ -1,6 +1,7 @@
 //! What many trains come to: medians, high percentiles, shares with their intervals.
 
 use footplate_sim::LawFamily;
+use footplate_store::score::Coverage;
 use serde_json::{Value, json};
 
 use super::trial::{NOT_BEYOND_PERCENT, Results};
@@ -123,15 +124,11 @@ impl Figures {
 
 /// The interval that holds the true probability with 95 %, from so many of so many (Wilson, 1927).
 pub(super) fn binomial_interval(of: usize, all: usize) -> [f64; 2] {
-    const Z: f64 = 1.959_964;
     if all == 0 {
         return [0.0, 1.0];
     }
-    let (n, share) = (all as f64, of as f64 / all as f64);
-    let middle = share + Z * Z / (2.0 * n);
-    let half = Z * libm::sqrt(share * (1.0 - share) / n + Z * Z / (4.0 * n * n));
-    let scale = 1.0 + Z * Z / n;
-    [((middle - half) / scale).max(0.0), ((middle + half) / scale).min(1.0)]
+    let (low, high) = Coverage { level: 0.95, inside: of, of: all }.plausible();
+    [low, high]
 }
 
 fn median_and_high(errors: Vec<f64>) -> Option<[f64; 2]> {
