@@ -12,6 +12,7 @@ mod seeds;
 mod station;
 mod traffic;
 mod truth;
+mod written_scores;
 
 use std::io::Write;
 

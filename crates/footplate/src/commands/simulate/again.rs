@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::commands::Outcome;
+
 /// One run of a scorer that did not do what it must.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FailedRun {
@@ -20,16 +22,16 @@ impl fmt::Display for FailedRun {
 /// More failures than these say nothing new to a person.
 const MOST_SAID: usize = 20;
 
-/// Names runs that failed on standard error, where a score does not go; says whether there were any. A line of
+/// Names runs that failed on standard error, where a score does not go; a score with any of them falls short. A line of
 /// `testdata/seeds.txt` that is made of one is driven by every test run from then on.
-pub(super) fn name_failed(failed: &[FailedRun]) -> bool {
+pub(super) fn name_failed(failed: &[FailedRun]) -> Outcome {
     for run in failed.iter().take(MOST_SAID) {
         eprintln!("failed: {run}");
     }
     if failed.len() > MOST_SAID {
         eprintln!("and {} more failed", failed.len() - MOST_SAID);
     }
-    !failed.is_empty()
+    if failed.is_empty() { Outcome::Done } else { Outcome::FallsShort }
 }
 
 #[cfg(test)]
@@ -46,6 +48,7 @@ mod tests {
             failed.to_string(),
             "seed 7, law lag: 1 mishap; only this again: footplate simulate driving --seed 7 --law lag"
         );
-        assert!(name_failed(&[failed]) && !name_failed(&[]));
+        assert!(matches!(name_failed(&[failed]), Outcome::FallsShort));
+        assert!(matches!(name_failed(&[]), Outcome::Done));
     }
 }

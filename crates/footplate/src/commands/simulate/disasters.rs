@@ -23,6 +23,7 @@ use self::scene::{OTHER, Outcomes, Scene, TRAIN};
 use super::super::Outcome;
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
+use super::written_scores::ScoreForm;
 use crate::spread::each;
 
 /// A third train, for telling trains apart.
@@ -44,12 +45,8 @@ pub(super) struct Arguments {
     /// Track time that a calibration may take, in seconds.
     #[arg(long, value_name = "S", default_value_t = 240, value_parser = clap::value_parser!(u16).range(30..=3600))]
     budget: u16,
-    /// Write the scores as a page of the documentation.
-    #[arg(long, conflicts_with = "json")]
-    markdown: bool,
-    /// Write the scores as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    form: ScoreForm,
     /// How many seeds at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -70,13 +67,7 @@ impl Arguments {
         let budget = TimeSpan::from_s(f64::from(self.budget));
         let scored = each("disasters", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
-        if self.json {
-            page.write_json(output)?;
-        } else if self.markdown {
-            page.write_markdown(output)?;
-        } else {
-            page.write_text(output)?;
-        }
+        self.form.write(&page, output)?;
         Ok(Outcome::Done)
     }
 

@@ -26,6 +26,7 @@ use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::rehearsal::{Calibrated, calibrate};
 use super::seeds::Seeds;
+use super::written_scores::ScoreForm;
 use crate::counted::counted;
 use crate::link::law_named;
 use crate::spread::each;
@@ -50,12 +51,8 @@ pub(super) struct Arguments {
     /// Track time that a calibration may take, in seconds.
     #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
     budget: u16,
-    /// Write the scores as a page of the documentation.
-    #[arg(long, conflicts_with = "json")]
-    markdown: bool,
-    /// Write the scores as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    form: ScoreForm,
     /// How many trains at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -77,15 +74,9 @@ impl Arguments {
         let budget = TimeSpan::from_s(f64::from(self.budget));
         let trains = each("driving", &jobs, self.threads, |(seed, law)| score(&layout, *seed, *law, budget))?;
         let page = Page { trains: &trains, asked: self.asked() };
-        if self.json {
-            page.write_json(output)?;
-        } else if self.markdown {
-            page.write_markdown(output)?;
-        } else {
-            page.write_text(output)?;
-        }
+        self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = trains.iter().filter_map(|train| self.failure(train)).collect();
-        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+        Ok(name_failed(&failed))
     }
 
     fn is_asked(&self, law: LawFamily) -> bool {

@@ -27,6 +27,7 @@ use super::again::{FailedRun, name_failed};
 use super::driving::choice::Choice;
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
+use super::written_scores::ScoreForm;
 use crate::spread::each;
 
 /// Let calibrated trains hold speeds that none of their steps has, arrive in time and follow each other, and score them by the truth.
@@ -44,12 +45,8 @@ pub(super) struct Arguments {
     /// Track time that each calibration may take, in seconds.
     #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
     budget: u16,
-    /// Write the scores as a page of the documentation.
-    #[arg(long, conflicts_with = "json")]
-    markdown: bool,
-    /// Write the scores as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    form: ScoreForm,
     /// How many seeds at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -77,15 +74,9 @@ impl Arguments {
         let budget = TimeSpan::from_s(f64::from(self.budget));
         let scored = each("pacing", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
-        if self.json {
-            page.write_json(output)?;
-        } else if self.markdown {
-            page.write_markdown(output)?;
-        } else {
-            page.write_text(output)?;
-        }
+        self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
-        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+        Ok(name_failed(&failed))
     }
 
     /// What the driver did not carry out, or trains came to grief over: how others drive them is no check of ours.

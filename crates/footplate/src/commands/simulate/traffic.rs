@@ -16,6 +16,7 @@ use self::session::{Asked, Session, Tally};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::seeds::Seeds;
+use super::written_scores::ScoreForm;
 use crate::spread::each;
 
 /// A train that comes to no destination for so long starves: ten journeys of those that wait longest.
@@ -46,12 +47,8 @@ pub(super) struct Arguments {
     /// Tell everything that happens while it happens.
     #[arg(long)]
     talk: bool,
-    /// Write the scores as a page of the documentation.
-    #[arg(long, conflicts_with = "json")]
-    markdown: bool,
-    /// Write the scores as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    form: ScoreForm,
     /// How many seeds at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -74,15 +71,9 @@ impl Arguments {
             Vec::new()
         };
         let page = Page { tallies: &tallies, by_blocks: &by_blocks, asked: self.asked() };
-        if self.json {
-            page.write_json(output)?;
-        } else if self.markdown {
-            page.write_markdown(output)?;
-        } else {
-            page.write_text(output)?;
-        }
+        self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = tallies.iter().filter_map(|tally| self.failed(tally)).collect();
-        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+        Ok(name_failed(&failed))
     }
 
     fn tallies(&self, layout: &Layout, seeds: &[u64], asked: Asked) -> anyhow::Result<Vec<Tally>> {

@@ -9,6 +9,7 @@ use super::attributed::Attributed;
 use super::figures::{Figures, both};
 use super::kind::Kind;
 use super::scene::Outcomes;
+use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
 # What becomes of trains that something happens to
@@ -32,43 +33,12 @@ pub(super) struct Page<'r> {
     pub(super) asked: String,
 }
 
-impl Page<'_> {
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(output, "{HEAD}\nMade by `footplate simulate disasters {}`.\n\n{LEGEND}", self.asked)?;
-        self.write_text(output)
+impl WrittenScores for Page<'_> {
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate disasters {}`.\n\n{LEGEND}", self.asked)
     }
 
-    fn runs(&self, kind: Kind) -> Vec<&Outcomes> {
-        self.scored
-            .iter()
-            .flat_map(|scored| &scored.runs)
-            .filter(|(of, _)| *of == kind)
-            .map(|(_, run)| run)
-            .collect()
-    }
-
-    fn figures(&self) -> impl Iterator<Item = Figures> {
-        let happened = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Faultless);
-        happened.map(|kind| Figures::of(kind, &self.runs(kind)))
-    }
-
-    fn alarms(&self) -> (usize, f64) {
-        let runs = || self.scored.iter().flat_map(|scored| &scored.runs).map(|(_, run)| run);
-        (runs().map(|run| run.false_alarms).sum(), runs().map(|run| run.watched_s).sum::<f64>() / 3600.0)
-    }
-
-    fn attributed(&self) -> Vec<(usize, Attributed)> {
-        let mut sums: Vec<(usize, Attributed)> = Vec::new();
-        for (trains, counted) in self.scored.iter().flat_map(|scored| &scored.attributed) {
-            match sums.iter_mut().find(|(known, _)| known == trains) {
-                Some((_, sum)) => sum.add(*counted),
-                None => sums.push((*trains, *counted)),
-            }
-        }
-        sums
-    }
-
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
             "| what happened | runs | noticed | after s | way mm | known again | after s | as before | rescaled | \
@@ -123,7 +93,7 @@ impl Page<'_> {
         Ok(())
     }
 
-    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
         let kinds: Vec<Value> = self.figures().map(|figures| figures.json()).collect();
         let runs =
             self.scored.iter().flat_map(|scored| scored.runs.iter().map(move |run| (scored.seed, run)));
@@ -150,6 +120,38 @@ impl Page<'_> {
             "runs": runs.collect::<Vec<Value>>(),
         });
         writeln!(output, "{all}")
+    }
+}
+
+impl Page<'_> {
+    fn runs(&self, kind: Kind) -> Vec<&Outcomes> {
+        self.scored
+            .iter()
+            .flat_map(|scored| &scored.runs)
+            .filter(|(of, _)| *of == kind)
+            .map(|(_, run)| run)
+            .collect()
+    }
+
+    fn figures(&self) -> impl Iterator<Item = Figures> {
+        let happened = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Faultless);
+        happened.map(|kind| Figures::of(kind, &self.runs(kind)))
+    }
+
+    fn alarms(&self) -> (usize, f64) {
+        let runs = || self.scored.iter().flat_map(|scored| &scored.runs).map(|(_, run)| run);
+        (runs().map(|run| run.false_alarms).sum(), runs().map(|run| run.watched_s).sum::<f64>() / 3600.0)
+    }
+
+    fn attributed(&self) -> Vec<(usize, Attributed)> {
+        let mut sums: Vec<(usize, Attributed)> = Vec::new();
+        for (trains, counted) in self.scored.iter().flat_map(|scored| &scored.attributed) {
+            match sums.iter_mut().find(|(known, _)| known == trains) {
+                Some((_, sum)) => sum.add(*counted),
+                None => sums.push((*trains, *counted)),
+            }
+        }
+        sums
     }
 }
 

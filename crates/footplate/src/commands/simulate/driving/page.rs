@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::figures::{Driven, Figures, ScoredTrain, binomial_interval};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
+use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
 # How well trains are driven
@@ -36,13 +37,12 @@ pub(super) struct Page<'r> {
     pub(super) asked: String,
 }
 
-impl Page<'_> {
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(output, "{HEAD}\nMade by `footplate simulate driving {}`.\n\n{LEGEND}", self.asked)?;
-        self.write_text(output)
+impl WrittenScores for Page<'_> {
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate driving {}`.\n\n{LEGEND}", self.asked)
     }
 
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         self.write_stops(output)?;
         writeln!(output, "\n## Not beyond\n\n{LEGEND_NOT_BEYOND}")?;
         self.write_not_beyond(output)?;
@@ -50,7 +50,7 @@ impl Page<'_> {
         self.write_rest(output)
     }
 
-    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
         let laws = LawFamily::ALL.iter().map(|law| Some(*law)).chain([None]);
         let rows = laws.flat_map(|law| {
             Driven::ALL.map(|by| {
@@ -75,7 +75,9 @@ impl Page<'_> {
         });
         writeln!(output, "{all}")
     }
+}
 
+impl Page<'_> {
     fn of(&self, law: Option<LawFamily>) -> impl Iterator<Item = &ScoredTrain> + Clone {
         self.trains.iter().filter(move |train| law.is_none_or(|law| train.law == law))
     }

@@ -10,6 +10,7 @@ use super::arrive::{self, Arrived};
 use super::figures::{quantile, root_mean_square, shown, within_pct};
 use super::follow::{self, Followed, Kept};
 use super::hold::{By, Held};
+use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
 # How well trains keep to a pace
@@ -65,13 +66,12 @@ pub(super) struct Page<'r> {
     pub(super) asked: String,
 }
 
-impl Page<'_> {
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(output, "{HEAD}\nMade by `footplate simulate pacing {}`.\n", self.asked)?;
-        self.write_text(output)
+impl WrittenScores for Page<'_> {
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate pacing {}`.\n", self.asked)
     }
 
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{HOLD}")?;
         self.write_held(output)?;
         writeln!(output, "\n{ARRIVE}")?;
@@ -80,6 +80,63 @@ impl Page<'_> {
         self.write_followed(output)
     }
 
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+        let parts = By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)));
+        let hold = parts.map(|(by, minute, span)| {
+            let figures = Figures::of(self.held(by), span);
+            json!({
+                "by": by.key(), "minute": minute, "runs": figures.runs, "means_within_0_5_pct": figures.means_within_pct,
+                "mean_off_pct_p95": figures.mean_off, "places_within_15_mm_pct": figures.places_within_pct,
+                "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
+                "commands_per_s": figures.commands_per_s,
+            })
+        });
+        let runs = self.scored.iter().flat_map(|scored| {
+            scored.held.iter().map(move |held| {
+                let figures = Figures::of(core::iter::once(held), 0.0..f64::INFINITY);
+                json!({
+                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
+                    "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
+                    "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
+                    "commands_per_s": figures.commands_per_s, "trouble": held.trouble,
+                })
+            })
+        });
+        let arrived = self.scored.iter().flat_map(|scored| {
+            scored.arrived.iter().map(move |arrived| {
+                json!({
+                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from_rest": arrived.from_rest,
+                    "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
+                    "late_s": arrived.late_and_beyond.map(|[late, _]| late),
+                    "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
+                    "commands": arrived.commands, "trouble": arrived.trouble,
+                })
+            })
+        });
+        let followed = self.scored.iter().flat_map(|scored| {
+            scored.followed.iter().map(move |run| {
+                let (kept, scale) = match run.kept {
+                    Kept::Time => ("s", 1e3),
+                    Kept::Length => ("mm", 1.0),
+                };
+                let off = || run.off.iter().map(|off| scale * off);
+                json!({
+                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_in": kept,
+                    "gap": run.gaps[0], "kept": run.gaps[1], "rms_ms_or_mm": root_mean_square(off()),
+                    "mean_ms_or_mm": off().sum::<f64>() / run.off.len().max(1) as f64, "looks": run.off.len(),
+                    "nearest_mm": run.nearest, "held_back": run.held_back,
+                    "commands_per_s": run.commands as f64 / run.seconds.max(1.0), "trouble": run.trouble,
+                })
+            })
+        });
+        let all = json!({ "hold": hold.collect::<Vec<Value>>(), "held": runs.collect::<Vec<Value>>(), "arrived": arrived.collect::<Vec<Value>>(),
+            "followed": followed.collect::<Vec<Value>>(),
+        });
+        writeln!(output, "{all}")
+    }
+}
+
+impl Page<'_> {
     fn write_followed(&self, output: &mut dyn Write) -> io::Result<()> {
         for (kept, unit, off_in) in [(Kept::Time, "s", "ms"), (Kept::Length, "mm", "mm")] {
             writeln!(
@@ -208,61 +265,6 @@ impl Page<'_> {
             )?;
         }
         Ok(())
-    }
-
-    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
-        let parts = By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)));
-        let hold = parts.map(|(by, minute, span)| {
-            let figures = Figures::of(self.held(by), span);
-            json!({
-                "by": by.key(), "minute": minute, "runs": figures.runs, "means_within_0_5_pct": figures.means_within_pct,
-                "mean_off_pct_p95": figures.mean_off, "places_within_15_mm_pct": figures.places_within_pct,
-                "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
-                "commands_per_s": figures.commands_per_s,
-            })
-        });
-        let runs = self.scored.iter().flat_map(|scored| {
-            scored.held.iter().map(move |held| {
-                let figures = Figures::of(core::iter::once(held), 0.0..f64::INFINITY);
-                json!({
-                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
-                    "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
-                    "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
-                    "commands_per_s": figures.commands_per_s, "trouble": held.trouble,
-                })
-            })
-        });
-        let arrived = self.scored.iter().flat_map(|scored| {
-            scored.arrived.iter().map(move |arrived| {
-                json!({
-                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from_rest": arrived.from_rest,
-                    "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
-                    "late_s": arrived.late_and_beyond.map(|[late, _]| late),
-                    "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
-                    "commands": arrived.commands, "trouble": arrived.trouble,
-                })
-            })
-        });
-        let followed = self.scored.iter().flat_map(|scored| {
-            scored.followed.iter().map(move |run| {
-                let (kept, scale) = match run.kept {
-                    Kept::Time => ("s", 1e3),
-                    Kept::Length => ("mm", 1.0),
-                };
-                let off = || run.off.iter().map(|off| scale * off);
-                json!({
-                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_in": kept,
-                    "gap": run.gaps[0], "kept": run.gaps[1], "rms_ms_or_mm": root_mean_square(off()),
-                    "mean_ms_or_mm": off().sum::<f64>() / run.off.len().max(1) as f64, "looks": run.off.len(),
-                    "nearest_mm": run.nearest, "held_back": run.held_back,
-                    "commands_per_s": run.commands as f64 / run.seconds.max(1.0), "trouble": run.trouble,
-                })
-            })
-        });
-        let all = json!({ "hold": hold.collect::<Vec<Value>>(), "held": runs.collect::<Vec<Value>>(), "arrived": arrived.collect::<Vec<Value>>(),
-            "followed": followed.collect::<Vec<Value>>(),
-        });
-        writeln!(output, "{all}")
     }
 }
 

@@ -6,6 +6,7 @@ use footplate_sim::MishapKind;
 use serde_json::{Value, json};
 
 use super::session::Tally;
+use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
 # How several trains fare on one layout
@@ -33,13 +34,12 @@ pub(super) struct Page<'r> {
     pub(super) asked: String,
 }
 
-impl Page<'_> {
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(output, "{HEAD}\nMade by `footplate simulate traffic {}`.\n\n{LEGEND}", self.asked)?;
-        self.write_text(output)
+impl WrittenScores for Page<'_> {
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate traffic {}`.\n\n{LEGEND}", self.asked)
     }
 
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
             "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
@@ -59,7 +59,7 @@ impl Page<'_> {
         row(output, "all, by blocks", &self.by_blocks.iter().collect::<Vec<_>>())
     }
 
-    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{}", json!({ "seeds": seeds(self.tallies), "by_blocks": seeds(self.by_blocks) }))
     }
 }
