@@ -1,11 +1,13 @@
 //! `footplate compare`: what recordings show beside what others published of trains of the same number.
 
 mod markdown;
+mod picture;
 mod table;
 
 use std::io::Write;
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use footplate_core::{Approach, TrainId};
 use footplate_store::{
@@ -16,6 +18,7 @@ use serde_json::{Value, json};
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::plot::PictureFile;
 
 /// Compare speeds and stops with tables that others published.
 ///
@@ -38,6 +41,9 @@ pub(crate) struct Arguments {
     /// Only this train; also the train of logs that name none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
+    /// Draw the figures of one train to this file, SVG or PNG by its ending.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PictureFile>,
     /// Print the comparison as JSON.
     #[arg(long)]
     json: bool,
@@ -58,6 +64,12 @@ impl Arguments {
         let recordings = LogFile::recordings(&self.logs, &layout, train)?;
         let batch = Batch::of_recordings(&layout, &recordings, train)?;
         let check = CrossCheck::of(&CalibrationFile::of(&layout, &batch), &figures)?;
+        if let Some(plot) = &self.plot {
+            let picture = picture::of(&check).with_context(|| {
+                format!("{}: a picture is of one train; choose one with --train", plot.path().display())
+            })?;
+            plot.write(&picture)?;
+        }
         if self.json {
             writeln!(output, "{}", serde_json::to_string_pretty(&as_json(&check))?)?;
         } else if self.markdown {

@@ -173,3 +173,13 @@ fn the_latencies_of_a_line_are_drawn() {
     assert_eq!(run.status, 0, "{}", run.errors);
     says(&svg, &["How fast the line is", "poll period", "first byte", "at most (ms)"]);
 }
+
+#[test]
+fn ours_are_drawn_beside_what_others_published() {
+    let svg = folder("compare").join("train24.svg");
+    let log = format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_run.csv");
+    let speeds = format!("{TESTDATA}/published-tables/speeds.csv");
+    let run = drawn(&["compare", &log, "--layout", "track-a", "--with", &speeds, "--train", "24"], &svg);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    says(&svg, &["Train 24 beside what others published", "steady speed (mm/s)", "ours", "theirs, agrees"]);
+}
