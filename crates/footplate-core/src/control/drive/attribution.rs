@@ -160,7 +160,11 @@ impl Attribution {
         if doubt.is_believed && believed >= CERTAIN * all {
             return None;
         }
-        if let Some(place) = weights.iter().position(|weight| *weight >= SURE * all) {
+        let is_decided = |(branch, weight): (&Branch, &f64)| {
+            let explanation = branch.passed.as_ref().map(|(explanation, _)| explanation);
+            *weight >= explanation.map_or(SURE, enough_for) * all
+        };
+        if let Some(place) = doubt.otherwise.iter().zip(&weights).position(is_decided) {
             let branch = doubt.otherwise.into_iter().nth(place)?;
             match branch.passed {
                 Some(_) => self.conduct.note_good(doubt.closure.sensor, now),
@@ -200,14 +204,17 @@ impl Attribution {
         }
         of_trains.sort_by(|(_, one), (_, other)| other.total_cmp(one));
         let best = of_trains.first().copied();
-        if let Some((train, _)) = best.filter(|(_, share)| *share >= SURE) {
+        let likeliest_of = |train: TrainId| {
+            let own = found.iter().filter(move |one| one.explanation.train() == train);
+            own.max_by(|one, other| one.log_density.total_cmp(&other.log_density))
+        };
+        let enough = |train| likeliest_of(train).map_or(SURE, |one| enough_for(&one.explanation));
+        if let Some((train, _)) = best.filter(|(train, share)| *share >= enough(*train)) {
             self.conduct.note_good(closure.sensor, now);
             if self.conduct.is_stuck(closure.sensor) {
                 return Verdict::Ignored;
             }
-            let own = found.iter().filter(|one| one.explanation.train() == train);
-            let likeliest = own.max_by(|one, other| one.log_density.total_cmp(&other.log_density));
-            if let Some(one) = likeliest {
+            if let Some(one) = likeliest_of(train) {
                 if one.log_density < UNUSUAL {
                     if self.doubt.is_some() {
                         // What came before may explain it better, once that is decided.
@@ -298,6 +305,15 @@ fn branch(
     let passed = locator.pass(ground, &train.model, closure.sensor, closure.window);
     let passed = Some((explanation, passed));
     Some(Branch { closure, train: train.id(), passed, locator, unseen: None, share })
+}
+
+/// How probable an explanation has to be to be believed. That a train is not where it was believed to be takes a second
+/// closure: by one that it did not make its place would be given to others while it stands there.
+const fn enough_for(explanation: &Explanation) -> f64 {
+    match explanation {
+        Explanation::Strayed(_) => CERTAIN,
+        Explanation::Train(_) | Explanation::Turnout { .. } => SURE,
+    }
 }
 
 /// How the turnouts lie if an explanation is true.
