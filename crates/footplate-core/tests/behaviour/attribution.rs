@@ -107,6 +107,25 @@ fn a_contact_that_closes_by_itself_moves_nobody_and_is_not_believed_until_it_beh
 }
 
 #[test]
+fn a_train_that_one_contact_missed_is_not_moved_by_another_that_closes_by_itself() {
+    let (mut world, mut driver) = two_trains();
+    // Given a train that a contact did not see,
+    world.dead.insert(world.layout.sensor_named("A1").expect("a contact"));
+    run(&mut driver, &world, FIRST, step(8));
+    run(&mut driver, &world, SECOND, step(8));
+    let unseen = |world: &ToyRailway| {
+        world.notices.iter().any(|notice| matches!(notice, DriveNotice::Overdue { train: FIRST, .. }))
+    };
+    assert!(world.run_until(&mut driver, 10.0, unseen), "{:#?}", world.notices);
+    // when one closes that it cannot have come to, and another train passes the next,
+    world.close(world.layout.sensor_named("F2").expect("a contact"));
+    world.run(&mut driver, 10.0);
+    // then it is where it was.
+    assert_eq!(laid(&world)[1], 0, "{:#?}", world.notices);
+    assert!(error_mm(&world, &driver, FIRST) < 25.0);
+}
+
+#[test]
 fn a_train_that_stands_closes_nothing() {
     let (mut world, mut driver) = two_trains();
     world.run(&mut driver, 2.0);

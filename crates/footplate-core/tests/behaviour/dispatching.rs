@@ -46,19 +46,19 @@ pub(crate) struct Traffic {
 
 impl Traffic {
     pub(crate) fn new() -> Self {
-        Self::with(Dispatcher::new)
+        Self::with(Dispatcher::new, STARTS)
     }
 
     /// The same under a watchdog.
     fn watched() -> Self {
-        Self::with(Dispatcher::watched)
+        Self::with(Dispatcher::watched, STARTS)
     }
 
-    fn with(dispatch: impl FnOnce(Timestamp, Driver) -> Dispatcher) -> Self {
-        let [(node, mm), _] = STARTS;
+    fn with(dispatch: impl FnOnce(Timestamp, Driver) -> Dispatcher, starts: [(&str, f64); 2]) -> Self {
+        let [(node, mm), _] = starts;
         let mut world = ToyRailway::new(TRAINS[0].0, node, mm);
         let mut driver = Driver::new(world.layout.clone(), straight());
-        for (train, (name, mm)) in TRAINS.into_iter().zip(STARTS) {
+        for (train, (name, mm)) in TRAINS.into_iter().zip(starts) {
             let node = world.layout.node_named(name).expect("a node");
             driver.add_train(model(train));
             driver.place(world.now, train, WayPoint { node, way: Length::from_mm(mm) }, Length::from_mm(2.0));
@@ -189,6 +189,24 @@ fn a_train_driven_by_hand_stops_before_the_track_of_another() {
     let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };
     let taken = traffic.dispatcher.order(traffic.world.now, throw);
     assert!(matches!(taken, Err(Refusal::TurnoutOccupied { turnout: TurnoutId(1), .. })), "{taken:?}");
+}
+
+#[test]
+fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() {
+    // Given a train on a track that ends, which the last contact before the end did not see,
+    let mut traffic = Traffic::with(Dispatcher::new, [("EN1", 150.0), ("B1", 150.0)]);
+    traffic.world.dead.insert(traffic.world.layout.sensor_named("F1").expect("a contact"));
+    traffic.go(TRAINS[0], "F1+400mm");
+    traffic.run(30.0);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    // when it is sent back,
+    traffic.go(TRAINS[0], "E1+300mm");
+    traffic.run(60.0);
+    // then it comes there, and nobody has to say where it stands.
+    assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
+    let lost = |notice: &DispatchNotice| matches!(notice, DispatchNotice::HeldAsUnknown { .. });
+    assert!(!traffic.notices.iter().any(lost), "{:#?}", traffic.notices);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
 }
 
 proptest! {

@@ -81,6 +81,10 @@ pub(super) struct DispatchedTrain {
     pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
     pub(super) no_room_until: Timestamp,
+    /// Whether a contact has reported it since it turned around, or since a person put it there.
+    pub(super) seen_since_turn: bool,
+    /// It was not seen where it should have been, and ahead of it there is nowhere to be seen: it is looked for behind.
+    pub(super) looks_back: bool,
     /// How long it would take from where it stands if nobody were in its way, in seconds; `None` until it was looked for.
     pub(super) unobstructed_s: Option<f64>,
     /// How many times as much it is given to come to rest in as usual: it was stopped for its limit.
@@ -112,6 +116,8 @@ impl DispatchedTrain {
             came: Trail::default(),
             rooms_made: 0,
             no_room_until: Timestamp::ZERO,
+            seen_since_turn: false,
+            looks_back: false,
             unobstructed_s: None,
             caution: 1.0,
             looked_at: Timestamp::ZERO,

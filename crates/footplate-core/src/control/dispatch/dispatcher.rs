@@ -160,6 +160,7 @@ impl Dispatcher {
         self.driver.place(now, train, at, uncertainty);
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
+            known.seen_since_turn = false;
             known.course.clear();
             known.unobstructed_s = None;
             known.held = Footprint::empty();
@@ -231,6 +232,11 @@ impl Dispatcher {
             self.take_over(now, train)?;
         }
         let taken = self.driver.order(now, order);
+        if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken)
+            && let Some(train) = self.trains.get_mut(&train)
+        {
+            train.seen_since_turn = false;
+        }
         self.settle(now);
         taken
     }

@@ -73,9 +73,9 @@ pub(super) struct Start {
     pub(super) pace: Pace,
     /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
     pub(super) frozen: Vec<TurnoutNeed>,
-    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead:
-    /// it may have come less far, and what is behind it then is not what was planned. Who stands on points that gave way to
-    /// it goes on: they would not give way to it when it comes back.
+    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead,
+    /// and behind only if that leads nowhere: it may have come less far, and nothing is thrown then of all that it holds.
+    /// Who stands on points that gave way to it goes on: they would not give way to it when it comes back.
     pub(super) turned: Option<Position>,
 }
 
@@ -93,6 +93,10 @@ impl Dispatcher {
         let mut kept_free: Option<Proposal> = None;
         let mut all_wait = !waiting.is_empty();
         for (queues, since, id) in waiting.iter().copied() {
+            // It may have been sent out of another's way meanwhile.
+            if !self.trains.get(&id).is_some_and(|train| train.is_ready(now)) {
+                continue;
+            }
             if self
                 .trains
                 .get(&id)
@@ -103,9 +107,10 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                match self.driver.unseen(id, now) {
-                    Some(_) => self.lose(now, id),
-                    None => self.cannot_go(now, id, self.no_way(id)),
+                if self.driver.unseen(id, now).is_none() {
+                    self.cannot_go(now, id, self.no_way(id));
+                } else if !self.looks_back(id) {
+                    self.lose(now, id);
                 }
                 continue;
             };
@@ -179,8 +184,13 @@ impl Dispatcher {
         };
         let mut near = self.driver.turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
+        let looks_back = train.looks_back;
+        if looks_back {
+            near.extend(train.held.turnouts());
+        }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let may_turn = self.driver.unseen(id, now).is_none() && !self.is_on_points_that_gave_way(now, id);
+        let is_sure = self.driver.unseen(id, now).is_none() || looks_back;
+        let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
         let turned = self.driver.turned_place(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned })
@@ -277,6 +287,7 @@ impl Dispatcher {
         train.granted_for = train.asked.filter(|_| purpose == Purpose::Journey).map(|asked| asked.order);
         train.waits_said = false;
         train.unobstructed_s = None;
+        train.looks_back = false;
         if purpose == Purpose::Journey {
             train.rooms_made = 0;
         }

@@ -33,6 +33,9 @@ impl Dispatcher {
                 }
             }
             DriveNotice::Passed { train, passed, .. } => {
+                if let Some(train) = self.trains.get_mut(train) {
+                    train.seen_since_turn = true;
+                }
                 let node = self.driver.layout().sensor_node(passed.sensor);
                 let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));
                 let state = self.trains.get(train).map(|train| train.state);

@@ -60,6 +60,18 @@ impl Dispatcher {
         self.say(DispatchNotice::HeldAsUnknown { train: id });
     }
 
+    /// A train was not seen where it should have been, and ahead of it there is no way: whether it is only now that it is
+    /// looked for behind. The contact that reported it last will report it again then, wherever it stands in between. One
+    /// that nothing has reported since it turned around may not have left at all: behind it, and not far, the track may end.
+    pub(super) fn looks_back(&mut self, id: TrainId) -> bool {
+        let Some(train) = self.trains.get_mut(&id).filter(|train| train.seen_since_turn) else {
+            return false;
+        };
+        self.is_stirred = true;
+        train.looked_at = Timestamp::ZERO;
+        !core::mem::replace(&mut train.looks_back, true)
+    }
+
     fn is_somewhere(&self, id: TrainId) -> bool {
         self.trains.get(&id).is_some_and(|train| !train.held.is_empty())
     }
@@ -73,7 +85,12 @@ impl Dispatcher {
             }
             let turn = Order::Reverse { train: id, then: crate::ids::SpeedStep::STAND };
             match self.driver.order(now, turn) {
-                Ok(order) => self.set_state(id, State::Turning { order }),
+                Ok(order) => {
+                    self.set_state(id, State::Turning { order });
+                    if let Some(train) = self.trains.get_mut(&id) {
+                        train.seen_since_turn = false;
+                    }
+                }
                 Err(why) => self.withdraw(now, id, Some(why)),
             }
         } else {

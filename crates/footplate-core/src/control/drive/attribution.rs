@@ -9,13 +9,13 @@ use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::{Ground, Locator, PassedContact};
+use crate::estimation::Ground;
 use crate::event::Event;
 use crate::ids::{SensorId, TrainId};
-use crate::time::{TimeSpan, Timestamp};
-use crate::track::TurnoutStates;
+use crate::time::Timestamp;
 
 use super::contact_conduct::ContactConduct;
+use super::doubt::{Branch, Doubt};
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Closure, Explanation, Hypothesis, hypotheses};
 
@@ -27,8 +27,6 @@ const CERTAIN: f64 = 0.9999;
 const NEGLIGIBLE: f64 = 0.01;
 /// A density (ln 1/s) that is less than this is unusual: a contact was missed, a turnout failed, a train has changed.
 const UNUSUAL: f64 = -3.0;
-/// A closure that is still not explained after this long never will be: two contacts further even at a crawl.
-const WAITS: TimeSpan = TimeSpan::from_s(15.0);
 
 /// What is made of a closure.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,33 +50,6 @@ pub(super) enum Decided {
     Otherwise(Box<Branch>),
     /// No train did it, as is believed.
     Nothing(Closure),
-}
-
-/// How things are with one train if they are not as is believed.
-#[derive(Debug, Clone)]
-pub(super) struct Branch {
-    pub(super) closure: Closure,
-    pub(super) train: TrainId,
-    /// How it passed the contact, and what had been expected; `None` if it did not.
-    pub(super) passed: Option<(Explanation, PassedContact)>,
-    /// As it was followed from there since.
-    pub(super) locator: Locator,
-    /// A contact that should have reported it before.
-    pub(super) unseen: Option<SensorId>,
-    /// Its share before what came after.
-    share: f64,
-}
-
-/// A closure of which nobody is sure.
-#[derive(Debug, Clone)]
-struct Doubt {
-    closure: Closure,
-    /// Whether a train is believed to have done it.
-    is_believed: bool,
-    /// The share of what is believed.
-    share: f64,
-    otherwise: Vec<Branch>,
-    until: Timestamp,
 }
 
 /// Judges closures one after the other.
@@ -130,29 +101,21 @@ impl Attribution {
         closure: Closure,
     ) -> Option<Decided> {
         let mut doubt = self.doubt.take()?;
-        if now >= doubt.until {
+        if doubt.is_over(now) {
             return (!doubt.is_believed).then_some(Decided::Nothing(doubt.closure));
         }
-        let background = self.conduct.log_rate(closure.sensor, now);
+        let log_nothing = self.conduct.log_rate(closure.sensor, now);
         // How well the new closure is explained, if the earlier one was so.
-        let likely = |trains: &BTreeMap<TrainId, DrivenTrain>, ground: Ground<'_>| {
-            let found = hypotheses(trains, ground, now, closure);
-            libm::exp(background) + found.iter().map(|one| libm::exp(one.log_density)).sum::<f64>()
+        let likely = |found: &[Hypothesis]| {
+            libm::exp(log_nothing) + found.iter().map(|one| libm::exp(one.log_density)).sum::<f64>()
         };
-        let believed = doubt.share * likely(trains, ground);
-        let weight = |branch: &Branch| {
-            let mut so = trains.clone();
-            if let Some(train) = so.get_mut(&branch.train) {
-                train.locator = branch.locator.clone();
-                train.expected.unseen = branch.unseen;
-            }
-            let explanation = branch.passed.as_ref().map(|(explanation, _)| explanation);
-            let turnouts = explanation.map(|explanation| turnouts_after(explanation, ground));
-            let turnouts = turnouts.as_ref().unwrap_or(ground.turnouts);
-            branch.share * likely(&so, Ground { turnouts, ..ground })
-        };
-        let weights: Vec<f64> = doubt.otherwise.iter().map(weight).collect();
-        let all = believed + weights.iter().sum::<f64>();
+        let believed = doubt.share * likely(&hypotheses(trains, ground, now, closure));
+        let explains = |branch: &Branch| branch.explains(trains, ground, now, closure);
+        let explained: Vec<Vec<Hypothesis>> = doubt.otherwise.iter().map(explains).collect();
+        for (branch, found) in doubt.otherwise.iter_mut().zip(&explained) {
+            branch.share *= likely(found);
+        }
+        let all = believed + doubt.otherwise.iter().map(|branch| branch.share).sum::<f64>();
         if !doubt.is_believed && believed >= SURE * all {
             self.conduct.note_strange(doubt.closure.sensor, doubt.closure.window.until);
             return Some(Decided::Nothing(doubt.closure));
@@ -160,23 +123,23 @@ impl Attribution {
         if doubt.is_believed && believed >= CERTAIN * all {
             return None;
         }
-        let is_decided = |(branch, weight): (&Branch, &f64)| {
-            let explanation = branch.passed.as_ref().map(|(explanation, _)| explanation);
-            *weight >= explanation.map_or(SURE, enough_for) * all
+        let is_decided = |branch: &Branch| {
+            let enough = branch.passes.iter().map(|pass| enough_for(&pass.explanation)).fold(SURE, f64::max);
+            branch.share >= enough * all
         };
-        if let Some(place) = doubt.otherwise.iter().zip(&weights).position(is_decided) {
+        if let Some(place) = doubt.otherwise.iter().position(is_decided) {
             let branch = doubt.otherwise.into_iter().nth(place)?;
-            match branch.passed {
-                Some(_) => self.conduct.note_good(doubt.closure.sensor, now),
-                None => {
-                    self.conduct.note_strange(doubt.closure.sensor, doubt.closure.window.until);
-                }
+            if branch.did_it {
+                self.conduct.note_good(branch.closure.sensor, now);
+            } else {
+                self.conduct.note_strange(branch.closure.sensor, branch.closure.window.until);
             }
             return Some(Decided::Otherwise(Box::new(branch)));
         }
         doubt.share = believed / all;
-        for (branch, weight) in doubt.otherwise.iter_mut().zip(weights) {
-            branch.share = weight / all;
+        for (branch, found) in doubt.otherwise.iter_mut().zip(&explained) {
+            branch.share /= all;
+            branch.go_on(trains, ground, closure, found, log_nothing);
         }
         self.doubt = Some(doubt);
         None
@@ -216,11 +179,14 @@ impl Attribution {
             }
             if let Some(one) = likeliest_of(train) {
                 if one.log_density < UNUSUAL {
-                    if self.doubt.is_some() {
+                    if self.doubt.as_ref().is_some_and(|doubt| !doubt.is_believed || doubt.share < SURE) {
                         // What came before may explain it better, once that is decided.
                         return Verdict::Ambiguous { likeliest: train, or: None };
                     }
-                    self.keep_in_mind(trains, now, closure, one, nothing / all);
+                    if let Some(train) = trains.get(&train) {
+                        let not_passed = Branch::not_passing(train, closure, nothing / all);
+                        self.doubt = Some(Doubt::believed(now, not_passed, self.doubt.take()));
+                    }
                 }
                 return Verdict::Explained(one.explanation);
             }
@@ -235,44 +201,11 @@ impl Attribution {
         let otherwise = found
             .iter()
             .filter(|one| density(one) >= NEGLIGIBLE * all)
-            .filter_map(|one| branch(trains, ground, closure, one, density(one) / all));
+            .filter_map(|one| Branch::passing(trains, ground, closure, one, density(one) / all));
         // One doubt at a time: an older one that this closure did not decide is given up.
-        self.doubt = Some(Doubt {
-            closure,
-            is_believed: false,
-            share: nothing / all,
-            otherwise: otherwise.collect(),
-            until: now + WAITS,
-        });
+        self.doubt = Some(Doubt::unbelieved(now, closure, nothing / all, otherwise.collect()));
         let second = of_trains.get(1).filter(|(_, share)| *share >= nothing / all);
         Verdict::Ambiguous { likeliest, or: second.map(|(train, _)| *train) }
-    }
-
-    /// What is believed is unusual enough to remember how it would be if nobody had passed the contact.
-    fn keep_in_mind(
-        &mut self,
-        trains: &BTreeMap<TrainId, DrivenTrain>,
-        now: Timestamp,
-        closure: Closure,
-        believed: &Hypothesis,
-        nothing: f64,
-    ) {
-        let Some(train) = trains.get(&believed.explanation.train()) else { return };
-        let not_passed = Branch {
-            closure,
-            train: train.id(),
-            passed: None,
-            locator: train.locator.clone(),
-            unseen: train.unseen(),
-            share: nothing,
-        };
-        self.doubt = Some(Doubt {
-            closure,
-            is_believed: true,
-            share: 1.0 - nothing,
-            otherwise: alloc::vec![not_passed],
-            until: now + WAITS,
-        });
     }
 
     fn strange(&mut self, closure: Closure) -> Verdict {
@@ -286,27 +219,6 @@ impl Attribution {
     }
 }
 
-/// A train as it goes on from a contact, if it passed it.
-fn branch(
-    trains: &BTreeMap<TrainId, DrivenTrain>,
-    ground: Ground<'_>,
-    closure: Closure,
-    hypothesis: &Hypothesis,
-    share: f64,
-) -> Option<Branch> {
-    let explanation = hypothesis.explanation;
-    let train = trains.get(&explanation.train())?;
-    let turnouts = turnouts_after(&explanation, ground);
-    let mut locator = train.locator.clone();
-    if matches!(explanation, Explanation::Strayed(_)) {
-        locator.lose();
-    }
-    let ground = Ground { turnouts: &turnouts, ..ground };
-    let passed = locator.pass(ground, &train.model, closure.sensor, closure.window);
-    let passed = Some((explanation, passed));
-    Some(Branch { closure, train: train.id(), passed, locator, unseen: None, share })
-}
-
 /// How probable an explanation has to be to be believed. That a train is not where it was believed to be takes a second
 /// closure: by one that it did not make its place would be given to others while it stands there.
 const fn enough_for(explanation: &Explanation) -> f64 {
@@ -314,13 +226,4 @@ const fn enough_for(explanation: &Explanation) -> f64 {
         Explanation::Strayed(_) => CERTAIN,
         Explanation::Train(_) | Explanation::Turnout { .. } => SURE,
     }
-}
-
-/// How the turnouts lie if an explanation is true.
-fn turnouts_after(explanation: &Explanation, ground: Ground<'_>) -> TurnoutStates {
-    let mut turnouts = ground.turnouts.clone();
-    if let Explanation::Turnout { turnout, leg, .. } = explanation {
-        turnouts.set(*turnout, *leg);
-    }
-    turnouts
 }

@@ -13,7 +13,8 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
 use crate::units::Length;
 
-use super::attribution::{Attribution, Branch, Decided, Verdict};
+use super::attribution::{Attribution, Decided, Verdict};
+use super::doubt::Branch;
 use super::driven_train::{DrivenTrain, LINE_TIME};
 use super::hypotheses::{Closure, Explanation};
 use super::known_track::KnownTrack;
@@ -327,23 +328,25 @@ impl Driver {
 
     /// A train passed a contact a while ago, or did not, as has turned out.
     fn take_back(&mut self, now: Timestamp, branch: Branch) {
-        let Branch { closure: Closure { sensor, window }, train, passed, locator, unseen, .. } = branch;
-        if let Some((explanation, _)) = passed {
-            self.believe(explanation);
-        } else {
+        let Branch { closure, did_it, train, passes, locator, unseen, .. } = branch;
+        if !did_it {
+            let Closure { sensor, window } = closure;
             self.outputs.say(DriveNotice::Unexplained { sensor, time: window.until });
         }
+        passes.iter().for_each(|pass| self.believe(pass.explanation));
         let ground = self.track.ground();
         let Some(train) = self.trains.get_mut(&train) else { return };
         train.locator = locator;
-        match (passed, ground.node_of(sensor)) {
-            (Some((_, passed)), Some(node)) => train.passed(ground, now, node, passed, &mut self.outputs),
-            _ => {
-                train.expected.unseen = unseen;
-                train.way_changed(ground, now, &mut self.outputs);
+        train.expected.unseen = unseen;
+        for pass in &passes {
+            if let Some(node) = ground.node_of(pass.closure.sensor) {
+                train.passed(ground, now, node, pass.passed, &mut self.outputs);
             }
         }
-        if matches!(passed, Some((Explanation::Turnout { .. }, _))) {
+        if passes.is_empty() {
+            train.way_changed(ground, now, &mut self.outputs);
+        }
+        if passes.iter().any(|pass| matches!(pass.explanation, Explanation::Turnout { .. })) {
             self.ways_changed(now);
         }
     }

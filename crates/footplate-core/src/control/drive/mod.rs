@@ -8,6 +8,7 @@ mod approach;
 mod attribution;
 mod command_time;
 mod contact_conduct;
+mod doubt;
 mod driven_train;
 mod driver;
 mod expectation;
