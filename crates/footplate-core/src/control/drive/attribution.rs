@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 
 use crate::estimation::Ground;
 use crate::event::Event;
-use crate::ids::{SensorId, TrainId};
+use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 
 use super::contact_conduct::ContactConduct;
@@ -75,6 +75,12 @@ impl Attribution {
     pub(super) fn doubts(&self, train: TrainId) -> bool {
         let otherwise = self.doubt.iter().flat_map(|doubt| &doubt.otherwise);
         otherwise.into_iter().any(|branch| branch.train == train)
+    }
+
+    /// A turnout was told to lie somehow: what it may have been before does not matter any more.
+    pub(super) fn turnout_thrown(&mut self, turnout: TurnoutId) {
+        let branches = self.doubt.iter_mut().flat_map(|doubt| &mut doubt.otherwise);
+        branches.for_each(|branch| branch.turnout_thrown(turnout));
     }
 
     /// A command to a train has left: those that it may be hear it, too.
@@ -184,7 +190,8 @@ impl Attribution {
                         return Verdict::Ambiguous { likeliest: train, or: None };
                     }
                     if let Some(train) = trains.get(&train) {
-                        let not_passed = Branch::not_passing(train, closure, nothing / all);
+                        let not_passed =
+                            Branch::not_passing(train, ground, closure, &one.explanation, nothing / all);
                         self.doubt = Some(Doubt::believed(now, not_passed, self.doubt.take()));
                     }
                 }

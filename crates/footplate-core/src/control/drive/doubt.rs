@@ -4,9 +4,9 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use crate::estimation::{Ground, Locator, PassedContact};
-use crate::ids::{SensorId, TrainId};
+use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::TurnoutStates;
+use crate::track::{Leg, TurnoutStates};
 
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Closure, Explanation, Hypothesis, hypotheses};
@@ -34,6 +34,8 @@ pub(super) struct Branch {
     pub(super) train: TrainId,
     /// What it passed from that closure on.
     pub(super) passes: Vec<Pass>,
+    /// How turnouts lie then that are believed to lie otherwise.
+    pub(super) lies: Vec<(TurnoutId, Leg)>,
     /// As it was followed from there since.
     pub(super) locator: Locator,
     /// A contact that should have reported it before.
@@ -92,17 +94,35 @@ impl Branch {
     ) -> Option<Self> {
         let explanation = hypothesis.explanation;
         let train = trains.get(&explanation.train())?;
-        let locator = train.locator.clone();
-        let (train, passes, unseen) = (train.id(), Vec::new(), None);
-        let mut branch = Self { closure, did_it: true, train, passes, locator, unseen, share };
+        let mut branch = Self { did_it: true, unseen: None, ..Self::before(train, closure, share) };
         branch.pass(trains, ground, closure, explanation);
         Some(branch)
     }
 
-    /// A train as it goes on if it did not pass a contact.
-    pub(super) fn not_passing(train: &DrivenTrain, closure: Closure, share: f64) -> Self {
+    /// A train as it goes on if it did not pass a contact, as is believed. What that has shown of a turnout is not so then.
+    pub(super) fn not_passing(
+        train: &DrivenTrain,
+        ground: Ground<'_>,
+        closure: Closure,
+        believed: &Explanation,
+        share: f64,
+    ) -> Self {
+        let mut branch = Self::before(train, closure, share);
+        if let Explanation::Turnout { turnout, .. } = *believed {
+            branch.lies.extend(ground.turnouts.get(turnout).map(|lies| (turnout, lies)));
+        }
+        branch
+    }
+
+    fn before(train: &DrivenTrain, closure: Closure, share: f64) -> Self {
         let (locator, unseen) = (train.locator.clone(), train.unseen());
-        Self { closure, did_it: false, train: train.id(), passes: Vec::new(), locator, unseen, share }
+        let (passes, lies) = (Vec::new(), Vec::new());
+        Self { closure, did_it: false, train: train.id(), passes, lies, locator, unseen, share }
+    }
+
+    /// A turnout was thrown: however it lay before.
+    pub(super) fn turnout_thrown(&mut self, thrown: TurnoutId) {
+        self.lies.retain(|(turnout, _)| *turnout != thrown);
     }
 
     /// All trains, and how the turnouts lie, if it is so.
@@ -116,9 +136,13 @@ impl Branch {
             train.locator = self.locator.clone();
             train.expected.unseen = self.unseen;
         }
+        (trains, self.turnouts(ground))
+    }
+
+    fn turnouts(&self, ground: Ground<'_>) -> TurnoutStates {
         let mut turnouts = ground.turnouts.clone();
-        self.passes.iter().for_each(|pass| set_turnout(&mut turnouts, &pass.explanation));
-        (trains, turnouts)
+        self.lies.iter().for_each(|(turnout, leg)| turnouts.set(*turnout, *leg));
+        turnouts
     }
 
     /// What explains a closure if it is so.
@@ -159,21 +183,15 @@ impl Branch {
         explanation: Explanation,
     ) {
         let Some(train) = trains.get(&self.train) else { return };
-        let (_, mut turnouts) = self.world(trains, ground);
-        set_turnout(&mut turnouts, &explanation);
-        if matches!(explanation, Explanation::Strayed(_)) {
-            self.locator.lose();
+        match explanation {
+            Explanation::Turnout { turnout, leg, .. } => self.lies.push((turnout, leg)),
+            Explanation::Strayed(_) => self.locator.lose(),
+            Explanation::Train(_) => {}
         }
+        let turnouts = self.turnouts(ground);
         let ground = Ground { turnouts: &turnouts, ..ground };
         let passed = self.locator.pass(ground, &train.model, closure.sensor, closure.window);
         self.unseen = None;
         self.passes.push(Pass { closure, explanation, passed });
-    }
-}
-
-/// How a turnout lies if an explanation is true.
-fn set_turnout(turnouts: &mut TurnoutStates, explanation: &Explanation) {
-    if let Explanation::Turnout { turnout, leg, .. } = explanation {
-        turnouts.set(*turnout, *leg);
     }
 }

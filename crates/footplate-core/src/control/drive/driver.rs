@@ -252,6 +252,7 @@ impl Driver {
 
     fn turnout_left(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
         self.track.turnouts.set(turnout, Leg::from_curved(curved));
+        self.attribution.turnout_thrown(turnout);
         let out = &mut self.outputs;
         let mut is_asked = false;
         // Whoever asked for it is answered; a line may say once what was asked twice.
@@ -308,7 +309,9 @@ impl Driver {
 
     /// A train passed a contact just now.
     fn passed(&mut self, now: Timestamp, closure: Closure, explanation: Explanation) {
-        self.believe(explanation);
+        if let Explanation::Turnout { train, turnout, leg } = explanation {
+            self.believe(train, turnout, leg);
+        }
         let ground = self.track.ground();
         if let (Some(train), Some(node)) =
             (self.trains.get_mut(&explanation.train()), ground.node_of(closure.sensor))
@@ -328,12 +331,12 @@ impl Driver {
 
     /// A train passed a contact a while ago, or did not, as has turned out.
     fn take_back(&mut self, now: Timestamp, branch: Branch) {
-        let Branch { closure, did_it, train, passes, locator, unseen, .. } = branch;
+        let Branch { closure, did_it, train, passes, lies, locator, unseen, .. } = branch;
         if !did_it {
             let Closure { sensor, window } = closure;
             self.outputs.say(DriveNotice::Unexplained { sensor, time: window.until });
         }
-        passes.iter().for_each(|pass| self.believe(pass.explanation));
+        lies.iter().for_each(|(turnout, leg)| self.believe(train, *turnout, *leg));
         let ground = self.track.ground();
         let Some(train) = self.trains.get_mut(&train) else { return };
         train.locator = locator;
@@ -346,18 +349,16 @@ impl Driver {
         if passes.is_empty() {
             train.way_changed(ground, now, &mut self.outputs);
         }
-        if passes.iter().any(|pass| matches!(pass.explanation, Explanation::Turnout { .. })) {
+        if !lies.is_empty() {
             self.ways_changed(now);
         }
     }
 
     /// Takes over what a train showed of a turnout.
-    fn believe(&mut self, explanation: Explanation) {
-        if let Explanation::Turnout { train, turnout, leg } = explanation {
-            self.track.turnouts.set(turnout, leg);
-            let curved = leg.is_curved();
-            self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
-        }
+    fn believe(&mut self, train: TrainId, turnout: TurnoutId, leg: Leg) {
+        self.track.turnouts.set(turnout, leg);
+        let curved = leg.is_curved();
+        self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
     }
 
     /// Says of the line what the plans want of it.
