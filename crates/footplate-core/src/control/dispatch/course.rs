@@ -64,7 +64,7 @@ pub(super) struct GrantedRun {
 
 impl GrantedRun {
     /// What it takes from a point on, where its rear end is.
-    pub(super) fn taken_from(&self, layout: &Layout, from: Length) -> Footprint {
+    pub(super) fn takes_beyond(&self, layout: &Layout, from: Length) -> Footprint {
         self.way.footprint(layout, from, self.end)
     }
 }

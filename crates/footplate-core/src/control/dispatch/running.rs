@@ -313,7 +313,7 @@ impl Dispatcher {
             match train.state {
                 State::Running { rear, confirmed, .. } if nth == 0 => {
                     let from = if confirmed { rear } else { rear.max(run.taken_from) };
-                    held.add(layout, &self.reserved(run.taken_from(layout, from)));
+                    held.add(layout, &self.reserved(run.takes_beyond(layout, from)));
                 }
                 _ => held.add(layout, &run.taken),
             }
@@ -342,7 +342,7 @@ impl Dispatcher {
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);
         // Near to where it began it keeps what it stood on.
-        let body = self.reserved(run.taken_from(layout, rear));
+        let body = self.reserved(run.takes_beyond(layout, rear));
         if rear < run.taken_from && !self.is_free_for(id, &body) {
             return true;
         }
