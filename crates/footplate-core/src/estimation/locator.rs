@@ -5,6 +5,7 @@
 //! tape, which a train feels a little longer or shorter.
 
 use super::felt_way::{FeltReach, felt_reach, felt_reaches, taping_doubt};
+use super::foresight::Foresight;
 use super::ground::Ground;
 use super::outlook::Outlook;
 use crate::calibration::motion::{Following, Guess, MotionModel};
@@ -318,6 +319,11 @@ impl Locator {
     /// Where it most likely goes from here; `None` while it is lost.
     pub(crate) fn outlook(&self) -> Option<Outlook> {
         Some(Outlook::new(self.node?, self.epoch, self.following.course()))
+    }
+
+    /// What is to be reckoned with from here.
+    pub(crate) const fn foresight(&self) -> Foresight {
+        Foresight::new(self.node, self.epoch, self.following)
     }
 
     /// Where it would come to rest if step 0 left the line at a time (not before the last entry), after any commands

@@ -14,6 +14,7 @@ mod claim;
 mod contact_scatter;
 mod felt_way;
 mod forecast;
+mod foresight;
 mod ground;
 mod law_memory;
 mod locator;
@@ -29,6 +30,7 @@ mod way_memory;
 
 pub use felt_way::{landmark_of, place_of, way_to, way_to_landmark};
 pub use forecast::{Forecast, Phase};
+pub(crate) use foresight::Foresight;
 pub use ground::Ground;
 pub use law_memory::{KnownLaw, LawMemory};
 pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint};

@@ -10,7 +10,7 @@ use crate::ids::{EdgeId, NodeId, TurnoutId};
 use crate::track::hop::Hops;
 use crate::track::{
     Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind, Place,
-    Ways,
+    PlannedZone, Ways,
 };
 use crate::units::Length;
 
@@ -22,7 +22,7 @@ impl Layout {
     ///
     /// # Errors
     /// The first thing that is wrong, in the order survey, places, stretches, rail ends without a stretch,
-    /// pairs, loops.
+    /// pairs, loops, zones.
     pub fn build(plan: &LayoutPlan) -> Result<Self, LayoutError> {
         let uncertainty = plan.survey.uncertainty;
         if !is_plausible(uncertainty) {
@@ -42,6 +42,8 @@ impl Layout {
             never_both_curved: plan.never_both_curved.clone(),
             partners,
             hops: Hops::default(),
+            zones: Vec::new(),
+            restricted: BTreeMap::new(),
         };
         let place_and_name = |node: NodeId| (node.pair(), layout.node_name(node).to_owned());
         if let Some((place, node)) = layout.loop_without_length().map(place_and_name) {
@@ -51,7 +53,10 @@ impl Layout {
             Ok(hops) => hops,
             Err((place, node)) => return Err(LayoutError::TooManyWays { place, node }),
         };
-        Ok(layout)
+        let zones = plan.zones.iter();
+        zones
+            .cloned()
+            .try_fold(layout, |layout, PlannedZone { zone, stretches }| layout.with_zone(zone, stretches))
     }
 
     /// A node from which edges of 0 mm lead back to it.

@@ -4,10 +4,10 @@ use alloc::string::String;
 use core::fmt;
 
 use crate::ids::{SensorId, TurnoutId};
-use crate::track::{Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS};
-use crate::units::Length;
+use crate::track::{Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, MAX_ZONE_LIMIT, MIN_ZONE_LIMIT};
+use crate::units::{Length, Speed};
 
-/// Why a plan is not a layout. Places, stretches and pairs are counted from 0 in the order of the plan.
+/// Why a plan is not a layout. Places, stretches, pairs and zones are counted from 0 in the order of the plan.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum LayoutError {
@@ -139,6 +139,43 @@ pub enum LayoutError {
         /// The node.
         node: String,
     },
+    /// A zone whose name could not be said in a message.
+    IllegalZoneName {
+        /// The zone.
+        zone: usize,
+        /// Its name.
+        name: String,
+    },
+    /// Two zones of one name.
+    DuplicateZone {
+        /// The later zone.
+        zone: usize,
+        /// The name.
+        name: String,
+    },
+    /// A limit that restricts nothing, or that no train could keep.
+    IllegalZoneLimit {
+        /// The zone.
+        zone: usize,
+        /// What was given.
+        found: Speed,
+    },
+    /// One stretch in two zones.
+    RestrictedTwice {
+        /// The later zone.
+        zone: usize,
+        /// The name of the zone that has it.
+        first: String,
+        /// The name of the zone that claims it, too.
+        second: String,
+    },
+    /// A zone that restricts nothing.
+    ZoneWithoutEdges {
+        /// The zone.
+        zone: usize,
+        /// Its name.
+        name: String,
+    },
 }
 
 /// The entry of a plan that an error is about.
@@ -154,6 +191,8 @@ pub enum PlanEntry {
     Stretch(usize),
     /// A pair of turnouts that are never both curved.
     Pair(usize),
+    /// A speed restriction.
+    Zone(usize),
 }
 
 impl LayoutError {
@@ -177,6 +216,11 @@ impl LayoutError {
             | Self::IllegalLength { stretch, .. }
             | Self::RailEndTaken { stretch, .. } => PlanEntry::Stretch(stretch),
             Self::IllegalPair { pair, .. } => PlanEntry::Pair(pair),
+            Self::IllegalZoneName { zone, .. }
+            | Self::DuplicateZone { zone, .. }
+            | Self::IllegalZoneLimit { zone, .. }
+            | Self::RestrictedTwice { zone, .. }
+            | Self::ZoneWithoutEdges { zone, .. } => PlanEntry::Zone(zone),
         }
     }
 }
@@ -261,6 +305,27 @@ impl fmt::Display for LayoutError {
                 f,
                 "there are too many ways from `{node}` to the next sensors: put sensors between the turnouts"
             ),
+            Self::IllegalZoneName { name, .. } => write!(
+                f,
+                "the zone's name `{}` is not 1 to {MAX_NAME_CHARACTERS} characters on one line",
+                name.escape_debug()
+            ),
+            Self::DuplicateZone { name, .. } => {
+                write!(f, "there is a zone `{name}` already; every zone needs its own name")
+            }
+            Self::IllegalZoneLimit { found, .. } => write!(
+                f,
+                "a limit of {} mm/s is not between {} and {} mm/s (is it in millimetres a second?)",
+                found.as_mm_per_s(),
+                MIN_ZONE_LIMIT.as_mm_per_s(),
+                MAX_ZONE_LIMIT.as_mm_per_s()
+            ),
+            Self::RestrictedTwice { first, second, .. } => {
+                write!(f, "an edge is in zone `{first}` and in zone `{second}`; each edge is in one at most")
+            }
+            Self::ZoneWithoutEdges { name, .. } => {
+                write!(f, "no edge is in zone `{name}`: write `zone = \"{name}\"` on the edges it restricts")
+            }
         }
     }
 }

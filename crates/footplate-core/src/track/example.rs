@@ -49,6 +49,7 @@ pub(crate) fn oval_plan() -> LayoutPlan {
             stretch("E1", "EX2", 40.0),
         ],
         never_both_curved: vec![],
+        zones: vec![],
     }
 }
 

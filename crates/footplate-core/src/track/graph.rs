@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
 use crate::track::hop::Hops;
-use crate::track::{Leg, Survey, TurnoutStates};
+use crate::track::{Leg, Survey, TurnoutStates, Zone};
 use crate::units::Length;
 
 impl NodeId {
@@ -129,6 +129,9 @@ pub struct Layout {
     /// The other turnout of each pair, both ways.
     pub(crate) partners: BTreeMap<TurnoutId, TurnoutId>,
     pub(crate) hops: Hops,
+    pub(crate) zones: Vec<Zone>,
+    /// The zone of each restricted stretch, by its place in the list.
+    pub(crate) restricted: BTreeMap<StretchId, usize>,
 }
 
 impl Layout {

@@ -6,6 +6,7 @@
 //! - [`Layout::hops_from`]: which sensors may come next, in nanoseconds, from a table made once;
 //! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent;
 //! - [`Layout::route`]: the shortest way between two nodes; [`Layout::circuit_from`]: a way that leads back;
+//! - [`Layout::greatest_speed`]: how fast trains may be along a way;
 //! - [`Position`] and [`Landmark`]: points on the rails, and the names people give them.
 
 mod build;
@@ -21,14 +22,18 @@ mod position;
 mod reach;
 mod route;
 mod turnout;
+mod zone;
 
 pub use circuit::Circuit;
 pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, Ways};
 pub use hop::{Hop, HopId};
 pub use landmark::{Landmark, LandmarkError};
-pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, RailEnd, Stretch, Survey};
+pub use plan::{
+    LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch, Survey,
+};
 pub use position::{Position, WayError};
 pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use route::{Route, RouteError};
 pub use turnout::{Leg, TurnoutNeed, TurnoutStates};
+pub use zone::{MAX_ZONE_LIMIT, MIN_ZONE_LIMIT, Zone};

@@ -6,8 +6,8 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::ids::{SensorId, TurnoutId};
-use crate::track::Leg;
+use crate::ids::{SensorId, StretchId, TurnoutId};
+use crate::track::{Leg, Zone};
 use crate::units::Length;
 
 /// Longest stretch that is believed. The one published slip of the unit (micrometres read as millimetres)
@@ -30,6 +30,17 @@ pub struct LayoutPlan {
     pub stretches: Vec<Stretch>,
     /// Pairs of turnouts in one place of which at most one may lie for its curved leg.
     pub never_both_curved: Vec<[TurnoutId; 2]>,
+    /// Speed restrictions.
+    pub zones: Vec<PlannedZone>,
+}
+
+/// A speed restriction and where it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedZone {
+    /// The restriction.
+    pub zone: Zone,
+    /// The stretches, counted from 0 in the order of the plan.
+    pub stretches: Vec<StretchId>,
 }
 
 /// How well the lengths of a layout are known, and how that is known.

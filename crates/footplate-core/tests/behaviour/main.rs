@@ -18,6 +18,7 @@ mod pacing;
 mod profiles;
 mod short_moves;
 mod speed_change_laws;
+mod speed_zones;
 mod stopping;
 mod toy_body;
 mod toy_railway;

@@ -84,6 +84,7 @@ pub(crate) fn layout() -> Layout {
             stretch("F1", "EX2", 900.0),
         ],
         never_both_curved: vec![],
+        zones: vec![],
     };
     Layout::build(&plan).expect("a layout")
 }

@@ -37,6 +37,7 @@ fn any_plan() -> impl Strategy<Value = LayoutPlan> {
                 stretches: rail_ends.chunks(2).zip(&lengths).map(join).collect(),
                 places,
                 never_both_curved: vec![],
+                zones: vec![],
             }
         })
 }

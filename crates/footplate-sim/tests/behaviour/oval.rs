@@ -41,6 +41,7 @@ pub(crate) fn oval() -> Layout {
         places,
         stretches,
         never_both_curved: Vec::new(),
+        zones: Vec::new(),
     })
     .unwrap()
 }

@@ -55,6 +55,7 @@ pub(crate) fn two_loops() -> Layout {
         places,
         stretches,
         never_both_curved: Vec::new(),
+        zones: Vec::new(),
     })
     .unwrap()
 }

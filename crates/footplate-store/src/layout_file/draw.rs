@@ -18,6 +18,8 @@ const RAIL: f64 = 0.002;
 const SENSOR: f64 = 0.004;
 const TURNOUT: f64 = 0.003;
 const LETTER: f64 = 0.011;
+/// The colour of rails on which the speed is restricted: that of a signal's caution.
+const RESTRICTED: &str = "#d80";
 
 /// The text of an SVG file. Places without a point, and the rails to them, are left out.
 ///
@@ -43,12 +45,17 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
     line(format_args!("<title>{}</title>", escaped(layout.name())));
     line(format_args!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"));
     line(format_args!("<g stroke=\"#555\" stroke-width=\"{rail}\" stroke-linecap=\"round\">"));
-    for (_, edge) in layout.edges().step_by(2) {
+    for (id, edge) in layout.edges().step_by(2) {
         if let (Some([x1, y1]), Some([x2, y2])) = (drawing.point(edge.from), drawing.point(edge.to)) {
             let (from, to) = (layout.node_name(edge.from), layout.node_name(edge.to));
             let mm = edge.length.as_mm();
+            let (colour, zone) = layout.zone(id).map_or_else(Default::default, |zone| {
+                let (name, limit) = (escaped(&zone.name), zone.limit.as_mm_per_s());
+                (format!(" stroke=\"{RESTRICTED}\""), format!(", zone {name}: at most {limit} mm/s"))
+            });
             line(format_args!(
-                "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"><title>{from} to {to}: {mm:.0} mm</title></line>"
+                "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{colour}><title>{from} to {to}: {mm:.0} \
+                 mm{zone}</title></line>"
             ));
         }
     }
@@ -100,6 +107,8 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::layout_file::{Drawing, built_in, parse_layout, write_layout};
+    use footplate_core::Speed;
+    use footplate_core::track::Zone;
 
     #[test]
     fn every_place_and_stretch_of_track_a_is_drawn_once() {
@@ -116,6 +125,18 @@ mod tests {
             line.split('"').nth(3).unwrap().parse::<f64>().unwrap()
         });
         assert!(heights.windows(2).all(|pair| pair[1] < pair[0] - 10.0), "{heights:?}");
+    }
+
+    #[test]
+    fn rails_with_a_speed_restriction_are_drawn_in_another_colour_and_say_so() {
+        let file = built_in("track-a").unwrap();
+        let zone = Zone { name: "C & E".into(), limit: Speed::from_mm_per_s(180.0) };
+        let [from, to] = ["C13", "E7"].map(|name| file.layout.node_named(name).unwrap());
+        let edge = file.layout.edge_between(from, to).unwrap();
+        let layout = file.layout.with_zone(zone, [edge.stretch()]).unwrap();
+        let svg = draw_layout(&LayoutFile { layout, ..file }).unwrap();
+        assert_eq!(svg.matches(RESTRICTED).count(), 1);
+        assert!(svg.contains("<title>C13 to E7: 875 mm, zone C &amp; E: at most 180 mm/s</title>"), "{svg}");
     }
 
     #[test]

@@ -110,6 +110,12 @@ pub enum LayoutProblem {
         /// The name.
         name: String,
     },
+    /// An edge in a zone that is nowhere described.
+    #[error("no zone is called `{found}`: add `{{ name = \"{found}\", max_mm_s = .. }}` to `zones`")]
+    UnknownZone {
+        /// What the file says.
+        found: String,
+    },
     /// A point that cannot be drawn.
     #[error("[{x}, {y}] is no point to draw at: coordinates are between -{limit} and {limit}")]
     Point {

@@ -49,12 +49,15 @@ pub fn import_layout<R: BufRead>(
         places: places.iter().map(|(_, place)| place.clone()).collect(),
         stretches: stretches.iter().map(|(_, stretch)| stretch.clone()).collect(),
         never_both_curved: context.never_both_curved.clone(),
+        zones: Vec::new(),
     };
     let layout = Layout::build(&plan).map_err(|error| {
         let (file, line) = match error.entry() {
             PlanEntry::Place(place) => (&nodes_file, places.get(place).map(|(line, _)| *line)),
             PlanEntry::Stretch(stretch) => (&edges_file, stretches.get(stretch).map(|(line, _)| *line)),
-            PlanEntry::Plan | PlanEntry::Survey | PlanEntry::Pair(_) => return ImportError::Context(error),
+            PlanEntry::Plan | PlanEntry::Survey | PlanEntry::Pair(_) | PlanEntry::Zone(_) => {
+                return ImportError::Context(error);
+            }
         };
         in_file(file)((line.unwrap_or_default(), RowProblem::Layout(error)))
     })?;

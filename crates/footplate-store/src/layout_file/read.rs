@@ -5,9 +5,9 @@ use std::io::Read;
 use std::path::Path;
 
 use footplate_core::track::{
-    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, RailEnd, Stretch, Survey,
+    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedZone, RailEnd, Stretch, Survey, Zone,
 };
-use footplate_core::{Length, TurnoutId};
+use footplate_core::{Length, Speed, StretchId, TurnoutId};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -115,6 +115,8 @@ struct Written {
     never_both_curved: Vec<Spanned<[u16; 2]>>,
     #[serde(default)]
     ends: Vec<Spanned<WrittenEnd>>,
+    #[serde(default)]
+    zones: Vec<Spanned<WrittenZone>>,
     edges: Vec<Spanned<WrittenEdge>>,
 }
 
@@ -147,6 +149,14 @@ struct WrittenEdge {
     from: Spanned<String>,
     to: Spanned<String>,
     mm: Spanned<f64>,
+    zone: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenZone {
+    name: String,
+    max_mm_s: Spanned<f64>,
 }
 
 impl Written {
@@ -159,7 +169,7 @@ impl Written {
         });
         let ends = self.ends.iter().map(|end| Ok(Place::End { names: end.get_ref().names.clone() }));
         let stretches = self.edges.iter().map(|edge| {
-            let WrittenEdge { from, to, mm } = edge.get_ref();
+            let WrittenEdge { from, to, mm, .. } = edge.get_ref();
             let length = Length::from_mm(*mm.get_ref());
             Ok(Stretch { from: rail_end(from)?, to: rail_end(to)?, length })
         });
@@ -176,7 +186,30 @@ impl Written {
                 .iter()
                 .map(|pair| pair.get_ref().map(TurnoutId))
                 .collect(),
+            zones: self.zones()?,
         })
+    }
+
+    /// The speed restrictions, each with the edges that name it.
+    fn zones(&self) -> Result<Vec<PlannedZone>, Fault> {
+        let restricted = || {
+            let edges = (0_u16..).zip(&self.edges);
+            edges.filter_map(|(number, edge)| Some((StretchId(number), edge.get_ref().zone.as_ref()?)))
+        };
+        let is_known = |name: &str| self.zones.iter().any(|zone| zone.get_ref().name == name);
+        if let Some((_, unknown)) = restricted().find(|(_, zone)| !is_known(zone.get_ref())) {
+            let found = unknown.get_ref().escape_debug().to_string();
+            return Err((unknown.span().start, LayoutProblem::UnknownZone { found }));
+        }
+        let zones = self.zones.iter().map(|zone| {
+            let WrittenZone { name, max_mm_s } = zone.get_ref();
+            let edges = restricted().filter(|(_, of)| of.get_ref() == name);
+            PlannedZone {
+                zone: Zone { name: name.clone(), limit: Speed::from_mm_per_s(*max_mm_s.get_ref()) },
+                stretches: edges.map(|(stretch, _)| stretch).collect(),
+            }
+        });
+        Ok(zones.collect())
     }
 
     /// The points of all places, in the order of the plan.
@@ -196,6 +229,10 @@ impl Written {
             PlanEntry::Place(place) => places.nth(place),
             PlanEntry::Stretch(stretch) => self.edges.get(stretch).map(|edge| edge.get_ref().place_of(error)),
             PlanEntry::Pair(pair) => self.never_both_curved.get(pair).map(|pair| pair.span().start),
+            PlanEntry::Zone(zone) => self.zones.get(zone).map(|zone| match error {
+                LayoutError::IllegalZoneLimit { .. } => zone.get_ref().max_mm_s.span().start,
+                _ => zone.span().start,
+            }),
             PlanEntry::Survey => Some(self.length_uncertainty_mm.span().start),
             PlanEntry::Plan => None,
         };

@@ -1,6 +1,6 @@
 //! Writes a layout as TOML that a person likes to read, and that reads back as the same layout.
 
-use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind};
+use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind, Zone};
 use footplate_core::{Length, NodeId};
 
 use super::drawing::{Drawing, LayoutFile};
@@ -36,6 +36,10 @@ pub fn write_layout(file: &LayoutFile) -> String {
     }
     text += "\n# Where the track ends: first the name on the way in, then on the way out.\n";
     text += &list("ends", places.lines(|kind| matches!(kind, NodeKind::Enter)));
+    if !layout.zones().is_empty() {
+        text += "\n# Where the speed is restricted: edges say in which zone they are.\n";
+        text += &list("zones", layout.zones().iter().map(zone));
+    }
     text += "\n# Each stretch of rail once, in one of its directions; the way back is the same rail.\n";
     text += &list("edges", stretches(layout));
     text
@@ -87,11 +91,19 @@ impl<'f> Places<'f> {
 /// The edges in pairs: the first of each says where it leads, its twin by which leg it gets there.
 fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
     let twins = layout.edges().skip(1).step_by(2);
-    layout.edges().step_by(2).zip(twins).map(|((_, there), (_, back))| {
+    layout.edges().step_by(2).zip(twins).map(|((id, there), (_, back))| {
         let from = rail_end(layout, there.from, there);
         let to = rail_end(layout, there.to, back);
-        format!("from = {from}, to = {to}, mm = {}", millimetres(there.length))
+        let zone =
+            layout.zone(id).map_or_else(String::new, |zone| format!(", zone = {}", quoted(&zone.name)));
+        format!("from = {from}, to = {to}, mm = {}{zone}", millimetres(there.length))
     })
+}
+
+fn zone(zone: &Zone) -> String {
+    // To the nanometre a second, as lengths are to the nanometre.
+    let limit = unscaled((zone.limit.as_mm_per_s() * 1e6).round() as i64, 6);
+    format!("name = {}, max_mm_s = {limit}", quoted(&zone.name))
 }
 
 /// A node with the leg by which `leaving` leaves its place.

@@ -26,7 +26,10 @@ edges = [
   { from = "main", to = "MR2 straight", mm = 250.5 },
   { from = "MR2", to = "A1", mm = 900 },
   { from = "BR1 curved", to = "EX1", mm = 300 },
-  { from = "EN2", to = "MR2 curved", mm = 0 },
+  { from = "EN2", to = "MR2 curved", mm = 0, zone = "siding" },
+]
+zones = [
+  { name = "siding", max_mm_s = 150 },
 ]
 "#;
 
@@ -46,6 +49,33 @@ fn the_oval_is_right() {
     assert_eq!(file.about, "");
     // Windows line ends and a file of the newest TOML are fine, too.
     assert_eq!(parse_layout("oval.toml", OVAL.replace('\n', "\r\n").as_bytes()).unwrap(), file);
+}
+
+#[test]
+fn a_zone_restricts_the_edges_that_name_it() {
+    let layout = parse_layout("oval.toml", OVAL.as_bytes()).unwrap().layout;
+    let limits =
+        layout.edges().filter_map(|(edge, _)| Some((edge.0, layout.zone(edge)?.limit.as_mm_per_s())));
+    // The sixth edge of the file and the way back over it.
+    assert_eq!(limits.collect::<Vec<_>>(), [(10, 150.0), (11, 150.0)]);
+}
+
+#[test]
+fn a_zone_that_is_wrong_is_named_where_it_stands() {
+    assert_eq!(
+        complaint("zone = \"siding\" }", "zone = \"sidings\" }"),
+        "oval.toml, line 24, column 53: no zone is called `sidings`: add `{ name = \"sidings\", max_mm_s = .. }` to \
+         `zones`"
+    );
+    assert_eq!(
+        complaint("max_mm_s = 150", "max_mm_s = 0.15"),
+        "oval.toml, line 27, column 33: a limit of 0.15 mm/s is not between 1 and 5000 mm/s (is it in millimetres a \
+         second?)"
+    );
+    assert_eq!(
+        complaint(", zone = \"siding\"", ""),
+        "oval.toml, line 27, column 3: no edge is in zone `siding`: write `zone = \"siding\"` on the edges it restricts"
+    );
 }
 
 #[test]
@@ -79,7 +109,8 @@ fn keys_are_those_of_a_layout() {
     assert_eq!(
         complaint("edges = [", "edge = ["),
         "oval.toml, line 18, column 1: unknown field `edge`, expected one of `format`, `name`, `about`, \
-         `length_uncertainty_mm`, `length_origin`, `sensors`, `turnouts`, `never_both_curved`, `ends`, `edges`"
+         `length_uncertainty_mm`, `length_origin`, `sensors`, `turnouts`, `never_both_curved`, `ends`, \
+         `zones`, `edges`"
     );
     assert_eq!(
         complaint("length_origin = \"tape measure\"\n", ""),
@@ -87,7 +118,7 @@ fn keys_are_those_of_a_layout() {
     );
     assert_eq!(
         complaint("mm = 900", "cm = 90"),
-        "oval.toml, line 22, column 30: unknown field `cm`, expected one of `from`, `to`, `mm`"
+        "oval.toml, line 22, column 30: unknown field `cm`, expected one of `from`, `to`, `mm`, `zone`"
     );
     assert_eq!(
         complaint("mm = 900", "mm = \"900\""),

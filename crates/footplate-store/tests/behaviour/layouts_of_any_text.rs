@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use footplate_core::track::{Layout, LayoutPlan, Leg, NodeKind, Place, RailEnd, Stretch, Survey};
-use footplate_core::{Length, NodeId, SensorId, TurnoutId};
+use footplate_core::track::{
+    Layout, LayoutPlan, Leg, NodeKind, Place, PlannedZone, RailEnd, Stretch, Survey, Zone,
+};
+use footplate_core::{Length, NodeId, SensorId, Speed, StretchId, TurnoutId};
 use footplate_store::{
     Drawing, ImportContext, LayoutFile, LayoutTables, import_layout, parse_layout, write_layout,
 };
@@ -14,7 +16,9 @@ use proptest::sample::{Index, select};
 const TRACK_A: &str = include_str!("../../layouts/track-a.toml");
 
 /// Pieces that mean something in a layout file, and some that mean nothing anywhere.
-const PIECES: [&str; 24] = [
+const PIECES: [&str; 26] = [
+    "zones = [",
+    "zone = \"neck\"",
     "\"A1\"",
     "\"BR6 curved\"",
     "mm = ",
@@ -131,8 +135,9 @@ fn import(nodes: &[u8], edges: &[u8], layout: &Layout) -> Option<LayoutFile> {
 fn any_layout() -> impl Strategy<Value = LayoutFile> {
     let siding = (0.0..2_000.0_f64, 0.0..2_000.0_f64, any::<bool>(), any::<bool>());
     let point = (any::<Index>(), -1e6..1e6_f64, -1e6..1e6_f64);
-    (vec(siding, 1..8), "\\PC{0,20}", "[a-z\n\"\\\\ ]{0,40}", vec(point, 0..5)).prop_map(
-        |(sidings, name, about, points)| {
+    let limit = (1_000..5_000_000_u32, any::<Index>());
+    (vec(siding, 1..8), "\\PC{0,20}", "[a-z\n\"\\\\ ]{0,40}", vec(point, 0..5), vec(limit, 0..3)).prop_map(
+        |(sidings, name, about, points, limits)| {
             let end = |leg| move |node: String| RailEnd { node, leg };
             let plain = end(None);
             let mm = |length: f64| Length::from_mm((length * 1e3).round() / 1e3);
@@ -175,8 +180,20 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
                 Place::Turnout { .. } => 1,
                 Place::End { .. } => 2,
             });
+            // A zone on every third stretch from some place on.
+            let zones = (0_u16..).zip(&limits).map(|(number, (um_s, from))| PlannedZone {
+                zone: Zone {
+                    name: format!("zone {number}"),
+                    limit: Speed::from_mm_per_s(f64::from(*um_s) / 1e3),
+                },
+                stretches: (from.index(stretches.len() / 3)..)
+                    .map(|third| StretchId(3 * third as u16 + number))
+                    .take_while(|stretch| usize::from(stretch.0) < stretches.len())
+                    .collect(),
+            });
+            let zones = zones.collect();
             let survey = Survey { uncertainty: Length::from_mm(2.5), origin: "made up".to_owned() };
-            let plan = LayoutPlan { name, survey, places, stretches, never_both_curved: vec![] };
+            let plan = LayoutPlan { name, survey, places, stretches, never_both_curved: vec![], zones };
             let layout = Layout::build(&plan).unwrap();
             let mut drawing = Drawing::default();
             for (node, x, y) in points {

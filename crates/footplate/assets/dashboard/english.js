@@ -14,6 +14,7 @@ export const ENGLISH = {
   // layout
   "layout": "Layout", "zoom": "Zoom", "zoom-in": "Zoom in", "zoom-out": "Zoom out", "zoom-all": "All",
   "track": "The layout with its trains; press on the track to name a place",
+  "zone": "zone {0}: at most {1} mm/s", "zones": "Amber rails restrict the speed. {0}",
   "pick-hint": "Press on the track to name a place.", "picked": "{0}: choose a train below", "trains": "Trains",
   "said": "Said", "order": "Order", "send": "Send", "speed": "speed", "at": "at", "busy": "busy with", "rests": "will rest",
   "nowhere": "nobody knows where", "stop": "Stop", "stop-here": "Stop at {0}", "step": "Step", "set": "Set",

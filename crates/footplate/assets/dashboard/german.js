@@ -14,6 +14,7 @@ export const GERMAN = {
   // layout
   "layout": "Anlage", "zoom": "Vergrößerung", "zoom-in": "Größer", "zoom-out": "Kleiner", "zoom-all": "Alles",
   "track": "Die Anlage mit ihren Zügen; auf das Gleis drücken, um einen Ort zu nennen",
+  "zone": "Zone {0}: höchstens {1} mm/s", "zones": "Auf gelben Gleisen ist langsam zu fahren. {0}",
   "pick-hint": "Auf das Gleis drücken, um einen Ort zu nennen.", "picked": "{0}: unten einen Zug wählen", "trains": "Züge",
   "said": "Gesagt", "order": "Auftrag", "send": "Senden", "speed": "Tempo", "at": "bei", "busy": "beschäftigt mit", "rests": "hält bei",
   "nowhere": "niemand weiß, wo", "stop": "Halt", "stop-here": "Halt bei {0}", "step": "Stufe", "set": "Fahren",

@@ -16,6 +16,9 @@ export function layoutPage(root, live) {
   const track = new PickTrack($("#track"), live.layout, (place) => {
     picked.textContent = place ? say("picked", place) : say("pick-hint");
   });
+  const zones = new Map(live.layout.edges.filter((edge) => edge.zone).map(({ zone }) => [zone.name, say("zone", zone.name, zone.max_mm_s)]));
+  $("#zones").hidden = zones.size === 0;
+  $("#zones").textContent = say("zones", [...zones.values()].join("; "));
   $("#zoom-in").addEventListener("click", () => track.view.zoom(0.7));
   $("#zoom-out").addEventListener("click", () => track.view.zoom(1.4));
   $("#zoom-all").addEventListener("click", () => track.view.all());

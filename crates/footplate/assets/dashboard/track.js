@@ -1,5 +1,7 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
+import { say } from "./words.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 /** How wide a letter of a name is, in units of the drawing. */
 const LETTER = 0.95;
@@ -37,7 +39,8 @@ export class Track {
       if (!ends[0] || !ends[1]) continue;
       this.#edges.set(edge.id, { ...edge, ends });
       if (edge.id % 2) continue;
-      const line = element("line", { x1: ends[0][0], y1: ends[0][1], x2: ends[1][0], y2: ends[1][1], class: "rail" }, rails);
+      const line = element("line", { x1: ends[0][0], y1: ends[0][1], x2: ends[1][0], y2: ends[1][1], class: edge.zone ? "rail restricted" : "rail" }, rails);
+      if (edge.zone) element("title", {}, line).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
       for (const id of [edge.id, edge.id + 1]) {
         const one = layout.edges[id];
         const from = one && this.#nodes.get(one.from);

@@ -13,6 +13,7 @@ mod station;
 mod traffic;
 mod truth;
 mod written_scores;
+mod zones;
 
 use std::io::Write;
 
@@ -43,6 +44,7 @@ enum World {
     Line(line::Arguments),
     Pacing(pacing::Arguments),
     Traffic(traffic::Arguments),
+    Zones(zones::Arguments),
 }
 
 impl Arguments {
@@ -54,6 +56,7 @@ impl Arguments {
             Some(World::Line(arguments)) => arguments.run(output),
             Some(World::Pacing(arguments)) => arguments.run(output),
             Some(World::Traffic(arguments)) => arguments.run(output),
+            Some(World::Zones(arguments)) => arguments.run(output),
             None => {
                 if self.list {
                     layout::list(output)?;

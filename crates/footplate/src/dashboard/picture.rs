@@ -171,6 +171,14 @@ struct EdgePicture {
     to: u16,
     leg: Option<&'static str>,
     length_mm: f64,
+    /// The speed restriction there.
+    zone: Option<ZonePicture>,
+}
+
+#[derive(Debug, Serialize)]
+struct ZonePicture {
+    name: String,
+    max_mm_s: f64,
 }
 
 impl LayoutPicture {
@@ -191,6 +199,10 @@ impl LayoutPicture {
             to: edge.to.0,
             leg: edge.leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }),
             length_mm: tenths(edge.length.as_mm()),
+            zone: layout.zone(id).map(|zone| ZonePicture {
+                name: zone.name.clone(),
+                max_mm_s: tenths(zone.limit.as_mm_per_s()),
+            }),
         };
         Self {
             name: layout.name().to_owned(),

@@ -162,6 +162,7 @@ fn two_ovals() -> Layout {
         places: (0..12).map(sensor).collect(),
         stretches: (0..12).map(stretch).collect(),
         never_both_curved: Vec::new(),
+        zones: Vec::new(),
     };
     Layout::build(&plan).expect("two ovals are a layout")
 }

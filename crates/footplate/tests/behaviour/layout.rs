@@ -56,6 +56,22 @@ fn show_as_json_is_the_same_facts() {
 }
 
 #[test]
+fn speed_restrictions_are_shown() {
+    let folder = folder("zones");
+    let file = folder.join("line.toml");
+    let zone = LINE.replace("mm = 80 }", "mm = 80, zone = \"end\" }");
+    fs::write(&file, zone + "zones = [{ name = \"end\", max_mm_s = 90 }]\n").unwrap();
+    let shown = footplate(&["layout", "show", text(&file)]).output;
+    assert!(shown.contains("zone    end: at most 90 mm/s on 80 mm of rails\n"), "{shown}");
+    let json = footplate(&["layout", "show", text(&file), "--json"]).output;
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let end = serde_json::json!([{ "name": "end", "max_mm_s": 90.0, "length_mm": 80.0 }]);
+    assert_eq!(summary["zones"], end);
+    let checked = footplate(&["layout", "check", text(&file)]).output;
+    assert!(checked.ends_with("6 nodes and 4 edges, with one speed restriction\n"), "{checked}");
+}
+
+#[test]
 fn show_draws_a_layout_or_says_what_it_lacks() {
     let folder = folder("drawing");
     let drawing = folder.join("track-a.svg");

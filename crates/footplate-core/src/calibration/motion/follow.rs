@@ -177,13 +177,32 @@ impl Following {
         Guess { mean: speed, variance: speed * speed * later.p[E][E] }
     }
 
-    /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
-    /// train that was told to run.
-    pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Guess, f64, f64)> {
+    /// Once all that was told has taken effect.
+    pub(crate) fn after_all(&self, model: &MotionModel) -> Self {
         let mut later = *self;
         while let Some((_, begins)) = later.course.next_effect(model) {
             later.settle(model, begins);
         }
+        later
+    }
+
+    /// Its speed (m/s) at a time, with what no shape of a change is true to.
+    pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Guess {
+        let speed = self.speed(model, time);
+        let shape = self.at(model, time).shape_speed_error(time);
+        Guess { variance: speed.variance + shape * shape, ..speed }
+    }
+
+    /// The speed (m/s) to which the change under way leads.
+    pub(crate) fn settled_speed(&self) -> Guess {
+        let mean = libm::exp(self.course.x[E]) * self.course.segment.to;
+        Guess { mean, variance: mean * mean * self.p[E][E] }
+    }
+
+    /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
+    /// train that was told to run.
+    pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Guess, f64, f64)> {
+        let later = self.after_all(model);
         if later.course.step != 0 {
             return None;
         }

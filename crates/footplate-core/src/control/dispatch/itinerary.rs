@@ -222,7 +222,8 @@ impl<'a> Search<'a> {
     /// How long part of an edge takes, waiting for others included.
     fn seconds(&self, edge: EdgeId, from: Length, to: Length) -> Option<f64> {
         let waits = self.obstacles.cost(self.layout, edge, from, to)?;
-        Some(((to - from).max(Length::ZERO) / self.pace.cruise).as_s() + waits)
+        let limit = self.layout.zone(edge).map_or(self.pace.cruise, |zone| zone.limit);
+        Some(((to - from).max(Length::ZERO) / self.pace.cruise.min(limit)).as_s() + waits)
     }
 
     /// Whether a run with such needs can go on over an edge: no turnout lies both ways at once.

@@ -90,7 +90,9 @@ impl DrivenTrain {
         let mut surest: Option<(SpeedStep, Length)> = None;
         let mut slowest: Option<(SpeedStep, TimeSpan)> = None;
         let mut nearest: Option<Length> = None;
-        for step in steps {
+        // A short run is over before a zone has been left.
+        let fastest = self.fastest_allowed(ground, now);
+        for step in steps.into_iter().filter(|step| fastest.is_none_or(|fastest| *step <= fastest)) {
             match self.short_run(ground, now, at, step, destination) {
                 CommandTime::At(_, rest) if rest.time - now <= MOVE_LIMIT => {
                     if surest.is_none_or(|(_, least)| spread(&rest) < least) {
@@ -143,7 +145,13 @@ impl DrivenTrain {
     }
 
     /// Whether a contact is passed at a settled speed, in time before the command to stop.
-    fn settles_before(&self, ground: Ground<'_>, located: &Located, at: WayPoint, step: SpeedStep) -> bool {
+    pub(super) fn settles_before(
+        &self,
+        ground: Ground<'_>,
+        located: &Located,
+        at: WayPoint,
+        step: SpeedStep,
+    ) -> bool {
         let speed = self.model.speed(step, Approach::Below).value;
         let stop = self.model.stop(step, Approach::Below);
         // No start is faster than its final speed.

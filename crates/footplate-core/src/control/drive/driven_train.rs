@@ -14,6 +14,7 @@ use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::refusal::Refusal;
+use super::restraint::Restraint;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
 use super::turnout_guard::TRAIN_REACH;
@@ -53,6 +54,8 @@ pub(super) struct DrivenTrain {
     pub(super) limit: Option<WayPoint>,
     /// How far it reaches ahead of and behind the leading end of its pickup.
     pub(super) reach: [Length; 2],
+    /// What keeps it to speed restrictions.
+    pub(super) restraint: Restraint,
     /// What it is paced for, while that is its goal.
     pub(super) pacing: Option<Pacing>,
     /// When it came by the contacts behind it, for who follows it.
@@ -71,6 +74,7 @@ impl DrivenTrain {
             expected: Expectation::default(),
             limit: None,
             reach: [TRAIN_REACH; 2],
+            restraint: Restraint::default(),
             pacing: None,
             passages: Passages::default(),
         }
@@ -129,7 +133,26 @@ impl DrivenTrain {
         }
     }
 
-    pub(super) fn tell_step(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+    /// Tells it a step, or the fastest below that the zones about it allow.
+    pub(super) fn tell_step(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        step: SpeedStep,
+        out: &mut Outputs,
+    ) {
+        let step = self.restrained(ground, now, step, out);
+        self.tell_at_once(now, step, out);
+    }
+
+    /// Tells it to stand.
+    pub(super) fn tell_stand(&mut self, now: Timestamp, out: &mut Outputs) {
+        self.restraint = Restraint::default();
+        self.tell_at_once(now, SpeedStep::STAND, out);
+    }
+
+    /// Tells it just this step.
+    pub(super) fn tell_at_once(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         self.told = step;
         self.tell(now, Command::Speed { train: self.id(), step }, out);
     }
@@ -140,10 +163,17 @@ impl DrivenTrain {
     }
 
     /// Runs at a step, or comes to rest if that is 0.
-    pub(super) fn run(&mut self, now: Timestamp, order: OrderId, step: SpeedStep, out: &mut Outputs) {
+    pub(super) fn run(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        order: OrderId,
+        step: SpeedStep,
+        out: &mut Outputs,
+    ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
         self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
-        self.tell_step(now, step, out);
+        self.tell_step(ground, now, step, out);
     }
 
     /// Comes to rest if it does not, and turns around.
@@ -161,7 +191,7 @@ impl DrivenTrain {
             self.tell(now, Command::Reverse { train: self.id() }, out);
         } else {
             self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
-            self.tell_step(now, SpeedStep::STAND, out);
+            self.tell_stand(now, out);
         }
     }
 
@@ -204,7 +234,7 @@ impl DrivenTrain {
                     if then > SpeedStep::STAND {
                         self.task =
                             Some(Task { order, goal: Goal::Run, phase: Phase::Telling { promise: None } });
-                        self.tell_step(now, then, out);
+                        self.tell_step(ground, now, then, out);
                     } else {
                         self.finish(ground, now, order, None, None, out);
                     }
@@ -299,7 +329,8 @@ impl DrivenTrain {
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
-        [phase, unsent, self.next_doubt(), self.guard(), self.next_look()].into_iter().flatten().min()
+        let looks = [self.next_look(), self.zone_look()];
+        [phase, unsent, self.next_doubt(), self.guard()].into_iter().chain(looks).flatten().min()
     }
 
     pub(super) fn handle_timeout(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
@@ -341,7 +372,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.task = Some(Task { phase: Phase::Telling { promise }, ..task });
-        self.tell_step(now, SpeedStep::STAND, out);
+        self.tell_stand(now, out);
     }
 
     /// Ends what cannot be done, and the run with it.
@@ -350,7 +381,7 @@ impl DrivenTrain {
             out.say(DriveNotice::GivenUp { order: task.order, train: self.id(), why });
         }
         if self.told > SpeedStep::STAND {
-            self.tell_step(now, SpeedStep::STAND, out);
+            self.tell_stand(now, out);
         }
     }
 

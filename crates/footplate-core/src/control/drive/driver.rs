@@ -167,11 +167,11 @@ impl Driver {
         }
         let train = order.train().and_then(|train| self.trains.get_mut(&train));
         match (order, train) {
-            (Order::Speed { step, .. }, Some(train)) => train.run(now, id, step, out),
+            (Order::Speed { step, .. }, Some(train)) => train.run(ground, now, id, step, out),
             (Order::Reverse { then, .. }, Some(train)) => train.reverse(ground, now, id, then, out),
             (Order::Stop(stop), Some(train)) => train.stop_at(ground, now, id, &stop, out)?,
             (Order::Move { distance, .. }, Some(train)) => train.move_on(ground, now, id, distance, out)?,
-            (Order::Hold { speed, .. }, Some(train)) => train.hold(now, id, speed, out)?,
+            (Order::Hold { speed, .. }, Some(train)) => train.hold(ground, now, id, speed, out)?,
             (Order::Arrive { target, within, .. }, Some(train)) => {
                 train.arrive(ground, now, id, target, within, out)?;
             }
@@ -179,6 +179,7 @@ impl Driver {
             _ => {}
         }
         self.orders = self.orders.wrapping_add(1);
+        self.heed_zones(now);
         self.pace(now);
         self.wish(now);
         Ok(id)
@@ -402,6 +403,7 @@ impl Machine for Driver {
             EventKind::Turnout { turnout, curved } => self.turnout_left(now, turnout, curved),
             EventKind::Stopped { .. } => {}
         }
+        self.heed_zones(now);
         self.pace(now);
         self.wish(now);
     }
@@ -411,6 +413,7 @@ impl Machine for Driver {
         for train in self.trains.values_mut() {
             train.handle_timeout(ground, now, &mut self.outputs);
         }
+        self.heed_zones(now);
         self.pace(now);
         self.wish(now);
     }

@@ -21,6 +21,8 @@ mod order;
 mod outputs;
 mod pacing;
 mod refusal;
+mod restraint;
+mod restricted_way;
 mod stop_planning;
 mod task;
 mod turning;

@@ -1,5 +1,7 @@
 //! What a driver has to say while it drives.
 
+use alloc::string::String;
+
 use crate::estimation::{DueContact, PassedContact};
 use crate::event::Command;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
@@ -47,6 +49,18 @@ pub enum DriveNotice {
         train: TrainId,
         /// The one ahead.
         leader: TrainId,
+    },
+    /// A train has been told a slower step than it was asked to run at, because of a zone that it is in or comes to. It gets
+    /// faster again by itself.
+    Restrained {
+        /// The train.
+        train: TrainId,
+        /// The step it was told.
+        step: SpeedStep,
+        /// The name of the zone.
+        zone: String,
+        /// The zone's limit.
+        limit: Speed,
     },
     /// An order has been carried out.
     Done(Finished),

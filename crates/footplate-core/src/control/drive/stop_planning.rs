@@ -19,7 +19,7 @@ use super::task::{Destination, Goal, Phase, Plan, Task};
 
 /// An order can only be kept if the command may wait for a poll that is on the line: eleven bytes of 4.583 ms, the
 /// command's own two, and a tenth more.
-const SOONEST: TimeSpan = TimeSpan::from_ms(66);
+pub(super) const SOONEST: TimeSpan = TimeSpan::from_ms(66);
 /// From when a contact closes until what it says has changed a plan: a poll that just missed it, the next one, and the
 /// command's own bytes.
 const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
@@ -62,7 +62,7 @@ impl DrivenTrain {
             );
             if stands {
                 let step = stop.step.unwrap_or_else(|| self.finding_step());
-                self.tell_step(now, step, out);
+                self.tell_step(ground, now, step, out);
             }
             return Ok(());
         };
@@ -147,11 +147,11 @@ impl DrivenTrain {
             }
             let step = self.approach_step(ground, now, located, &destination)?;
             self.take(task, out);
-            self.tell_step(now, step, out);
+            self.tell_step(ground, now, step, out);
         } else {
             self.take(task, out);
             match destination.step.filter(|step| *step != self.told) {
-                Some(step) => self.tell_step(now, step, out),
+                Some(step) => self.tell_step(ground, now, step, out),
                 None => self.plan(ground, now, out),
             }
         }

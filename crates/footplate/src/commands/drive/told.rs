@@ -105,6 +105,10 @@ impl Tongue<'_> {
                     "train {train} is held back: it would come too near to train {leader}, or nobody knows where that is"
                 )
             }
+            DriveNotice::Restrained { train, step, zone, limit } => format!(
+                "train {train} runs at step {step}: zone {zone} allows {:.0} mm/s",
+                limit.as_mm_per_s()
+            ),
             DriveNotice::Done(finished) => self.done(finished)?,
             DriveNotice::Thrown { turnout, curved, .. } => {
                 format!("turnout {turnout} told to lie {}", leg(*curved))

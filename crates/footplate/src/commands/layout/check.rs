@@ -22,7 +22,12 @@ impl Arguments {
         let file = layout_named(&self.layout)?;
         let layout = &file.layout;
         let (nodes, edges) = (layout.nodes().len(), layout.edges().len());
-        writeln!(output, "{}: a sound layout of {nodes} nodes and {edges} edges", self.layout)?;
+        write!(output, "{}: a sound layout of {nodes} nodes and {edges} edges", self.layout)?;
+        match layout.zones().len() {
+            0 => writeln!(output)?,
+            1 => writeln!(output, ", with one speed restriction")?,
+            zones => writeln!(output, ", with {zones} speed restrictions")?,
+        }
         Ok(Outcome::Done)
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use footplate_core::track::{Hop, Layout, NodeKind, TurnoutNeed};
+use footplate_core::track::{Hop, Layout, NodeKind, TurnoutNeed, Zone};
 use footplate_store::{LayoutFile, draw_layout, layout_named, write_whole};
 use serde_json::{Value, json};
 
@@ -68,7 +68,17 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
     for [one, other] in layout.never_both_curved() {
         writeln!(output, "pair    turnouts {one} and {other} are never both curved")?;
     }
+    for zone in layout.zones() {
+        let (limit, rails) = (zone.limit.as_mm_per_s(), restricted_mm(layout, zone));
+        writeln!(output, "zone    {}: at most {limit} mm/s on {rails:.0} mm of rails", zone.name)?;
+    }
     Ok(())
+}
+
+/// How long the rails of a zone are.
+fn restricted_mm(layout: &Layout, zone: &Zone) -> f64 {
+    let stretches = layout.edges().step_by(2).filter(|(edge, _)| layout.zone(*edge) == Some(zone));
+    stretches.map(|(_, edge)| edge.length.as_mm()).sum()
 }
 
 /// Every way from a sensor to the next, one a line.
@@ -92,6 +102,13 @@ fn summary(layout: &Layout) -> Value {
             "turnouts": turnouts.collect::<Value>(),
         })
     });
+    let zones = layout.zones().iter().map(|zone| {
+        json!({
+            "name": zone.name,
+            "max_mm_s": rounded_mm(zone.limit.as_mm_per_s()),
+            "length_mm": rounded_mm(restricted_mm(layout, zone)),
+        })
+    });
     json!({
         "name": layout.name(),
         "nodes": layout.nodes().len(),
@@ -103,6 +120,7 @@ fn summary(layout: &Layout) -> Value {
         "length_uncertainty_mm": rounded_mm(layout.survey().uncertainty.as_mm()),
         "length_origin": layout.survey().origin,
         "never_both_curved": layout.never_both_curved(),
+        "zones": zones.collect::<Value>(),
         "hops": hops.collect::<Value>(),
     })
 }

@@ -2,7 +2,7 @@
 
 mod arrive;
 mod counted;
-mod figures;
+pub(in crate::commands::simulate) mod figures;
 mod follow;
 mod hold;
 mod page;

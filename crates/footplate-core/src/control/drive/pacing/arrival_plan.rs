@@ -4,16 +4,19 @@
 //! stopping way `d` and time `t` are known well, `s` the time for which it runs steadily at that step before. From its state
 //! now the train is brought to `D − d − v s` in `T − t − s`, so that it is there at the speed `v` of the step: by the motion
 //! with the least jerk if that asks for no speed that it cannot hold, else by two changes of speed and a steady run between
-//! them.
+//! them. Where zones on the way allow less than either asks for, it runs at one speed wherever they do not.
 
 use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::DrivenTrain;
+use crate::estimation::{Ground, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::kinematics::{MinimumJerk, Motion, SpeedLaw, Transit};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
+
+use super::zoned_transit::{SlowPart, ZonedTransit};
 
 /// A stop is as sure as the model says when it is made from a speed that has settled.
 pub(super) const STEADY: TimeSpan = TimeSpan::from_ms(2000);
@@ -50,6 +53,7 @@ pub(super) struct FinalStep {
 pub(super) enum Profile {
     LeastJerk(MinimumJerk),
     Kept(Transit),
+    Zoned(ZonedTransit),
 }
 
 impl Profile {
@@ -57,6 +61,7 @@ impl Profile {
         match self {
             Self::LeastJerk(motion) => motion,
             Self::Kept(motion) => motion,
+            Self::Zoned(motion) => motion,
         }
     }
 }
@@ -118,6 +123,8 @@ impl ArrivalProfile {
 pub(super) struct Means {
     pub(super) speeds: [f64; 2],
     pub(super) last: Vec<FinalStep>,
+    /// Where zones allow less, as m before the target.
+    pub(super) slow: Vec<SlowPart>,
 }
 
 impl Means {
@@ -139,17 +146,29 @@ impl Means {
             return None;
         }
         let [slowest, fastest] = [self.speeds[0].min(begins.speed), self.speeds[1].max(begins.speed)];
+        let slow: Vec<SlowPart> = self.slow.iter().map(|part| part.before(begins.left)).collect();
+        // It stops from its last step, and runs at that before.
+        if slow.iter().any(|part| part.to > way && part.from < begins.left && part.speed < last.speed) {
+            return None;
+        }
         let is_held = |speed: Speed| (slowest..=fastest).contains(&speed.as_m_per_s());
         let (length, span) = (Length::from_m(way), TimeSpan::from_s(time));
         let [from, to] = [begins.speed, last.speed].map(Speed::from_m_per_s);
         let smooth = MinimumJerk::new(length, from, to, span);
-        if smooth.speeds().into_iter().all(is_held) {
+        if smooth.speeds().into_iter().all(is_held) && slow.iter().all(|part| part.allows(&smooth)) {
             return Some(ArrivalPlan { begins, profile: Profile::LeastJerk(smooth), last });
         }
         let change = (CHANGE_PART * time).clamp(CHANGE[0], CHANGE[1]).min(0.5 * time);
         let law = SpeedLaw::Smooth;
-        let kept = Transit::new(length, [from, to], span, law, TimeSpan::from_s(change))?;
-        is_held(kept.kept()).then_some(ArrivalPlan { begins, profile: Profile::Kept(kept), last })
+        let kept = Transit::new(length, [from, to], span, law, TimeSpan::from_s(change));
+        let kept = kept.filter(|kept| is_held(kept.kept()) && slow.iter().all(|part| part.allows(kept)));
+        let profile = kept.map(Profile::Kept).or_else(|| {
+            let ends = [begins.speed, last.speed];
+            let speeds = [slowest, fastest];
+            let zoned = (!slow.is_empty()).then(|| ZonedTransit::new(way, ends, time, speeds, &slow));
+            zoned.flatten().map(Profile::Zoned)
+        })?;
+        Some(ArrivalPlan { begins, profile, last })
     }
 
     /// The shortest time (s) for which there is a plan; `None` if there is none at all.
@@ -171,7 +190,14 @@ fn times(from: f64) -> impl Iterator<Item = f64> {
 
 impl DrivenTrain {
     /// What can be planned with: the steps from which it stops surely, and speeds between its slowest and its fastest.
-    pub(super) fn means(&self, usable: &[SpeedStep], slowest: Speed) -> Means {
+    pub(super) fn means(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        at: WayPoint,
+        usable: &[SpeedStep],
+        slowest: Speed,
+    ) -> Means {
         let speed = |step: &SpeedStep| self.model.steady_speed(*step, Approach::Below).as_m_per_s();
         let ends = [usable.first(), usable.last()].map(|step| step.map_or(0.0, speed));
         let last = self.sure_steps(usable).into_iter().map(|step| {
@@ -187,7 +213,20 @@ impl DrivenTrain {
         Means {
             speeds: [(low * (1.0 + RESERVE)).max(slowest.as_m_per_s()), high * (1.0 - RESERVE)],
             last: last.collect(),
+            slow: self.slow_parts(ground, now, at),
         }
+    }
+
+    /// Where zones on the way to a target allow less, and what the step that keeps to them runs at, as m before the target.
+    fn slow_parts(&self, ground: Ground<'_>, now: Timestamp, at: WayPoint) -> Vec<SlowPart> {
+        let restricted = self.restricted_until(ground, now, at);
+        let [ahead, behind] = self.reach.map(Length::as_m);
+        let parts = restricted.into_iter().map(|(way, step)| SlowPart {
+            from: at.way.as_m() - (way.from - ahead),
+            to: at.way.as_m() - (way.to + behind),
+            speed: self.model.steady_speed(step, Approach::Below).as_m_per_s() * (1.0 - RESERVE),
+        });
+        parts.collect()
     }
 }
 
@@ -198,7 +237,7 @@ mod tests {
     fn means() -> Means {
         let step = SpeedStep::new(6).expect("a step");
         let last = FinalStep { step, speed: 0.25, stop_way: 0.15, stop_time: 1.2 };
-        Means { speeds: [0.05, 0.5], last: alloc::vec![last] }
+        Means { speeds: [0.05, 0.5], last: alloc::vec![last], slow: Vec::new() }
     }
 
     #[test]
@@ -210,6 +249,28 @@ mod tests {
         assert!((end.distance.as_m() - (4.0 - 0.15 - 0.5)).abs() < 1e-9);
         assert!((plan.profile.motion().duration().as_s() - 11.3).abs() < 1e-9);
         assert!((end.speed.as_m_per_s() - 0.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_zone_on_the_way_is_planned_for_and_makes_the_soonest_later() {
+        let begins = |_: f64| Some(Beginning { after: 0.0, left: 4.0, speed: 0.2 });
+        // From 2.5 m before the target to 1.5 m before it.
+        let slow = SlowPart { from: 2.5, to: 1.5, speed: 0.15 };
+        let (free, zoned) = (means(), Means { slow: alloc::vec![slow], ..means() });
+        let [before, soonest] = [&free, &zoned].map(|means| means.soonest(begins).expect("some time"));
+        // A metre at 150 mm/s takes 6.7 s, at 500 mm/s 2 s; and there are two changes of speed more.
+        assert!(soonest > before + 3.0 && soonest < before + 8.0, "{soonest} after {before}");
+        let plan = zoned.plan(begins(0.0).expect("a state"), 1.1 * soonest).expect("time enough");
+        let motion = plan.profile.motion();
+        for tenth in 0..(10.0 * motion.duration().as_s()) as u32 {
+            let state = motion.state_at(TimeSpan::from_s(0.1 * f64::from(tenth)));
+            let left = 4.0 - state.distance.as_m();
+            assert!(!(1.51..2.49).contains(&left) || state.speed.as_m_per_s() < 0.151, "{state:?}");
+        }
+        // Nobody stops from 250 mm/s where 150 are allowed.
+        let at_the_end =
+            Means { slow: alloc::vec![SlowPart { from: 0.3, to: -1.0, speed: 0.15 }], ..means() };
+        assert!(at_the_end.soonest(begins).is_none());
     }
 
     #[test]

@@ -172,7 +172,7 @@ impl DrivenTrain {
         let (at, mut outlook) = (destination.at.ok_or_else(lost)?, self.locator.outlook().ok_or_else(lost)?);
         let [place, speed] = outlook.place_and_speed(&self.model, outlook.seconds(now));
         let begins = Beginning { after: 0.0, left: at.way.as_m() - place, speed };
-        let means = self.means(&self.usable_steps(), CREEPING);
+        let means = self.means(ground, now, at, &self.usable_steps(), CREEPING);
         match means.plan(begins, within.as_s()) {
             Some(plan) => {
                 let arriving = Arriving { destination, plan: Some(plan), since: now, start: None };
@@ -192,10 +192,13 @@ impl DrivenTrain {
         within: TimeSpan,
     ) -> Result<Found, Refusal> {
         let usable = self.usable_steps();
-        let means = self.means(&usable, UNHURRIED);
         let at = destination.at.ok_or(Refusal::Lost { train: self.id() })?;
+        let means = self.means(ground, now, at, &usable, UNHURRIED);
         let left = (at.way - located.at.way).as_m();
-        let step_for = |within: f64| self.nearest_step(&usable, START_LOSS * left / within);
+        let allowed = self.fastest_allowed(ground, now);
+        let may_start = |step: &SpeedStep| allowed.is_none_or(|allowed| *step <= allowed);
+        let starts: Vec<SpeedStep> = usable.iter().copied().filter(may_start).collect();
+        let step_for = |within: f64| self.nearest_step(&starts, START_LOSS * left / within);
         let begins = |within: f64| self.started(now, step_for(within)?, at);
         let seconds = within.as_s();
         let by = now + within;
@@ -214,7 +217,7 @@ impl DrivenTrain {
             return planned(unhurried, now + waits).ok_or(Refusal::Lost { train: self.id() });
         }
         // One step and the stop: what takes the least time, or all of it.
-        let runs = means.last.iter().filter_map(|last| {
+        let runs = means.last.iter().filter(|last| may_start(&last.step)).filter_map(|last| {
             match self.short_run(ground, now, at, last.step, &destination) {
                 CommandTime::At(_, rest) => Some((last.step, rest.time - now, spread(&rest))),
                 _ => None,
@@ -289,7 +292,7 @@ impl DrivenTrain {
             if arriving.plan.is_none() {
                 self.leave_to_stop(task, destination);
             }
-            self.tell_step(now, step, out);
+            self.tell_step(ground, now, step, out);
             return false;
         }
         if now < begins {
@@ -303,7 +306,7 @@ impl DrivenTrain {
         let last = last.filter(|step| *step != self.told && budget.free() <= seconds(now));
         self.leave_to_stop(task, destination);
         match last {
-            Some(step) => self.tell_step(now, step, out),
+            Some(step) => self.tell_step(ground, now, step, out),
             None => self.plan(ground, now, out),
         }
         false

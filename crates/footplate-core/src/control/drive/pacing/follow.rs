@@ -336,7 +336,7 @@ impl DrivenTrain {
             following.is_held = false;
             let slower = fastest.filter(|step| *step < told);
             if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
-                self.tell_step(now, step, out);
+                self.tell_step(ground, now, step, out);
             }
             return slower.is_none();
         }
@@ -345,7 +345,7 @@ impl DrivenTrain {
                 following.is_held = true;
                 out.say(DriveNotice::HeldBack { order: task.order, train: self.id(), leader });
             }
-            self.tell_step(now, SpeedStep::STAND, out);
+            self.tell_stand(now, out);
         }
         false
     }

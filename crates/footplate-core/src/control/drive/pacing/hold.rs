@@ -47,6 +47,7 @@ impl DrivenTrain {
     /// Takes an order to hold a speed.
     pub(in crate::control::drive) fn hold(
         &mut self,
+        ground: Ground<'_>,
         now: Timestamp,
         order: OrderId,
         speed: Speed,
@@ -73,7 +74,7 @@ impl DrivenTrain {
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
         if step != self.told {
-            self.tell_step(now, step, out);
+            self.tell_step(ground, now, step, out);
         }
         Ok(())
     }
@@ -90,7 +91,7 @@ impl DrivenTrain {
         let Some(located) = self.located(ground, now) else { return };
         let node = located.at.node;
         holding.line = holding.line.and_then(|line| line.counted_from(ground, node, now));
-        if holding.line.is_some() || now < holding.settled {
+        if holding.line.is_some() || now < holding.settled || self.is_restrained() {
             return;
         }
         let way = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
@@ -98,5 +99,20 @@ impl DrivenTrain {
         holding.line = Some(line);
         let IdealLine { way, time, speed, .. } = line;
         out.say(DriveNotice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+    }
+
+    /// It is slowed down for a zone: the line ends here.
+    pub(in crate::control::drive) const fn interrupt_line(&mut self) {
+        if let Some(Pacing { pace: Pace::Hold(holding), .. }) = &mut self.pacing {
+            holding.line = None;
+        }
+    }
+
+    /// It is told a step again at which it can hold its speed: another line begins once it is settled.
+    pub(in crate::control::drive) fn resume_line(&mut self, now: Timestamp, step: SpeedStep) {
+        let settles = self.model.settles_within(self.told, step);
+        if let Some(Pacing { pace: Pace::Hold(holding), .. }) = &mut self.pacing {
+            holding.settled = now + settles;
+        }
     }
 }

@@ -17,6 +17,7 @@ mod reference;
 mod step_search;
 mod surveyed_way;
 mod task;
+mod zoned_transit;
 
 pub use arrival_plan::ArrivalProfile;
 pub(super) use passages::Passages;

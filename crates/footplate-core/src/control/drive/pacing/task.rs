@@ -63,6 +63,11 @@ impl DrivenTrain {
         self.pacing.as_ref().filter(|_| self.goal() == Some(Goal::Pace))
     }
 
+    /// Whether what it should do is looked at again and again, so that no step is owed to it.
+    pub(in crate::control::drive) fn is_paced_by_itself(&self) -> bool {
+        self.paced().is_some_and(|pacing| !matches!(pacing.pace, Pace::Hold(_)))
+    }
+
     /// When it wants to be looked at, if nothing is reported before.
     pub(in crate::control::drive) fn next_look(&self) -> Option<Timestamp> {
         self.paced()?.look.filter(|_| self.is_told())
@@ -128,6 +133,12 @@ impl DrivenTrain {
         others: &Others,
         out: &mut Outputs,
     ) {
+        // Who holds a speed that a zone does not allow waits until it has left that.
+        let is_holding = matches!(&self.pacing, Some(Pacing { pace: Pace::Hold(_), .. }));
+        if is_holding && self.is_restrained() {
+            self.pacing.iter_mut().for_each(|pacing| pacing.look = None);
+            return;
+        }
         if !self.goes_by_plan(ground, now, out) || !self.may_follow(ground, now, others, out) {
             return;
         }
@@ -137,6 +148,7 @@ impl DrivenTrain {
             Some(Pace::Follow(following)) => self.follow_reference(ground, now, *following, node, others),
             _ => None,
         };
+        let allowed = self.fastest_allowed(ground, now);
         let Some(pacing) = &mut self.pacing else { return };
         let guard = pacing.look.take().filter(|_| matches!(pacing.pace, Pace::Follow(_)));
         let (reference, way) = match &mut pacing.pace {
@@ -161,6 +173,7 @@ impl DrivenTrain {
             Pace::Follow(following) => following.fastest(),
             Pace::Hold(_) | Pace::Arrive(_) => None,
         };
+        let fastest = fastest.into_iter().chain(allowed).min();
         let usable = pacing.usable.partition_point(|step| fastest.is_none_or(|fastest| *step <= fastest));
         let usable = pacing.usable.get(..usable).unwrap_or_default();
         let search = StepSearch::new(&self.model, &way, &reference, usable, [at, leaves], behind);
@@ -169,7 +182,7 @@ impl DrivenTrain {
             Some((0, step)) => {
                 pacing.look = Some(now + SPACING);
                 if self.could_still_stop(ground, now, step) {
-                    self.tell_step(now, step, out);
+                    self.tell_step(ground, now, step, out);
                 }
             }
             Some((grid, _)) => {

@@ -1,7 +1,7 @@
 //! What many measurements come to.
 
 /// The value below which a part of all values lies.
-pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
+pub(in crate::commands::simulate) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
@@ -25,7 +25,7 @@ pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64>
 }
 
 /// A figure as the tables show it.
-pub(super) fn shown(figure: Option<f64>, digits: usize) -> String {
+pub(in crate::commands::simulate) fn shown(figure: Option<f64>, digits: usize) -> String {
     figure.map_or_else(|| "–".to_owned(), |figure| format!("{figure:.digits$}"))
 }
 

@@ -104,7 +104,12 @@ impl<'l> Rehearsal<'l> {
 
     /// A driver that knows the trains that were put down, and where.
     pub(crate) fn driver(&self) -> Driver {
-        let mut driver = Driver::new(self.layout.clone(), self.turnouts.clone());
+        self.driver_on(self.layout)
+    }
+
+    /// The same with another idea of the layout.
+    pub(crate) fn driver_on(&self, layout: &Layout) -> Driver {
+        let mut driver = Driver::new(layout.clone(), self.turnouts.clone());
         for (train, at) in &self.places {
             if let Some(model) = self.models.get(train) {
                 driver.add_train(model.clone());

@@ -1,0 +1,265 @@
+//! From one speed to another over a given way in a given time, slower where that is asked for.
+//!
+//! Letters: `V` the speed kept wherever nothing restricts it, `c` what a part of the way allows, `R` the time of a change of
+//! speed. The speed is `min(V, c)`; a change to a lower one is done where the restricted part begins, one to a higher one
+//! begins where it ends. The time that takes falls as `V` grows, so that halving finds the `V` that takes the time given.
+
+use crate::kinematics::{Motion, MotionState, SpeedChange, SpeedLaw};
+use crate::time::TimeSpan;
+use crate::units::{Length, Speed};
+
+/// A change of speed takes so long (s): as long as a train needs for some steps.
+const CHANGE: f64 = 2.0;
+/// Parts of the way, and changes between them and at both ends: a way with more restricted parts is slow all along.
+const MOST_PARTS: usize = 9;
+const MOST_PIECES: usize = 2 * MOST_PARTS + 1;
+/// A motion is looked at so many times: every quarter of a second of a minute.
+const SAMPLES: u16 = 240;
+/// Halvings of a speed that leave less than a thousandth of a mm/s.
+const HALVINGS: usize = 20;
+
+/// A part of the way (m from its beginning) with the greatest speed there (m/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SlowPart {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) speed: f64,
+}
+
+impl SlowPart {
+    /// The same counted from where a train is, for one that is given by how far before a target it is.
+    pub(super) fn before(self, left: f64) -> Self {
+        Self { from: left - self.from, to: left - self.to, ..self }
+    }
+
+    /// Whether a motion is no faster there.
+    pub(super) fn allows(&self, motion: &impl Motion) -> bool {
+        let seconds = motion.duration().as_s();
+        (0..=SAMPLES).all(|nth| {
+            let state = motion.state_at(TimeSpan::from_s(seconds * f64::from(nth) / f64::from(SAMPLES)));
+            let place = state.distance.as_m();
+            place < self.from || place > self.to || state.speed.as_m_per_s() <= self.speed
+        })
+    }
+}
+
+/// A change of speed, or none, from a moment (s) and a place (m) on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Piece {
+    time: f64,
+    place: f64,
+    lasts: f64,
+    speeds: [f64; 2],
+}
+
+/// Speeds kept one after the other, with changes between them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ZonedTransit {
+    pieces: [Piece; MOST_PIECES],
+    count: usize,
+}
+
+/// A stretch of the way with the speed kept on it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Level {
+    length: f64,
+    speed: f64,
+}
+
+impl ZonedTransit {
+    /// Over a way (m), from a speed to another (m/s), in a time (s), with speeds between two bounds wherever parts of the way
+    /// leave that. `None` where no speed takes the time, or there are more parts than can be looked at.
+    pub(super) fn new(
+        way: f64,
+        ends: [f64; 2],
+        time: f64,
+        [slowest, fastest]: [f64; 2],
+        parts: &[SlowPart],
+    ) -> Option<Self> {
+        let at = |speed: f64| Self::at_speed(way, ends, speed, parts);
+        let takes = |transit: &Self| transit.duration().as_s();
+        let (mut low, mut high) = (slowest, fastest);
+        if takes(&at(high)?) > time || takes(&at(low)?) < time {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if takes(&at(middle)?) > time { low = middle } else { high = middle }
+        }
+        at(high)
+    }
+
+    /// With one speed wherever nothing restricts it.
+    fn at_speed(way: f64, ends: [f64; 2], speed: f64, parts: &[SlowPart]) -> Option<Self> {
+        let mut levels = [Level::default(); MOST_PARTS];
+        let count = levels_of(way, speed, parts, &mut levels)?;
+        let levels = levels.get_mut(..count)?;
+        while let Some((nth, lower)) = too_short(levels, ends) {
+            levels.get_mut(nth)?.speed = lower;
+        }
+        let mut transit = Self { pieces: [Piece::default(); MOST_PIECES], count: 0 };
+        let mut speed = ends[0];
+        for (nth, level) in levels.iter().enumerate() {
+            let next = levels.get(nth + 1).map_or(ends[1], |next| next.speed);
+            let is_last = nth + 1 == levels.len();
+            let rises = change_way(speed, level.speed);
+            let falls = if is_last || next < level.speed { change_way(level.speed, next) } else { 0.0 };
+            // What is too short for its changes is run through by shorter ones.
+            let scale = (level.length / (rises + falls).max(f64::MIN_POSITIVE)).min(1.0);
+            transit.push([speed, level.speed], rises * scale)?;
+            transit.push([level.speed; 2], level.length - (rises + falls) * scale)?;
+            speed = level.speed;
+            if falls > 0.0 {
+                transit.push([level.speed, next], falls * scale)?;
+                speed = next;
+            }
+        }
+        Some(transit)
+    }
+
+    fn push(&mut self, speeds: [f64; 2], way: f64) -> Option<()> {
+        if way <= 0.0 {
+            return Some(());
+        }
+        let end = self.end();
+        let lasts = 2.0 * way / (speeds[0] + speeds[1]);
+        *self.pieces.get_mut(self.count)? = Piece { lasts, speeds, ..end };
+        self.count += 1;
+        Some(())
+    }
+
+    /// Where the last piece ends.
+    fn end(&self) -> Piece {
+        let last = self.pieces.get(self.count.wrapping_sub(1)).copied().unwrap_or_default();
+        let way = 0.5 * (last.speeds[0] + last.speeds[1]) * last.lasts;
+        Piece { time: last.time + last.lasts, place: last.place + way, ..last }
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        self.pieces.get(..self.count).unwrap_or_default()
+    }
+}
+
+impl Piece {
+    fn change(&self) -> SpeedChange<'static> {
+        let [from, to] = self.speeds.map(Speed::from_m_per_s);
+        SpeedLaw::Smooth.between(from, to, TimeSpan::from_s(self.lasts))
+    }
+}
+
+impl Motion for ZonedTransit {
+    fn state_at(&self, time: TimeSpan) -> MotionState {
+        let seconds = time.as_s();
+        let piece = self.pieces().iter().rev().find(|piece| piece.time <= seconds).or(self.pieces().first());
+        let Some(piece) = piece else { return MotionState::default() };
+        let state = piece.change().state_at(time - TimeSpan::from_s(piece.time));
+        MotionState { distance: state.distance + Length::from_m(piece.place), ..state }
+    }
+
+    fn time_at(&self, distance: Length) -> Option<TimeSpan> {
+        let place = distance.as_m();
+        let piece =
+            self.pieces().iter().rev().find(|piece| piece.place <= place).or(self.pieces().first())?;
+        let since = piece.change().time_at(distance - Length::from_m(piece.place))?;
+        Some(TimeSpan::from_s(piece.time) + since)
+    }
+
+    fn duration(&self) -> TimeSpan {
+        TimeSpan::from_s(self.end().time)
+    }
+
+    fn distance(&self) -> Length {
+        Length::from_m(self.end().place)
+    }
+}
+
+/// The way of a change, which every symmetric law runs at the mean of its speeds.
+fn change_way(from: f64, to: f64) -> f64 {
+    if from == to { 0.0 } else { 0.5 * (from + to) * CHANGE }
+}
+
+/// The way in parts of one speed each, in order; how many there are.
+fn levels_of(way: f64, speed: f64, parts: &[SlowPart], levels: &mut [Level]) -> Option<usize> {
+    let (mut at, mut count) = (0.0, 0);
+    while at < way {
+        let here = parts.iter().filter(|part| part.from <= at && part.to > at);
+        let level = here.map(|part| part.speed).fold(speed, f64::min);
+        let bounds = parts.iter().flat_map(|part| [part.from, part.to]);
+        let until = bounds.filter(|bound| *bound > at).fold(way, f64::min);
+        match levels.get_mut(..count).and_then(|known| known.last_mut()) {
+            Some(last) if last.speed == level => last.length += until - at,
+            _ => {
+                *levels.get_mut(count)? = Level { length: until - at, speed: level };
+                count += 1;
+            }
+        }
+        at = until;
+    }
+    (count > 0).then_some(count)
+}
+
+/// A part that is too short to get to its speed and away from it again, and the speed that it is run at instead.
+fn too_short(levels: &[Level], ends: [f64; 2]) -> Option<(usize, f64)> {
+    levels.iter().enumerate().find_map(|(nth, level)| {
+        let before =
+            nth.checked_sub(1).and_then(|nth| levels.get(nth)).map_or(ends[0], |before| before.speed);
+        let next = levels.get(nth + 1).map_or(ends[1], |next| next.speed);
+        let beside = before.max(next);
+        let falls = if next < level.speed { change_way(level.speed, next) } else { 0.0 };
+        let is_short = level.length < change_way(before.min(level.speed), level.speed) + falls;
+        (is_short && beside < level.speed).then_some((nth, beside))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALL: SlowPart = SlowPart { from: 2.0, to: 3.0, speed: 0.2 };
+
+    fn transit(time: f64, parts: &[SlowPart]) -> Option<ZonedTransit> {
+        ZonedTransit::new(6.0, [0.25, 0.15], time, [0.05, 0.5], parts)
+    }
+
+    #[test]
+    fn it_covers_the_way_in_the_time_and_is_slow_where_that_is_asked() {
+        for time in [22.0, 25.0, 35.0, 60.0] {
+            let transit = transit(time, &[HALL]).expect("time enough");
+            assert!((transit.duration().as_s() - time).abs() < 0.01, "{time}: {:?}", transit.duration());
+            assert!((transit.distance().as_m() - 6.0).abs() < 1e-6);
+            let end = transit.state_at(transit.duration());
+            assert!((end.speed.as_m_per_s() - 0.15).abs() < 1e-6 && (end.distance.as_m() - 6.0).abs() < 1e-6);
+            let mut before = MotionState::default();
+            for tenth in 0..(10.0 * time) as u32 {
+                let state = transit.state_at(TimeSpan::from_s(0.1 * f64::from(tenth)));
+                let (place, speed) = (state.distance.as_m(), state.speed.as_m_per_s());
+                assert!(
+                    !(2.001..2.999).contains(&place) || speed <= 0.2 + 1e-6,
+                    "{time}: {speed} at {place}"
+                );
+                assert!(state.distance >= before.distance, "{time}");
+                let at = transit.time_at(state.distance).expect("on the way");
+                assert!((transit.state_at(at).distance - state.distance).abs() < Length::from_mm(0.01));
+                before = state;
+            }
+        }
+    }
+
+    #[test]
+    fn the_soonest_is_what_the_slow_part_leaves() {
+        // By hand at 0.5 m/s: 0.75 m in 2 s, 0.55 m at 0.5 m/s, 0.7 m in 2 s, 1 m at 0.2 m/s, 0.7 m in 2 s, 1.65 m at 0.5 m/s
+        // and 0.65 m in 2 s: 17.4 s.
+        assert!(transit(17.3, &[HALL]).is_none());
+        assert!(transit(17.5, &[HALL]).is_some());
+        // Without it 4.2 s less: 0.75 and 0.65 m in 2 s each, 4.6 m at 0.5 m/s.
+        assert!(transit(13.3, &[]).is_some() && transit(13.1, &[]).is_none());
+    }
+
+    #[test]
+    fn a_gap_too_short_to_get_faster_in_is_run_through_as_slowly() {
+        let next = SlowPart { from: 3.3, to: 4.0, speed: 0.15 };
+        let transit = transit(24.0, &[HALL, next]).expect("time enough");
+        let between = transit.time_at(Length::from_m(3.1)).expect("on the way");
+        assert!((transit.state_at(between).speed.as_m_per_s() - 0.2).abs() < 0.051);
+    }
+}

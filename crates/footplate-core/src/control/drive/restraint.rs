@@ -1,0 +1,358 @@
+//! What keeps a train to speed restrictions, whatever it was told and by whom.
+//!
+//! A train is told the step that is asked for, or the fastest below it that the zones about it allow: within a zone those of
+//! which its speed is believed to be within the limit but for a stated share of cases, ahead of one those from which it can
+//! still be slowed down before its front comes there. Whatever is reported, it is told the slower step by the clock, at the
+//! last moment at which that is sure. When its rear end has certainly left, it is told what was asked for.
+//!
+//! ```text
+//! x(t) + k σ_x + front = zone   ⇒   v(t) + k σ_v ≤ limit          until   x(t) − k σ_x − rear ≥ end of the zone
+//! ```
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use crate::estimation::{Foresight, Ground, WayPoint};
+use crate::ids::SpeedStep;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Zone;
+use crate::units::{Ratio, Speed};
+
+use super::driven_train::DrivenTrain;
+use super::driver::Driver;
+use super::notice::DriveNotice;
+use super::order::Aim;
+use super::outputs::Outputs;
+use super::restricted_way::RestrictedWay;
+use super::stop_planning::SOONEST;
+use super::task::{Destination, Goal, Phase};
+
+/// How often a train may come to a zone nearer than is believed, and how often it may be faster there: in one case of a
+/// hundred each. A restriction is no end of the track, where ten times as much is asked.
+const TOO_FAST: Ratio = Ratio::from_percent(1.0);
+/// A step that was asked for is followed by a slower one no sooner than this: the next look, and a poll.
+const UNDONE: TimeSpan = TimeSpan::from_ms(300);
+/// A train that has left a zone gets faster when it need not slow down again for so long: about what it takes to be faster
+/// at all.
+const WORTHWHILE: TimeSpan = TimeSpan::from_ms(2_000);
+/// Within a zone a train gets faster only where this part of the limit is left: no train is told up and down for a
+/// thousandth.
+const SPARED: f64 = 0.03;
+/// Where not even the slowest step is within the limit, the train has slowed down for it once its speed is within this
+/// part of that step's.
+const SETTLED: f64 = 0.03;
+/// What is restricted is looked at again after this, whatever is reported.
+const AGAIN: TimeSpan = TimeSpan::from_ms(1_000);
+/// Looks are no nearer to each other: a train of 400 mm/s runs 8 mm.
+const TICK: TimeSpan = TimeSpan::from_ms(20);
+/// Halvings of a few seconds that leave about a millisecond.
+const HALVINGS: usize = 12;
+
+/// What a train would run at if it were allowed to.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Restraint {
+    /// The step that was asked for, while the train has been told a slower one.
+    wanted: Option<SpeedStep>,
+    /// When the zones about it are looked at next.
+    look: Option<Timestamp>,
+    /// The zone that was said to slow it down.
+    said: Option<String>,
+}
+
+/// From where a train is judged: when a command can leave, how far it reaches and how it moves.
+struct Prospect<'t> {
+    train: &'t DrivenTrain,
+    here: Foresight,
+    now: Timestamp,
+    usable: Vec<SpeedStep>,
+    k: f64,
+}
+
+impl Driver {
+    /// Looks at the zones about the trains for which that is due.
+    pub(super) fn heed_zones(&mut self, now: Timestamp) {
+        let ground = self.track.ground();
+        if ground.layout.zones().is_empty() {
+            return;
+        }
+        for train in self.trains.values_mut().filter(|train| train.zone_look().is_some_and(|at| at <= now)) {
+            train.heed_zones(ground, now, &mut self.outputs);
+        }
+    }
+}
+
+impl DrivenTrain {
+    /// When the zones about it are looked at next.
+    pub(super) fn zone_look(&self) -> Option<Timestamp> {
+        self.restraint.look.filter(|_| self.told > SpeedStep::STAND)
+    }
+
+    /// Something is known anew, or the train was told something.
+    pub(super) const fn look_at_zones(&mut self, now: Timestamp) {
+        self.restraint.look = Some(now);
+    }
+
+    /// Whether it has been told a slower step than it was asked to run at.
+    pub(super) const fn is_restrained(&self) -> bool {
+        self.restraint.wanted.is_some()
+    }
+
+    /// The fastest step of those that move it, if zones leave less than all of them.
+    pub(super) fn fastest_allowed(&self, ground: Ground<'_>, now: Timestamp) -> Option<SpeedStep> {
+        if ground.layout.zones().is_empty() {
+            return None;
+        }
+        let (fastest, zone) = self.allowed(ground, now, self.model.highest());
+        zone.map(|_| fastest)
+    }
+
+    /// What is restricted on the way to a place, each with the fastest step that keeps to it.
+    pub(super) fn restricted_until<'g>(
+        &self,
+        ground: Ground<'g>,
+        now: Timestamp,
+        at: WayPoint,
+    ) -> Vec<(RestrictedWay<'g>, SpeedStep)> {
+        if ground.layout.zones().is_empty() {
+            return Vec::new();
+        }
+        let prospect = Prospect::of(self, now);
+        let [_, rear] = prospect.ends();
+        let mut ways = RestrictedWay::about(ground, &self.model, at.node, -rear, at.way.as_m());
+        ways.retain(|way| way.to >= rear && way.from <= at.way.as_m());
+        ways.into_iter().map(|way| (way, prospect.within(way.zone.limit.as_m_per_s()))).collect()
+    }
+
+    /// The step to be told if one is asked for, which is kept in mind. Says so if zones leave less.
+    pub(super) fn restrained(
+        &mut self,
+        ground: Ground<'_>,
+        now: Timestamp,
+        step: SpeedStep,
+        out: &mut Outputs,
+    ) -> SpeedStep {
+        self.restraint.wanted = None;
+        self.restraint.look = Some(now);
+        if step == SpeedStep::STAND || ground.layout.zones().is_empty() {
+            return step;
+        }
+        let (allowed, zone) = self.allowed(ground, now, step);
+        if let Some(zone) = zone {
+            self.restraint.wanted = Some(step);
+            self.say_restrained(allowed, zone, out);
+        }
+        allowed
+    }
+
+    fn say_restrained(&mut self, step: SpeedStep, zone: &Zone, out: &mut Outputs) {
+        if self.restraint.said.as_ref() != Some(&zone.name) {
+            self.restraint.said = Some(zone.name.clone());
+            let (train, name, limit) = (self.id(), zone.name.clone(), zone.limit);
+            out.say(DriveNotice::Restrained { train, step, zone: name, limit });
+        }
+    }
+
+    /// The fastest step up to one that may be told now, and the zone that leaves no more.
+    fn allowed<'g>(
+        &self,
+        ground: Ground<'g>,
+        now: Timestamp,
+        step: SpeedStep,
+    ) -> (SpeedStep, Option<&'g Zone>) {
+        let prospect = Prospect::of(self, now);
+        let ways = prospect.ways(ground, step);
+        let Some(zone) = prospect.forbids(&ways, step, UNDONE, 1.0) else { return (step, None) };
+        (prospect.fastest_below(&ways, step), Some(zone))
+    }
+
+    /// Slows down for what is ahead, and gets faster where nothing restricts it any more.
+    fn heed_zones(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+        let told = self.told;
+        let wanted = self.restraint.wanted.filter(|wanted| *wanted > told);
+        let prospect = Prospect::of(self, now);
+        let ways = prospect.ways(ground, wanted.unwrap_or(told));
+        let by = prospect.slow_down_by(&ways, told);
+        let due = by.filter(|(by, _)| *by <= prospect.start() + TICK);
+        let slower = due.map(|(_, zone)| (prospect.fastest_below(&ways, told), zone));
+        let slower = slower.filter(|(step, _)| *step < told);
+        let leaves = prospect.leaves(&ways);
+        let faster = wanted.filter(|_| due.is_none()).and_then(|wanted| {
+            let faster = prospect.usable.iter().rev().filter(|step| **step > told && **step <= wanted);
+            let mut faster = faster.copied().chain(Some(wanted));
+            faster.find(|step| {
+                prospect.forbids(&ways, *step, WORTHWHILE, 1.0 - SPARED).is_none()
+                    && self.is_worth_it(ground, now, *step)
+            })
+        });
+        let next = by.map(|(by, _)| by - SOONEST).into_iter().chain(leaves.filter(|_| wanted.is_some()));
+        let next = next.chain(Some(now + AGAIN)).min().unwrap_or(now).max(now + TICK);
+        self.restraint.look = Some(next);
+        if let Some((step, zone)) = slower {
+            // Who is paced is told what it should do at every look.
+            if self.is_paced_by_itself() {
+                self.restraint.wanted = None;
+            } else {
+                self.restraint.wanted.get_or_insert(told);
+            }
+            self.say_restrained(step, zone, out);
+            self.interrupt_line();
+            self.tell_at_once(now, step, out);
+        } else if let Some(step) = faster {
+            if Some(step) == wanted {
+                self.restraint.wanted = None;
+            }
+            self.resume_line(now, step);
+            self.tell_at_once(now, step, out);
+        } else if by.is_none() && leaves.is_none() {
+            self.restraint.said = None;
+        }
+    }
+
+    /// Whether a train should get faster that is under way to a place: only if it can stop from the faster step as surely.
+    fn is_worth_it(&self, ground: Ground<'_>, now: Timestamp, step: SpeedStep) -> bool {
+        let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };
+        let is_running = matches!(self.task.map(|task| task.phase), Some(Phase::Running { .. }));
+        let located = self.located(ground, now);
+        is_running && located.is_some_and(|located| self.settles_before(ground, &located, at, step))
+    }
+}
+
+impl<'t> Prospect<'t> {
+    fn of(train: &'t DrivenTrain, now: Timestamp) -> Self {
+        let k = Aim::NotBeyond(TOO_FAST).margin();
+        Self { train, here: train.locator.foresight(), now, usable: train.usable_steps(), k }
+    }
+
+    /// When a command can leave at the latest.
+    fn start(&self) -> Timestamp {
+        self.now + SOONEST
+    }
+
+    /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
+    /// slowest of all, wherever it goes.
+    fn ways<'g>(&self, ground: Ground<'g>, step: SpeedStep) -> Vec<RestrictedWay<'g>> {
+        let Some(node) = self.here.node() else {
+            let zones = ground.layout.zones().iter();
+            let slowest =
+                zones.min_by(|one, other| one.limit.as_m_per_s().total_cmp(&other.limit.as_m_per_s()));
+            let everywhere = |zone| RestrictedWay { zone, from: f64::NEG_INFINITY, to: f64::INFINITY };
+            return slowest.map(everywhere).into_iter().collect();
+        };
+        let model = &self.train.model;
+        let step = step.max(self.train.told);
+        let slowest = self.usable.first().copied().unwrap_or(step);
+        let soon = SOONEST + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
+        let [front, rear] = self.ends();
+        let speed = Speed::from_m_per_s(model.speed(step, crate::event::Approach::Above).value.as_m_per_s());
+        let ahead = front + (speed * soon).as_m() * (1.0 + SETTLED);
+        let mut ways = RestrictedWay::about(ground, model, node, -rear, ahead);
+        ways.retain(|way| way.to >= rear && way.from <= ahead);
+        ways
+    }
+
+    /// Where its front may be and where its rear may still be (m past the contact).
+    fn ends(&self) -> [f64; 2] {
+        let [ahead, behind] = self.train.reach.map(crate::units::Length::as_m);
+        let place = |k: f64| self.here.place(&self.train.model, self.now, k);
+        [place(self.k) + ahead, place(-self.k) - behind]
+    }
+
+    /// The fastest step within a limit, of which the slowest that moves it is taken to be.
+    fn within(&self, limit: f64) -> SpeedStep {
+        let keeps = |step: &SpeedStep| {
+            let mut told = self.here;
+            told.tell(&self.train.model, self.start(), *step);
+            told.after_all(&self.train.model).fastest_settled(self.k) <= limit
+        };
+        let within = self.usable.partition_point(keeps).max(1);
+        self.usable.get(within - 1).copied().unwrap_or(SpeedStep::STAND)
+    }
+
+    /// The first zone that a step would be too fast for, if it is told now and a slower one so long after; with this part
+    /// of every limit.
+    fn forbids<'g>(
+        &self,
+        ways: &[RestrictedWay<'g>],
+        step: SpeedStep,
+        lasting: TimeSpan,
+        part: f64,
+    ) -> Option<&'g Zone> {
+        let [front, _] = self.ends();
+        let (mut told, mut brakes) = (self.here, self.start());
+        if told.step() != step.get() {
+            told.tell(&self.train.model, brakes, step);
+            brakes += lasting;
+        }
+        let is_too_fast = |way: &&RestrictedWay<'g>| {
+            let limit = way.zone.limit.as_m_per_s() * part;
+            let slow = self.within(limit);
+            step > slow && (way.from <= front || !self.slows_for(told, way, (slow, brakes), limit))
+        };
+        ways.iter().find(is_too_fast).map(|way| way.zone)
+    }
+
+    /// Whether a train is within a limit when it comes to a zone ahead if it is told a slower step at a time.
+    fn slows_for(
+        &self,
+        mut told: Foresight,
+        way: &RestrictedWay<'_>,
+        (slow, at): (SpeedStep, Timestamp),
+        limit: f64,
+    ) -> bool {
+        let model = &self.train.model;
+        told.tell(model, at, slow);
+        let told = told.after_all(model);
+        let limit = limit.max(told.fastest_settled(self.k) * (1.0 + SETTLED));
+        let entry = way.from - self.train.reach[0].as_m();
+        let enters = told.reaches(model, entry, self.now, self.k);
+        enters.is_none_or(|enters| told.fastest_from(model, enters, self.k) <= limit)
+    }
+
+    /// The fastest step below one that may be told now; the slowest that moves it where none may.
+    fn fastest_below(&self, ways: &[RestrictedWay<'_>], step: SpeedStep) -> SpeedStep {
+        let below = self.usable.partition_point(|usable| *usable < step);
+        let below = self.usable.get(..below).unwrap_or_default();
+        let may = below.partition_point(|usable| self.forbids(ways, *usable, UNDONE, 1.0).is_none()).max(1);
+        below.get(may - 1).copied().unwrap_or(step)
+    }
+
+    /// When a slower step has to leave at the latest, and for which zone; at once for a zone that it may be in.
+    fn slow_down_by<'g>(&self, ways: &[RestrictedWay<'g>], told: SpeedStep) -> Option<(Timestamp, &'g Zone)> {
+        let [front, _] = self.ends();
+        let model = &self.train.model;
+        let mut here = self.here;
+        here.tell(model, self.start(), told);
+        let by = |way: &RestrictedWay<'g>| {
+            let limit = way.zone.limit.as_m_per_s();
+            let slow = self.within(limit);
+            if told <= slow {
+                return None;
+            }
+            let is_in_time = |at: Timestamp| self.slows_for(here, way, (slow, at), limit);
+            if way.from <= front || !is_in_time(self.start()) {
+                return Some((self.start(), way.zone));
+            }
+            let entry = way.from - self.train.reach[0].as_m();
+            let mut late = here.after_all(model).reaches(model, entry, self.start(), self.k)?;
+            let mut in_time = self.start();
+            for _ in 0..HALVINGS {
+                let middle = in_time + TimeSpan::from_s(0.5 * (late - in_time).as_s());
+                if is_in_time(middle) { in_time = middle } else { late = middle }
+            }
+            Some((in_time, way.zone))
+        };
+        ways.iter().filter_map(by).min_by_key(|(at, _)| *at)
+    }
+
+    /// When its rear end will have left the first of the zones that it may be in.
+    fn leaves(&self, ways: &[RestrictedWay<'_>]) -> Option<Timestamp> {
+        let [front, _] = self.ends();
+        let model = &self.train.model;
+        let after = self.here.after_all(model);
+        let left = ways
+            .iter()
+            .filter(|way| way.from <= front && way.to.is_finite())
+            .filter_map(|way| after.reaches(model, way.to + self.train.reach[1].as_m(), self.now, -self.k));
+        left.min()
+    }
+}

@@ -1,0 +1,153 @@
+//! Speed restrictions: zones of rail in which no part of any train shall be faster than a limit.
+
+use alloc::string::String;
+
+use crate::ids::{EdgeId, StretchId};
+use crate::track::{Layout, LayoutError, MAX_NAME_CHARACTERS};
+use crate::units::Speed;
+
+/// The highest limit that is believed: eight times what 200 km/h come to at 1:87. What is written above it is in another
+/// unit, or no restriction.
+pub const MAX_ZONE_LIMIT: Speed = Speed::from_mm_per_s(5_000.0);
+/// The lowest: slower than any train crawls it would close the track.
+pub const MIN_ZONE_LIMIT: Speed = Speed::from_mm_per_s(1.0);
+
+/// A speed restriction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zone {
+    /// What people call it.
+    pub name: String,
+    /// No part of a train that is in it shall be faster.
+    pub limit: Speed,
+}
+
+impl Layout {
+    /// The speed restrictions, in the order in which they were written.
+    #[must_use]
+    pub fn zones(&self) -> &[Zone] {
+        &self.zones
+    }
+
+    /// The speed restriction of an edge, if it has one.
+    #[inline]
+    #[must_use]
+    pub fn zone(&self, edge: EdgeId) -> Option<&Zone> {
+        self.zones.get(*self.restricted.get(&edge.stretch())?)
+    }
+
+    /// The greatest speed allowed along a way: the lowest limit of its edges. `None` if it is not restricted.
+    pub fn greatest_speed(&self, way: impl IntoIterator<Item = EdgeId>) -> Option<Speed> {
+        let limits = way.into_iter().filter_map(|edge| Some(self.zone(edge)?.limit));
+        limits.reduce(Speed::min)
+    }
+
+    /// Restricts the speed on some stretches, in both directions. A stretch is in one zone at most.
+    ///
+    /// # Errors
+    /// What is wrong with the zone.
+    pub fn with_zone(
+        mut self,
+        zone: Zone,
+        stretches: impl IntoIterator<Item = StretchId>,
+    ) -> Result<Self, LayoutError> {
+        let number = self.zones.len();
+        let Zone { name, limit } = &zone;
+        let is_name = (1..=MAX_NAME_CHARACTERS).contains(&name.chars().count())
+            && !name.chars().any(char::is_control)
+            && name.trim() == name;
+        if !is_name {
+            return Err(LayoutError::IllegalZoneName { zone: number, name: name.clone() });
+        }
+        if self.zones.iter().any(|known| known.name == *name) {
+            return Err(LayoutError::DuplicateZone { zone: number, name: name.clone() });
+        }
+        // NaN is not within the limits either.
+        if !(*limit >= MIN_ZONE_LIMIT && *limit <= MAX_ZONE_LIMIT) {
+            return Err(LayoutError::IllegalZoneLimit { zone: number, found: *limit });
+        }
+        let count = self.stretch_count();
+        let mut is_empty = true;
+        for stretch in stretches.into_iter().filter(|stretch| usize::from(stretch.0) < count) {
+            is_empty = false;
+            let first = self.restricted.insert(stretch, number).filter(|first| *first != number);
+            if let Some(first) = first.and_then(|first| self.zones.get(first)) {
+                let [first, second] = [first, &zone].map(|zone| zone.name.clone());
+                return Err(LayoutError::RestrictedTwice { zone: number, first, second });
+            }
+        }
+        if is_empty {
+            return Err(LayoutError::ZoneWithoutEdges { zone: number, name: name.clone() });
+        }
+        self.zones.push(zone);
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::NodeId;
+    use crate::track::PlanEntry;
+    use crate::track::example::oval;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    fn zone(name: &str, mm_s: f64) -> Zone {
+        Zone { name: name.into(), limit: Speed::from_mm_per_s(mm_s) }
+    }
+
+    fn edge(layout: &Layout, from: &str, to: &str) -> EdgeId {
+        let node = |name: &str| -> NodeId { layout.node_named(name).unwrap() };
+        layout.edge_between(node(from), node(to)).unwrap()
+    }
+
+    #[test]
+    fn a_way_allows_what_its_slowest_edge_allows_in_both_directions() {
+        let plain = oval();
+        let (siding, neck) = (edge(&plain, "BR1", "C1"), edge(&plain, "A1", "BR1"));
+        let layout = plain
+            .with_zone(zone("siding", 150.0), [siding.stretch()])
+            .and_then(|layout| layout.with_zone(zone("neck", 200.0), [neck.stretch()]))
+            .unwrap();
+        let limit = |way: &[EdgeId]| layout.greatest_speed(way.iter().copied()).map(Speed::as_mm_per_s);
+        assert_eq!(limit(&[neck, siding]), Some(150.0));
+        assert_eq!(limit(&[neck.twin()]), Some(200.0));
+        assert_eq!(limit(&[edge(&layout, "D1", "A1")]), None);
+        assert_eq!(layout.zone(siding.twin()).unwrap().name, "siding");
+        assert_eq!(
+            layout.zones().iter().map(|zone| zone.name.as_str()).collect::<Vec<_>>(),
+            ["siding", "neck"]
+        );
+    }
+
+    #[test]
+    fn a_zone_is_refused_with_what_is_wrong_with_it() {
+        let restricted = || oval().with_zone(zone("siding", 150.0), [StretchId(2)]).unwrap();
+        let refusal = |wrong: Zone, stretches: &[u16]| {
+            let stretches = stretches.iter().copied().map(StretchId);
+            let error = restricted().with_zone(wrong, stretches).unwrap_err();
+            assert_eq!(error.entry(), PlanEntry::Zone(1));
+            error.to_string()
+        };
+        for name in ["", " neck", "a\nb", &"x".repeat(MAX_NAME_CHARACTERS + 1)] {
+            assert!(refusal(zone(name, 100.0), &[0]).ends_with("is not 1 to 32 characters on one line"));
+        }
+        assert_eq!(
+            refusal(zone("siding", 100.0), &[0]),
+            "there is a zone `siding` already; every zone needs its own name"
+        );
+        for (limit, text) in [(0.0, "0"), (-3.0, "-3"), (9_000.0, "9000"), (f64::NAN, "NaN")] {
+            let expected = std::format!(
+                "a limit of {text} mm/s is not between 1 and 5000 mm/s (is it in millimetres a second?)"
+            );
+            assert_eq!(refusal(zone("neck", limit), &[0]), expected);
+        }
+        assert_eq!(
+            refusal(zone("neck", 100.0), &[0, 2]),
+            "an edge is in zone `siding` and in zone `neck`; each edge is in one at most"
+        );
+        let nothing = "no edge is in zone `neck`: write `zone = \"neck\"` on the edges it restricts";
+        assert_eq!(refusal(zone("neck", 100.0), &[]), nothing);
+        assert_eq!(refusal(zone("neck", 100.0), &[999]), nothing);
+    }
+}

@@ -1,0 +1,165 @@
+//! `footplate simulate zones`: trains are ordered about on a layout with speed restrictions, and their true speeds in these are scored.
+
+mod page;
+mod passage;
+mod ride;
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context, ensure};
+use clap::Args;
+use footplate_core::track::{Layout, Zone};
+use footplate_core::{EdgeId, Length, Speed, StretchId, TimeSpan, TrainId};
+use footplate_sim::LivingSwitches;
+use footplate_store::layout_named;
+
+use self::page::Page;
+use self::ride::{Ridden, Told, ride};
+use super::super::Outcome;
+use super::again::{FailedRun, name_failed};
+use super::driving::choice::Choice;
+use super::rehearsal::{Rehearsal, Way};
+use super::seeds::Seeds;
+use crate::progress::with_progress;
+use crate::spread::{all_cores, spread};
+
+/// Let calibrated trains run, stop, hold speeds, arrive in time and follow each other over speed restrictions, and score their true speeds there.
+///
+/// Each seed is a layout with three trains and other restrictions for each of them.
+#[derive(Args)]
+#[command(after_help = "Example: footplate simulate zones --seeds 1..4 --markdown")]
+pub(super) struct Arguments {
+    /// The layout: the name of a built-in one or a layout file. Its own zones are not heeded.
+    #[arg(long, default_value = "track-a")]
+    layout: String,
+    /// The seed of the trains and zones, or of many: 1..30.
+    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
+    seeds: Seeds,
+    /// Track time that each calibration may take, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
+    budget: u16,
+    /// Write the scores as a page of the documentation.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: bool,
+    /// How many seeds at once; without it, as many as there are cores. The result is the same.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
+/// Zones at once on a way round, ...
+const ZONES: usize = 2;
+/// ... each of edges next to each other of at least so many mm, ...
+const LONG_ENOUGH: f64 = 250.0;
+/// ... with limits between these (mm/s): faster than any train crawls, slower than any runs.
+const LIMITS: [f64; 2] = [130.0, 260.0];
+
+/// All of one seed.
+struct Scored {
+    seed: u64,
+    rides: Vec<Ridden>,
+}
+
+impl Arguments {
+    pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let layout = layout_named(&self.layout)?.layout;
+        let seeds: Vec<u64> = self.seeds.iter().collect();
+        let budget = TimeSpan::from_s(f64::from(self.budget));
+        let threads = self.threads.unwrap_or_else(all_cores);
+        let scored = with_progress("zones", seeds.len(), |done| {
+            spread(seeds.len(), threads, |at| {
+                let scored = score(&layout, seeds[at], budget);
+                done.fetch_add(1, Ordering::Relaxed);
+                scored
+            })
+        })?;
+        let page = Page { scored: &scored, asked: self.asked() };
+        if self.json {
+            page.write_json(output)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
+        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    fn failure(&self, scored: &Scored) -> Option<FailedRun> {
+        let found = scored.rides.iter().find_map(|ride| Some((ride, ride.trouble.as_ref()?)));
+        let (ride, trouble) = found?;
+        let again = format!("simulate zones --seed {}{}", scored.seed, self.settings());
+        Some(FailedRun { what: format!("seed {}, train {}: {trouble}", scored.seed, ride.train), again })
+    }
+
+    /// What was asked for, as on the command line.
+    fn asked(&self) -> String {
+        format!("--seeds {}{} --markdown", self.seeds.written(), self.settings())
+    }
+
+    fn settings(&self) -> String {
+        let mut settings = String::new();
+        if self.layout != "track-a" {
+            settings += &format!(" --layout {}", self.layout);
+        }
+        if self.budget != 300 {
+            settings += &format!(" --budget {}", self.budget);
+        }
+        settings
+    }
+}
+
+/// Everything that is asked of the trains of one seed.
+fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
+    let way = Way::round(layout);
+    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
+    let stage = Rehearsal::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let mut choice = Choice::new(seed);
+    let mut rides = Vec::new();
+    for nth in 0..TRAINS.len() {
+        let restricted = restricted(layout, &way, &mut choice)?;
+        let draw = choice.between(0.0, 1e9) as u64;
+        for told in Told::ALL {
+            // Whoever follows has the train before it in the list ahead.
+            let trains = [TRAINS[nth], TRAINS[(nth + 1) % TRAINS.len()]];
+            rides.push(ride([layout, &restricted], &stage, &way, trains, told, draw)?);
+        }
+    }
+    Ok(Scored { seed, rides })
+}
+
+/// The layout with zones on the way round.
+fn restricted(layout: &Layout, way: &Way, choice: &mut Choice) -> anyhow::Result<Layout> {
+    let mut taken: Vec<StretchId> = Vec::new();
+    let mut found = layout.clone();
+    for nth in 0..ZONES {
+        let stretches = loop {
+            let begins = choice.between(0.0, way.edges.len() as f64) as usize;
+            let stretches = some_of(layout, way.edges.iter().cycle().skip(begins).take(way.edges.len()));
+            if stretches.iter().all(|stretch| !taken.contains(stretch)) {
+                break stretches;
+            }
+        };
+        taken.extend(&stretches);
+        let limit = Speed::from_mm_per_s(choice.between(LIMITS[0], LIMITS[1]));
+        let zone = Zone { name: format!("zone {nth}"), limit };
+        found = found.with_zone(zone, stretches).context("a zone of edges that are in no other")?;
+    }
+    Ok(found)
+}
+
+/// As many edges from the first on as make a zone.
+fn some_of<'e>(layout: &Layout, edges: impl Iterator<Item = &'e EdgeId>) -> Vec<StretchId> {
+    let mut length = Length::ZERO;
+    let long_enough = |edge: &&EdgeId| {
+        let goes_on = length.as_mm() < LONG_ENOUGH;
+        length += layout.edge(**edge).map_or(Length::ZERO, |edge| edge.length);
+        goes_on
+    };
+    edges.take_while(long_enough).map(|edge| edge.stretch()).collect()
+}
