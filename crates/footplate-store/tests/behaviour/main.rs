@@ -7,6 +7,7 @@ mod bad_trains_and_lines;
 mod built_in_layouts;
 mod child_process;
 mod circuits;
+mod clearances;
 mod decisions;
 mod drawn_moments;
 mod journal_survives;

@@ -3,11 +3,13 @@
 use footplate_core::control::LinkNews;
 use footplate_wire::LinkNotice;
 
-/// Whether the station has fallen silent or answers again; most of what is heard says neither.
+/// Whether the station has fallen silent or answers again, and which train may face either way; most of what is heard says
+/// nothing of the kind.
 pub(crate) const fn news_of(notice: &LinkNotice) -> Option<LinkNews> {
     match notice {
         LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => Some(LinkNews::Silent),
         LinkNotice::Answers => Some(LinkNews::Answers),
+        LinkNotice::ReverseInDoubt { train } => Some(LinkNews::ReverseInDoubt { train: *train }),
         _ => None,
     }
 }

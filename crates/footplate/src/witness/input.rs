@@ -1,8 +1,11 @@
 //! What a machine can be told, and the words for it in a recording.
 
-use footplate_core::Event;
 use footplate_core::control::{LinkNews, Order};
+use footplate_core::{Event, TrainId};
 use serde::de::DeserializeOwned;
+
+/// Before the number of the train.
+const REVERSE_IN_DOUBT: &str = "reverse-in-doubt ";
 
 /// Something that a machine is told. All that it decides follows from how it began and these, in their order and at
 /// their times.
@@ -57,6 +60,7 @@ impl Input {
             Self::Order(order) => ("order", serde_json::to_string(order).unwrap_or_default()),
             Self::Link(LinkNews::Silent) => ("link", "silent".to_owned()),
             Self::Link(LinkNews::Answers) => ("link", "answers".to_owned()),
+            Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
@@ -76,8 +80,12 @@ impl Input {
                 "silent" => Self::Link(LinkNews::Silent),
                 "answers" => Self::Link(LinkNews::Answers),
                 _ => {
-                    let why = "it should be `silent` or `answers`".to_owned();
-                    return Err(InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why });
+                    let train = text.strip_prefix(REVERSE_IN_DOUBT).and_then(|train| train.parse().ok());
+                    let train = train.map(TrainId).ok_or_else(|| {
+                        let why = "it should be `silent`, `answers` or `reverse-in-doubt 24`".to_owned();
+                        InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why }
+                    })?;
+                    Self::Link(LinkNews::ReverseInDoubt { train })
                 }
             },
             "timeout" => Self::Timeout,
@@ -102,8 +110,7 @@ mod tests {
     use footplate_core::control::{Aim, StopOrder};
     use footplate_core::track::Landmark;
     use footplate_core::{
-        EventKind, Length, NodeId, Ratio, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
-        TurnoutId,
+        EventKind, Length, NodeId, Ratio, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TurnoutId,
     };
 
     use super::*;
@@ -129,6 +136,7 @@ mod tests {
             Input::NoMoreLines,
             Input::Link(LinkNews::Silent),
             Input::Link(LinkNews::Answers),
+            Input::Link(LinkNews::ReverseInDoubt { train }),
             Input::Order(Order::Stop(StopOrder {
                 aim: Aim::NotBeyond(Ratio::from_parts(0.001)),
                 ..StopOrder::at(train, Landmark { node: NodeId(7), offset: Length::from_m(0.1 + 0.2) })

@@ -13,6 +13,7 @@ mod dispatcher;
 mod footprint;
 mod granting;
 mod hearing;
+mod holders;
 mod itinerary;
 mod journey;
 mod notice;

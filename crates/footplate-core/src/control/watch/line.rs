@@ -17,12 +17,18 @@ pub enum LinkNews {
     Silent,
     /// It answers, for the first time or again.
     Answers,
+    /// A train was told to turn around, and nobody knows whether it heard: it may face either way.
+    ReverseInDoubt {
+        /// The train.
+        train: TrainId,
+    },
 }
 
 impl Watchdog {
     /// What is heard of the station's line.
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
         match news {
+            LinkNews::ReverseInDoubt { train } => self.lose(now, train),
             _ if !self.is_watching() => {}
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);

@@ -298,6 +298,14 @@ impl Conductor {
                 }
             }
             Instruction::Place(train, at) => self.place(now, &step, train, at),
+            Instruction::Length(train, lengths) => {
+                self.dispatcher.set_lengths(now, train, lengths);
+                let [ahead, behind] = [lengths.ahead(), lengths.behind()].map(Length::as_mm);
+                self.say(format!(
+                    "train {train} reaches {ahead:.0} mm ahead of the end of its pickup that leads, and {behind:.0} mm \
+                     behind"
+                ));
+            }
             Instruction::Halt => self.halt(now),
             Instruction::PowerOn => self.dispatcher.switch_power(now, true),
             Instruction::Where(Some(train)) => {

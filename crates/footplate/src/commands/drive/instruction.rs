@@ -1,6 +1,6 @@
 //! What a line says, once it has been understood.
 
-use footplate_core::control::{Journey, Order};
+use footplate_core::control::{Journey, Order, TrainLengths};
 use footplate_core::track::Landmark;
 use footplate_core::{SensorId, TimeSpan, TrainId};
 
@@ -15,6 +15,8 @@ pub(super) enum Instruction {
     Straighten,
     /// A person put a train there, or sees that it stands there.
     Place(TrainId, Landmark),
+    /// A person has measured a train.
+    Length(TrainId, TrainLengths),
     /// All trains stand, and the power goes off the track, at once.
     Halt,
     /// The power comes back.
@@ -60,6 +62,7 @@ hold 24 250mm/s                   run at a mean speed, whatever steps that takes
 follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, contact by contact (or by 150mm)
 arrive 24 at D5+40mm in 12s       come to rest there, 12 s from now
 place 24 at C13+120mm             train 24 was put there by hand, or stands there as you see
+length 24 pickup 45mm overhang 110mm   how long train 24 is: its pickup, and from there to its further end
 halt                              all trains stand and the power goes off, at once
 power on                          give power to the track again
 where [24]                        where the train is, how sure, and how fast

@@ -1,15 +1,15 @@
 //! Reads what people write to drive trains, and tells them what would be right where it is not.
 
 use footplate_core::SpeedStep;
-use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder};
+use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder, TrainLengths};
 
 use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 15] = [
-    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "place", "halt",
-    "power", "where", "wait", "help",
+const VERBS: [&str; 16] = [
+    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "place", "length",
+    "halt", "power", "where", "wait", "help",
 ];
 
 /// Reads one line; `None` where it says nothing.
@@ -66,6 +66,13 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             let train = words.train()?;
             words.expect("at")?;
             Instruction::Place(train, words.landmark()?)
+        }
+        "length" => {
+            let train = words.train()?;
+            words.expect("pickup")?;
+            let pickup = words.distance()?;
+            words.expect("overhang")?;
+            Instruction::Length(train, TrainLengths { overhang: words.distance()?, pickup })
         }
         "halt" => Instruction::Halt,
         "power" => {
@@ -232,6 +239,11 @@ mod tests {
             panic!("a place")
         };
         assert_eq!((placed, at.offset), (train, Length::from_mm(120.0)));
+        let lengths = TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
+        assert_eq!(
+            read("length 24 pickup 45mm overhang 11cm"),
+            Ok(Some(Instruction::Length(train, lengths)))
+        );
         assert_eq!(read("halt"), Ok(Some(Instruction::Halt)));
         assert_eq!(read("power on"), Ok(Some(Instruction::PowerOn)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
@@ -271,6 +283,7 @@ mod tests {
             ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
             ("go 24 at D5", "column 7: `at` should be `to`"),
             ("go 24 to D5 facin", "column 13: `facin` says nothing here: did you mean `facing`?"),
+            ("length 24 110mm", "column 11: `110mm` should be `pickup`"),
             ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),

@@ -28,6 +28,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Follow { .. }) => "follow",
         Instruction::Order(Order::Arrive { .. }) => "arrive",
         Instruction::Place(..) => "place",
+        Instruction::Length(..) => "length",
         Instruction::Halt => "halt",
         Instruction::PowerOn => "power",
         Instruction::Where(_) => "where",
@@ -277,7 +278,7 @@ impl Tongue<'_> {
 }
 
 /// Trains one after the other, as in a sentence.
-fn trains(trains: &[TrainId]) -> String {
+pub(super) fn trains(trains: &[TrainId]) -> String {
     let trains: Vec<String> = trains.iter().map(|train| format!("train {train}")).collect();
     if trains.is_empty() { "nobody that can move".to_owned() } else { trains.join(", ") }
 }

@@ -10,7 +10,7 @@ use super::Conductor;
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
-use crate::commands::drive::told::verb;
+use crate::commands::drive::told::{trains, verb};
 use crate::dashboard::{Alarm, TrainPassed};
 
 impl Conductor {
@@ -52,7 +52,13 @@ impl Conductor {
 
     /// Says what the dispatcher says, and does what follows.
     pub(super) fn dispatched(&mut self, now: Timestamp, notice: &DispatchNotice) {
-        if let Some(line) = self.tongue().dispatched(notice) {
+        if let Some(mut line) = self.tongue().dispatched(notice) {
+            if let DispatchNotice::Drive(DriveNotice::AtLimit { train }) = notice {
+                let holders = self.dispatcher.holders_beyond(*train, now);
+                if !holders.is_empty() {
+                    line += &format!("; it is held by {}", trains(&holders));
+                }
+            }
             if let Some(alarm) = Alarm::of_dispatch(self.driver().layout(), notice) {
                 self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm.said(&line))));
             }

@@ -1,0 +1,35 @@
+//! Who holds the track that a train was stopped before.
+
+use alloc::vec::Vec;
+
+use crate::ids::TrainId;
+use crate::time::Timestamp;
+use crate::units::Length;
+
+use super::dispatcher::Dispatcher;
+use super::way::Way;
+
+/// So far beyond the end of what a train may enter its holder is looked for: two of the steps in which free track is looked
+/// for.
+const BEYOND: Length = Length::from_mm(100.0);
+
+impl Dispatcher {
+    /// The trains that hold the track just beyond what a train may enter, as the turnouts lie; nobody where it may go on as
+    /// far as anybody looks.
+    #[must_use]
+    pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
+        let found = || {
+            let known = self.trains.get(&train)?;
+            let limit = self.driver.position_at(train, self.driver.limit(train)?)?;
+            let layout = self.driver.layout();
+            let room = self.room(now, known);
+            let ahead = room.ahead + BEYOND;
+            let turnouts = self.driver.turnouts();
+            let (way, at) = Way::around(layout, turnouts, limit, &known.came, Length::ZERO, ahead);
+            let taken = way.footprint(layout, at, at + ahead);
+            let others = self.trains.values().filter(|other| other.id != train && other.held.meets(&taken));
+            Some(others.map(|other| other.id).collect())
+        };
+        found().unwrap_or_default()
+    }
+}
