@@ -1,10 +1,10 @@
 //! No part of a train is in a zone while the train is faster than the zone allows, whatever it was told to do; and it is as
 //! fast as it was told to be everywhere else.
-#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+#![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{DriveNotice, Driver, Gap, Order, Refusal, StopOrder};
 use footplate_core::track::Zone;
-use footplate_core::{Command, Length, Speed, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Command, EdgeId, Length, Speed, SpeedStep, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, add_train, driver_of_both_ways as driver_of, step};
 
@@ -30,16 +30,13 @@ fn restricted() -> ToyRailway {
 fn round_mm(world: &ToyRailway, train: usize) -> f64 {
     let toy = &world.trains[train];
     let edges = [("A1", "BR1"), ("BR1", "B1"), ("B1", "MR2"), ("MR2", "D1"), ("D1", "A1")];
-    let mut begins = 0.0;
-    for (from, to) in edges {
-        let [from, to] = [from, to].map(|name| world.layout.node_named(name).expect("a node"));
-        let edge = world.layout.edge_between(from, to).expect("an edge");
-        if edge == toy.at.edge {
-            return begins + toy.at.offset.as_mm();
-        }
-        begins += world.layout.edge(edge).expect("an edge").length.as_mm();
-    }
-    panic!("{toy:?} is not on the way round")
+    let edges = edges.map(|names| {
+        let [from, to] = <[&str; 2]>::from(names).map(|name| world.layout.node_named(name).expect("a node"));
+        world.layout.edge_between(from, to).expect("an edge")
+    });
+    let at = edges.iter().position(|edge| *edge == toy.at.edge).expect("with all turnouts straight");
+    let length = |edge: &EdgeId| world.layout.edge(*edge).expect("an edge").length.as_mm();
+    edges[..at].iter().map(length).sum::<f64>() + toy.at.offset.as_mm()
 }
 
 fn is_in_zone(at: f64) -> bool {

@@ -13,10 +13,11 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::estimation::{Foresight, Ground, WayPoint};
+use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Zone;
-use crate::units::{Ratio, Speed};
+use crate::units::{Length, Ratio};
 
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
@@ -45,8 +46,8 @@ const SETTLED: f64 = 0.03;
 const AGAIN: TimeSpan = TimeSpan::from_ms(1_000);
 /// Looks are no nearer to each other: a train of 400 mm/s runs 8 mm.
 const TICK: TimeSpan = TimeSpan::from_ms(20);
-/// Halvings of a few seconds that leave about a millisecond.
-const HALVINGS: usize = 12;
+/// Halvings of a few seconds that leave less than a look takes.
+const HALVINGS: usize = 8;
 
 /// What a train would run at if it were allowed to.
 #[derive(Debug, Clone, Default)]
@@ -66,6 +67,14 @@ struct Prospect<'t> {
     now: Timestamp,
     usable: Vec<SpeedStep>,
     k: f64,
+    /// Where its front may be and where its rear may still be (m past the contact).
+    ends: [f64; 2],
+}
+
+/// A restricted way, and the fastest step that keeps to it.
+struct Slow<'g> {
+    way: RestrictedWay<'g>,
+    step: SpeedStep,
 }
 
 impl Driver {
@@ -117,7 +126,7 @@ impl DrivenTrain {
             return Vec::new();
         }
         let prospect = Prospect::of(self, now);
-        let [_, rear] = prospect.ends();
+        let [_, rear] = prospect.ends;
         let mut ways = RestrictedWay::about(ground, &self.model, at.node, -rear, at.way.as_m());
         ways.retain(|way| way.to >= rear && way.from <= at.way.as_m());
         ways.into_iter().map(|way| (way, prospect.within(way.zone.limit.as_m_per_s()))).collect()
@@ -161,7 +170,7 @@ impl DrivenTrain {
     ) -> (SpeedStep, Option<&'g Zone>) {
         let prospect = Prospect::of(self, now);
         let ways = prospect.ways(ground, step);
-        let Some(zone) = prospect.forbids(&ways, step, UNDONE, 1.0) else { return (step, None) };
+        let Some(zone) = prospect.forbids(&ways, step, UNDONE) else { return (step, None) };
         (prospect.fastest_below(&ways, step), Some(zone))
     }
 
@@ -180,7 +189,8 @@ impl DrivenTrain {
             let faster = prospect.usable.iter().rev().filter(|step| **step > told && **step <= wanted);
             let mut faster = faster.copied().chain(Some(wanted));
             faster.find(|step| {
-                prospect.forbids(&ways, *step, WORTHWHILE, 1.0 - SPARED).is_none()
+                prospect.forbids(&ways, *step, WORTHWHILE).is_none()
+                    && prospect.spares(&ways, *step)
                     && self.is_worth_it(ground, now, *step)
             })
         });
@@ -220,7 +230,10 @@ impl DrivenTrain {
 impl<'t> Prospect<'t> {
     fn of(train: &'t DrivenTrain, now: Timestamp) -> Self {
         let k = Aim::NotBeyond(TOO_FAST).margin();
-        Self { train, here: train.locator.foresight(), now, usable: train.usable_steps(), k }
+        let here = train.locator.foresight();
+        let [ahead, behind] = train.reach.map(Length::as_m);
+        let ends = [here.place(&train.model, now, k) + ahead, here.place(&train.model, now, -k) - behind];
+        Self { train, here, now, usable: train.usable_steps(), k, ends }
     }
 
     /// When a command can leave at the latest.
@@ -230,31 +243,23 @@ impl<'t> Prospect<'t> {
 
     /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
     /// slowest of all, wherever it goes.
-    fn ways<'g>(&self, ground: Ground<'g>, step: SpeedStep) -> Vec<RestrictedWay<'g>> {
+    fn ways<'g>(&self, ground: Ground<'g>, step: SpeedStep) -> Vec<Slow<'g>> {
+        let slow = |way: RestrictedWay<'g>| Slow { way, step: self.within(way.zone.limit.as_m_per_s()) };
         let Some(node) = self.here.node() else {
             let zones = ground.layout.zones().iter();
             let slowest =
                 zones.min_by(|one, other| one.limit.as_m_per_s().total_cmp(&other.limit.as_m_per_s()));
             let everywhere = |zone| RestrictedWay { zone, from: f64::NEG_INFINITY, to: f64::INFINITY };
-            return slowest.map(everywhere).into_iter().collect();
+            return slowest.map(everywhere).map(slow).into_iter().collect();
         };
         let model = &self.train.model;
         let step = step.max(self.train.told);
         let slowest = self.usable.first().copied().unwrap_or(step);
         let soon = SOONEST + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
-        let [front, rear] = self.ends();
-        let speed = Speed::from_m_per_s(model.speed(step, crate::event::Approach::Above).value.as_m_per_s());
-        let ahead = front + (speed * soon).as_m() * (1.0 + SETTLED);
-        let mut ways = RestrictedWay::about(ground, model, node, -rear, ahead);
-        ways.retain(|way| way.to >= rear && way.from <= ahead);
-        ways
-    }
-
-    /// Where its front may be and where its rear may still be (m past the contact).
-    fn ends(&self) -> [f64; 2] {
-        let [ahead, behind] = self.train.reach.map(crate::units::Length::as_m);
-        let place = |k: f64| self.here.place(&self.train.model, self.now, k);
-        [place(self.k) + ahead, place(-self.k) - behind]
+        let [front, rear] = self.ends;
+        let ahead = front + (model.steady_speed(step, Approach::Above) * soon).as_m() * (1.0 + SPARED);
+        let ways = RestrictedWay::about(ground, model, node, -rear, ahead);
+        ways.into_iter().filter(|way| way.to >= rear && way.from <= ahead).map(slow).collect()
     }
 
     /// The fastest step within a limit, of which the slowest that moves it is taken to be.
@@ -268,91 +273,87 @@ impl<'t> Prospect<'t> {
         self.usable.get(within - 1).copied().unwrap_or(SpeedStep::STAND)
     }
 
-    /// The first zone that a step would be too fast for, if it is told now and a slower one so long after; with this part
-    /// of every limit.
-    fn forbids<'g>(
-        &self,
-        ways: &[RestrictedWay<'g>],
-        step: SpeedStep,
-        lasting: TimeSpan,
-        part: f64,
-    ) -> Option<&'g Zone> {
-        let [front, _] = self.ends();
+    /// Whether it may be on a way already.
+    fn may_be_on(&self, way: &RestrictedWay<'_>) -> bool {
+        way.from <= self.ends[0]
+    }
+
+    /// The first zone that a step would be too fast for, if it is told now and a slower one so long after.
+    fn forbids<'g>(&self, ways: &[Slow<'g>], step: SpeedStep, lasting: TimeSpan) -> Option<&'g Zone> {
         let (mut told, mut brakes) = (self.here, self.start());
         if told.step() != step.get() {
             told.tell(&self.train.model, brakes, step);
             brakes += lasting;
         }
-        let is_too_fast = |way: &&RestrictedWay<'g>| {
-            let limit = way.zone.limit.as_m_per_s() * part;
-            let slow = self.within(limit);
-            step > slow && (way.from <= front || !self.slows_for(told, way, (slow, brakes), limit))
+        let is_too_fast = |slow: &&Slow<'g>| {
+            step > slow.step && (self.may_be_on(&slow.way) || !self.slows_for(told, slow, brakes))
         };
-        ways.iter().find(is_too_fast).map(|way| way.zone)
+        ways.iter().find(is_too_fast).map(|slow| slow.way.zone)
     }
 
-    /// Whether a train is within a limit when it comes to a zone ahead if it is told a slower step at a time.
-    fn slows_for(
-        &self,
-        mut told: Foresight,
-        way: &RestrictedWay<'_>,
-        (slow, at): (SpeedStep, Timestamp),
-        limit: f64,
-    ) -> bool {
+    /// Whether a step leaves something of the limit of every zone that it may be in.
+    fn spares(&self, ways: &[Slow<'_>], step: SpeedStep) -> bool {
+        let mut on = ways.iter().filter(|slow| self.may_be_on(&slow.way));
+        on.all(|slow| step <= self.within(slow.way.zone.limit.as_m_per_s() * (1.0 - SPARED)))
+    }
+
+    /// Whether a train is within the limit when it comes to a zone ahead if it is told the slower step at a time.
+    fn slows_for(&self, mut told: Foresight, slow: &Slow<'_>, at: Timestamp) -> bool {
         let model = &self.train.model;
-        told.tell(model, at, slow);
+        told.tell(model, at, slow.step);
         let told = told.after_all(model);
+        let limit = slow.way.zone.limit.as_m_per_s();
         let limit = limit.max(told.fastest_settled(self.k) * (1.0 + SETTLED));
-        let entry = way.from - self.train.reach[0].as_m();
-        let enters = told.reaches(model, entry, self.now, self.k);
+        let enters = told.reaches(model, self.entry(&slow.way), self.now, self.k);
         enters.is_none_or(|enters| told.fastest_from(model, enters, self.k) <= limit)
     }
 
+    /// Where it is when its front comes to a way.
+    fn entry(&self, way: &RestrictedWay<'_>) -> f64 {
+        way.from - self.train.reach[0].as_m()
+    }
+
     /// The fastest step below one that may be told now; the slowest that moves it where none may.
-    fn fastest_below(&self, ways: &[RestrictedWay<'_>], step: SpeedStep) -> SpeedStep {
+    fn fastest_below(&self, ways: &[Slow<'_>], step: SpeedStep) -> SpeedStep {
         let below = self.usable.partition_point(|usable| *usable < step);
         let below = self.usable.get(..below).unwrap_or_default();
-        let may = below.partition_point(|usable| self.forbids(ways, *usable, UNDONE, 1.0).is_none()).max(1);
+        let may = below.partition_point(|usable| self.forbids(ways, *usable, UNDONE).is_none()).max(1);
         below.get(may - 1).copied().unwrap_or(step)
     }
 
     /// When a slower step has to leave at the latest, and for which zone; at once for a zone that it may be in.
-    fn slow_down_by<'g>(&self, ways: &[RestrictedWay<'g>], told: SpeedStep) -> Option<(Timestamp, &'g Zone)> {
-        let [front, _] = self.ends();
+    fn slow_down_by<'g>(&self, ways: &[Slow<'g>], told: SpeedStep) -> Option<(Timestamp, &'g Zone)> {
         let model = &self.train.model;
         let mut here = self.here;
         here.tell(model, self.start(), told);
-        let by = |way: &RestrictedWay<'g>| {
-            let limit = way.zone.limit.as_m_per_s();
-            let slow = self.within(limit);
-            if told <= slow {
+        let by = |slow: &Slow<'g>| {
+            if told <= slow.step {
                 return None;
             }
-            let is_in_time = |at: Timestamp| self.slows_for(here, way, (slow, at), limit);
-            if way.from <= front || !is_in_time(self.start()) {
-                return Some((self.start(), way.zone));
+            let is_in_time = |at: Timestamp| self.slows_for(here, slow, at);
+            if self.may_be_on(&slow.way) || !is_in_time(self.start()) {
+                return Some((self.start(), slow.way.zone));
             }
-            let entry = way.from - self.train.reach[0].as_m();
+            let entry = self.entry(&slow.way);
             let mut late = here.after_all(model).reaches(model, entry, self.start(), self.k)?;
             let mut in_time = self.start();
             for _ in 0..HALVINGS {
                 let middle = in_time + TimeSpan::from_s(0.5 * (late - in_time).as_s());
                 if is_in_time(middle) { in_time = middle } else { late = middle }
             }
-            Some((in_time, way.zone))
+            Some((in_time, slow.way.zone))
         };
         ways.iter().filter_map(by).min_by_key(|(at, _)| *at)
     }
 
     /// When its rear end will have left the first of the zones that it may be in.
-    fn leaves(&self, ways: &[RestrictedWay<'_>]) -> Option<Timestamp> {
-        let [front, _] = self.ends();
+    fn leaves(&self, ways: &[Slow<'_>]) -> Option<Timestamp> {
         let model = &self.train.model;
         let after = self.here.after_all(model);
-        let left = ways
-            .iter()
-            .filter(|way| way.from <= front && way.to.is_finite())
-            .filter_map(|way| after.reaches(model, way.to + self.train.reach[1].as_m(), self.now, -self.k));
-        left.min()
+        let on = ways.iter().filter(|slow| self.may_be_on(&slow.way) && slow.way.to.is_finite());
+        let left = |slow: &Slow<'_>| {
+            after.reaches(model, slow.way.to + self.train.reach[1].as_m(), self.now, -self.k)
+        };
+        on.filter_map(left).min()
     }
 }

@@ -217,7 +217,9 @@ impl DrivenTrain {
             return planned(unhurried, now + waits).ok_or(Refusal::Lost { train: self.id() });
         }
         // One step and the stop: what takes the least time, or all of it.
-        let runs = means.last.iter().filter(|last| may_start(&last.step)).filter_map(|last| {
+        let slowest = self.restricted_until(ground, now, at).into_iter().map(|(_, step)| step).min();
+        let may_run = |step: SpeedStep| may_start(&step) && slowest.is_none_or(|slowest| step <= slowest);
+        let runs = means.last.iter().filter(|last| may_run(last.step)).filter_map(|last| {
             match self.short_run(ground, now, at, last.step, &destination) {
                 CommandTime::At(_, rest) => Some((last.step, rest.time - now, spread(&rest))),
                 _ => None,
