@@ -6,7 +6,6 @@ mod ride;
 
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::sync::atomic::Ordering;
 
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -22,8 +21,8 @@ use super::again::{FailedRun, name_failed};
 use super::driving::choice::Choice;
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
-use crate::progress::with_progress;
-use crate::spread::{all_cores, spread};
+use super::written_scores::ScoreForm;
+use crate::spread::each;
 
 /// Let calibrated trains run, stop, hold speeds, arrive in time and follow each other over speed restrictions, and score their true speeds there.
 ///
@@ -40,12 +39,8 @@ pub(super) struct Arguments {
     /// Track time that each calibration may take, in seconds.
     #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
     budget: u16,
-    /// Write the scores as a page of the documentation.
-    #[arg(long, conflicts_with = "json")]
-    markdown: bool,
-    /// Write the scores as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    form: ScoreForm,
     /// How many seeds at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -70,24 +65,11 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let seeds: Vec<u64> = self.seeds.iter().collect();
         let budget = TimeSpan::from_s(f64::from(self.budget));
-        let threads = self.threads.unwrap_or_else(all_cores);
-        let scored = with_progress("zones", seeds.len(), |done| {
-            spread(seeds.len(), threads, |at| {
-                let scored = score(&layout, seeds[at], budget);
-                done.fetch_add(1, Ordering::Relaxed);
-                scored
-            })
-        })?;
+        let scored = each("zones", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
-        if self.json {
-            page.write_json(output)?;
-        } else if self.markdown {
-            page.write_markdown(output)?;
-        } else {
-            page.write_text(output)?;
-        }
+        self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
-        Ok(if name_failed(&failed) { Outcome::FallsShort } else { Outcome::Done })
+        Ok(name_failed(&failed))
     }
 
     fn failure(&self, scored: &Scored) -> Option<FailedRun> {

@@ -8,6 +8,7 @@ use super::Scored;
 use super::passage::Passage;
 use super::ride::{Ridden, Told};
 use crate::commands::simulate::pacing::figures::{quantile, shown};
+use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
 # How well trains keep to speed restrictions
@@ -67,13 +68,12 @@ impl Figures {
     }
 }
 
-impl Page<'_> {
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
-        writeln!(output, "{HEAD}\nMade by `footplate simulate zones {}`.\n", self.asked)?;
-        self.write_text(output)
+impl WrittenScores for Page<'_> {
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate zones {}`.\n", self.asked)
     }
 
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{LEGEND}")?;
         writeln!(
             output,
@@ -108,11 +108,7 @@ impl Page<'_> {
         Ok(())
     }
 
-    fn rides(&self, told: Told) -> impl Iterator<Item = &Ridden> {
-        self.scored.iter().flat_map(|scored| &scored.rides).filter(move |ride| ride.told == told)
-    }
-
-    pub(super) fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
         let rides = self.scored.iter().flat_map(|scored| scored.rides.iter().map(move |ride| (scored, ride)));
         let rides = rides.map(|(scored, ride)| {
             let passages = ride.passages.iter().map(|passage| {
@@ -129,5 +125,11 @@ impl Page<'_> {
         });
         serde_json::to_writer_pretty(&mut *output, &json!({ "rides": rides.collect::<Vec<_>>() }))?;
         writeln!(output)
+    }
+}
+
+impl Page<'_> {
+    fn rides(&self, told: Told) -> impl Iterator<Item = &Ridden> {
+        self.scored.iter().flat_map(|scored| &scored.rides).filter(move |ride| ride.told == told)
     }
 }
