@@ -295,7 +295,9 @@ impl Dispatcher {
             let Some(seconds) = soonest else { continue };
             let held =
                 self.reserved(standing(layout, self.driver.turnouts(), place, &Trail::default(), room));
-            if !held.meets(&mover.held) {
+            // A little further on may be out of the way already, at the end of a siding; otherwise it would be no move.
+            let gets_out = wish.meets(&mover.held) && !wish.meets(&held);
+            if gets_out || !held.meets(&mover.held) {
                 let seconds = if is_clear { seconds } else { seconds + ON_TURNOUT_S };
                 places.push((wish.meets(&held), place, held, seconds));
             }
