@@ -2,7 +2,7 @@
 //! fast as it was told to be everywhere else.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Gap, Order, Refusal, StopOrder};
+use footplate_core::control::{DriveNotice, Driver, Gap, Machine, Order, Refusal, StopOrder};
 use footplate_core::track::Zone;
 use footplate_core::{Command, EdgeId, Length, Speed, SpeedStep, TimeSpan, TrainId};
 
@@ -242,4 +242,19 @@ fn a_limit_below_the_slowest_step_is_run_at_that() {
         driver.model(TRAIN).expect("known").uses(*step) == footplate_core::calibration::motion::StepUse::Moves
     });
     assert_eq!(Some(driver.told(TRAIN)), slowest);
+}
+
+#[test]
+fn nobody_is_woken_again_and_again_whether_or_not_there_are_zones() {
+    for mut world in [restricted(), ToyRailway::new(24, "D1", 300.0)] {
+        let mut driver = driver_of(&world, "D1", 300.0);
+        driver.order(world.now, Order::Speed { train: TRAIN, step: step(12) }).expect("a step");
+        for _ in 0..1_500 {
+            world.run(&mut driver, 0.02);
+            // Whatever was due has been done: the next time lies ahead.
+            driver.handle_timeout(world.now);
+            world.listen(&mut driver);
+            assert!(driver.next_timeout().is_none_or(|at| at > world.now), "{:?}", driver.next_timeout());
+        }
+    }
 }

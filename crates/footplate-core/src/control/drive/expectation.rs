@@ -79,7 +79,7 @@ impl DrivenTrain {
         let due = self.locator.next_contact(ground, &self.model, now);
         let end = self.end_of_track(ground, now);
         let limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
-        self.look_at_zones(now);
+        self.look_at_zones(ground, now);
         // What was missed is not forgotten because something was commanded.
         self.expected = Expectation { due, since: now, overdue_said: false, end, limit, ..self.expected };
     }

@@ -96,9 +96,9 @@ impl DrivenTrain {
         self.restraint.look.filter(|_| self.told > SpeedStep::STAND)
     }
 
-    /// Something is known anew, or the train was told something.
-    pub(super) const fn look_at_zones(&mut self, now: Timestamp) {
-        self.restraint.look = Some(now);
+    /// Something is known anew, or the train was told something. Where nothing is restricted nobody looks.
+    pub(super) fn look_at_zones(&mut self, ground: Ground<'_>, now: Timestamp) {
+        self.restraint.look = (!ground.layout.zones().is_empty()).then_some(now);
     }
 
     /// Whether it has been told a slower step than it was asked to run at.
@@ -141,7 +141,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) -> SpeedStep {
         self.restraint.wanted = None;
-        self.restraint.look = Some(now);
+        self.look_at_zones(ground, now);
         if step == SpeedStep::STAND || ground.layout.zones().is_empty() {
             return step;
         }
