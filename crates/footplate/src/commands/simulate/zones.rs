@@ -51,8 +51,8 @@ const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
 const ZONES: usize = 2;
 /// ... each of edges next to each other of at least so many mm, ...
 const LONG_ENOUGH: f64 = 250.0;
-/// ... with limits between these (mm/s): faster than any train crawls, slower than any runs.
-const LIMITS: [f64; 2] = [130.0, 260.0];
+/// ... with limits between these (mm/s): faster than the slowest step of most trains, slower than any runs.
+const LIMITS: [f64; 2] = [170.0, 280.0];
 
 /// All of one seed.
 struct Scored {

@@ -14,7 +14,7 @@ const HEAD: &str = "\
 # How well trains keep to speed restrictions
 
 Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. For each of them two
-stretches of 25 cm and more of its way round are restricted to 130 to 260 mm/s, and it is told for two minutes each to run at a step
+stretches of 25 cm and more of its way round are restricted to 170 to 280 mm/s, and it is told for two minutes each to run at a step
 (300 to 450 mm/s), to stop at one place after the other, to hold a speed (300 to 450 mm/s), to arrive at places in time, and to follow
 another train. The simulator shares no formula with what drives, and its truth is used for these figures alone.
 ";

@@ -200,6 +200,9 @@ impl Ride<'_, '_> {
                     Err(Refusal::TooSoon { earliest, .. }) => {
                         self.driver.order(now, arrive(TimeSpan::from_s(earliest.as_s() * OFFERED)))
                     }
+                    Err(Refusal::TooSlow { latest, .. }) => {
+                        self.driver.order(now, arrive(TimeSpan::from_s(latest.as_s() / OFFERED)))
+                    }
                     asked => asked,
                 }
             }
