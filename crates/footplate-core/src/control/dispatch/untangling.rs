@@ -30,14 +30,17 @@ struct Effort {
     moves: usize,
     /// Of all places for a train to step aside to, so many are tried, the soonest reached.
     places: usize,
+    /// Whether a train may step aside to where it partly stands or may stand already: to come by a contact, after which it
+    /// holds less.
+    near: bool,
     /// Of all scenes after a move that does not help by itself, so many are looked at further.
     kept: usize,
 }
 
 /// While others run: a few milliseconds.
-const USUAL: Effort = Effort { tried: 150, moves: 2, places: 6, kept: 4 };
+const USUAL: Effort = Effort { tried: 150, moves: 2, places: 6, near: false, kept: 4 };
 /// When nobody runs, and nobody would for ever: a tenth of a second does not matter.
-const THOROUGH: Effort = Effort { tried: 1_500, moves: 4, places: 12, kept: 16 };
+const THOROUGH: Effort = Effort { tried: 1_500, moves: 4, places: 12, near: true, kept: 16 };
 /// What was tried in vain is not tried again for so long.
 const IN_VAIN: TimeSpan = TimeSpan::from_s(6.0);
 
@@ -137,6 +140,8 @@ impl Dispatcher {
                 return;
             }
             self.thought = Some(now);
+            // More room than usual to come to rest in is not worth standing for ever.
+            self.trains.values_mut().for_each(|train| train.caution = 1.0);
         }
         let ready: Vec<TrainId> =
             self.trains.values().filter(|train| train.is_ready(now)).map(|train| train.id).collect();
@@ -231,7 +236,7 @@ impl Dispatcher {
                     if !is_in_the_way && scenes.len() == 1 && best.is_some() {
                         continue;
                     }
-                    for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish, effort.places) {
+                    for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish, effort) {
                         if !is_fixed_free(&held) {
                             continue;
                         }
@@ -275,7 +280,7 @@ impl Dispatcher {
         nth: usize,
         fixed: &Obstacles,
         wish: &Proposal,
-        places_tried: usize,
+        effort: Effort,
     ) -> Vec<(Position, Footprint, f64)> {
         let Some(mover) = scene.standers.get(nth) else { return Vec::new() };
         let Some(start) = self.hypothetical(now, mover) else { return Vec::new() };
@@ -297,7 +302,7 @@ impl Dispatcher {
                 self.reserved(standing(layout, self.driver.turnouts(), place, &Trail::default(), room));
             // A little further on may be out of the way already, at the end of a siding; otherwise it would be no move.
             let gets_out = wish.meets(&mover.held) && !wish.meets(&held);
-            if gets_out || !held.meets(&mover.held) {
+            if gets_out || effort.near || !held.meets(&mover.held) {
                 let seconds = if is_clear { seconds } else { seconds + ON_TURNOUT_S };
                 places.push((wish.meets(&held), place, held, seconds));
             }
@@ -312,7 +317,7 @@ impl Dispatcher {
             own.for_each(|need| held.take_turnout(layout, need.turnout));
             others().all(|other| !proposal.meets(&other.held)).then_some((place, held, seconds))
         };
-        places.into_iter().filter_map(can_go).take(places_tried).collect()
+        places.into_iter().filter_map(can_go).take(effort.places).collect()
     }
 
     /// How long a train takes to its destination in a scene; `None` if it cannot go there.
