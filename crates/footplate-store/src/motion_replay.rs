@@ -26,6 +26,10 @@ use crate::store::{KeptReplay, Store, StoreError};
 /// train stood, and so on how fast it is known to stop.
 const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 
+/// A train that runs and is told one step more when no contact and no command has been for so long was pushed: it had not come
+/// where it should, and the calibration took it for stuck. No trip of an experiment takes as long between two of either.
+const PUSHED_AFTER: TimeSpan = TimeSpan::from_ms(4_000);
+
 /// What sessions told of one train.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MotionReplay {
@@ -137,6 +141,7 @@ impl MotionReplay {
 
     fn take(&mut self, layout: &Layout, sections: &SectionIndex, recording: &str, run: &Run) {
         let mut fitted: Option<Timestamp> = None;
+        let (mut told, mut last, mut is_pushed) = (SpeedStep::STAND, Timestamp::ZERO, false);
         let moving: Vec<TrainId> = run.moving().iter().map(|at_start| at_start.train).collect();
         let train = self.fit.model().train();
         self.fit.interrupt();
@@ -162,6 +167,17 @@ impl MotionReplay {
                     fitted = Some(raw.event.time);
                     self.fit.refit(sections);
                 }
+                match raw.event.kind {
+                    EventKind::Speed { step, .. } => {
+                        let is_one_more = told > SpeedStep::STAND && step.get() == told.get() + 1;
+                        is_pushed |= is_one_more && raw.event.time - last >= PUSHED_AFTER;
+                        told = step;
+                    }
+                    // How long it was stuck says nothing of how it starts and runs.
+                    EventKind::Sensor(_) if core::mem::take(&mut is_pushed) => self.fit.interrupt(),
+                    _ => {}
+                }
+                last = raw.event.time;
                 self.fit.take(layout, &self.turnouts, &raw.event);
                 self.events += 1;
                 let at = run.began_at.map(|began_at| began_at + (raw.event.time - Timestamp::ZERO));

@@ -203,6 +203,35 @@ fn store_that_knows(name: &str, link: &str, trains: &[&str]) -> String {
 }
 
 #[test]
+fn two_trains_whose_ways_cross_are_sent_at_once_and_both_arrive() {
+    let link = "sim:track-a?seed=7&faults=none&trains=24,58";
+    let store = store_that_knows("crossing-store", link, &["24", "58"]);
+    // While it learns, train 24 gets stuck once; that it was pushed says nothing of how it starts.
+    // Each is found, one after the other; then both are sent over the same necks at once, and again.
+    let finds = |train: u16| {
+        format!("speed {train} 9\nwait {train} located\nwait 15s\nstop {train}\nwait {train} at rest\n")
+    };
+    let script = format!(
+        "turnout all straight\nlength 24 pickup 45mm overhang 110mm\nlength 58 pickup 45mm overhang 110mm\n{}{}\
+         go 24 to E7+200mm\ngo 58 to B5+100mm\nwait 24 at rest\nwait 58 at rest\ngo 24 to A4+100mm\ngo 58 to C6+200mm\n",
+        finds(24),
+        finds(58)
+    );
+    let run = drive("crossing", link, &script, &["--json", "--store", &store]);
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    let lines = lines(&run);
+    let went: Vec<_> = lines.iter().filter(|line| line["command"] == "go").collect();
+    assert_eq!(went.len(), 4, "{}", run.output);
+    for line in went {
+        let truth = line["true_error_mm"].as_f64().expect("it arrived");
+        // Calibrated for two and a half minutes; a train that was stopped for its limit near its place has arrived, too.
+        assert!(truth.abs() < 120.0, "{line}");
+    }
+    assert!(run.errors.contains("waits for track that is held by train"), "{}", run.errors);
+    assert!(run.errors.contains("train 24 reaches 110 mm ahead"), "{}", run.errors);
+}
+
+#[test]
 fn whoever_is_stopped_before_track_of_another_is_told_whose_it_is() {
     let link = "sim:track-a?seed=7&faults=none&trains=24,58";
     let store = store_that_knows("holder-store", link, &["24", "58"]);
