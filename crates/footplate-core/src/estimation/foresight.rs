@@ -3,7 +3,7 @@
 //! [`Outlook`](super::Outlook) says what is most likely, thousands of times; this says what is to be reckoned with. `k` is
 //! everywhere the number of standard deviations that are allowed for.
 
-use crate::calibration::motion::{Following, Guess, MotionModel};
+use crate::calibration::motion::{FELT, Following, Guess, MotionModel};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
 
@@ -84,16 +84,30 @@ impl Foresight {
         Some(from + TimeSpan::from_s(high))
     }
 
+    /// By which part it is at a time faster than what it was told will have it, negative for a train that gets faster.
+    pub(crate) fn unsettled(&self, model: &MotionModel, at: Timestamp) -> f64 {
+        let now = self.following.speed(model, (at - self.epoch).as_s()).mean;
+        let settled = self.after_all(model).following.settled_speed().mean;
+        if settled > 0.0 { now / settled - 1.0 } else { now }
+    }
+
     /// How fast (m/s) it may be at a time and from then on, the change under way done or not.
     pub(crate) fn fastest_from(&self, model: &MotionModel, at: Timestamp, k: f64) -> f64 {
-        let now = bound(self.following.changing_speed(model, (at - self.epoch).as_s()), k);
+        let now = local(self.following.changing_speed(model, (at - self.epoch).as_s()), k);
         now.max(self.fastest_settled(k))
     }
 
     /// How fast (m/s) it may run once all changes are done, of a foresight [`after_all`](Self::after_all).
     pub(crate) fn fastest_settled(&self, k: f64) -> f64 {
-        bound(self.following.settled_speed(), k)
+        local(self.following.settled_speed(), k)
     }
+}
+
+/// The bound of a speed on any single stretch: a model knows speeds as means of whole hops in the train's own measure, and a
+/// stretch of rail is felt shorter or longer than that by what hops are.
+fn local(of: Guess, k: f64) -> f64 {
+    let felt = FELT * of.mean;
+    bound(Guess { variance: of.variance + felt * felt, ..of }, k)
 }
 
 fn bound(of: Guess, k: f64) -> f64 {

@@ -186,11 +186,16 @@ impl Following {
         later
     }
 
-    /// Its speed (m/s) at a time, with what no shape of a change is true to.
+    /// Its speed (m/s) at a time, with what no shape of a change is true to and what a start that is late or early makes of it.
     pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Guess {
         let speed = self.speed(model, time);
-        let shape = self.at(model, time).shape_speed_error(time);
-        Guess { variance: speed.variance + shape * shape, ..speed }
+        let later = self.at(model, time);
+        let shape = later.shape_speed_error(time);
+        let lateness = libm::sqrt(later.p[H][H]);
+        let late = time - later.course.x[H];
+        let [before, after] = [late - lateness, late + lateness].map(|late| later.course.segment.speed(late));
+        let start = 0.5 * (after - before);
+        Guess { variance: speed.variance + shape * shape + start * start, ..speed }
     }
 
     /// The speed (m/s) to which the change under way leads.

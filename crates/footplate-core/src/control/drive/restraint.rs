@@ -17,7 +17,7 @@ use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Zone;
-use crate::units::{Length, Ratio};
+use crate::units::{Length, Ratio, Speed};
 
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
@@ -67,6 +67,10 @@ struct Prospect<'t> {
     now: Timestamp,
     usable: Vec<SpeedStep>,
     k: f64,
+    /// Whether it is still faster than the step told last will have it, ...
+    slows_down: bool,
+    /// ... or slower, or one of the two.
+    changes: bool,
     /// Where its front may be and where its rear may still be (m past the contact).
     ends: [f64; 2],
 }
@@ -170,8 +174,20 @@ impl DrivenTrain {
     ) -> (SpeedStep, Option<&'g Zone>) {
         let prospect = Prospect::of(self, now);
         let ways = prospect.ways(ground, step);
+        // Who slows down for a zone is told nothing faster until it has: what came of a change and its opposite within a moment
+        // nobody could say.
+        if prospect.slows_down
+            && step > self.told
+            && self.told > SpeedStep::STAND
+            && let Some(slow) = ways.iter().find(|slow| step > slow.step)
+        {
+            let told = prospect.forbids(&ways, self.told, UNDONE);
+            let step =
+                if told.is_some() { prospect.fastest_below(&ways, self.told, UNDONE) } else { self.told };
+            return (step, Some(slow.way.zone));
+        }
         let Some(zone) = prospect.forbids(&ways, step, UNDONE) else { return (step, None) };
-        (prospect.fastest_below(&ways, step), Some(zone))
+        (prospect.fastest_below(&ways, step, UNDONE), Some(zone))
     }
 
     /// Slows down for what is ahead, and gets faster where nothing restricts it any more.
@@ -182,14 +198,15 @@ impl DrivenTrain {
         let ways = prospect.ways(ground, wanted.unwrap_or(told));
         let by = prospect.slow_down_by(&ways, told);
         let due = by.filter(|(by, _)| *by <= prospect.start() + TICK);
-        let slower = due.map(|(_, zone)| (prospect.fastest_below(&ways, told), zone));
+        let slower = due.map(|(_, zone)| (prospect.fastest_below(&ways, told, WORTHWHILE), zone));
         let slower = slower.filter(|(step, _)| *step < told);
         let leaves = prospect.leaves(&ways);
         let faster = wanted.filter(|_| due.is_none()).and_then(|wanted| {
             let faster = prospect.usable.iter().rev().filter(|step| **step > told && **step <= wanted);
             let mut faster = faster.copied().chain(Some(wanted));
             faster.find(|step| {
-                prospect.forbids(&ways, *step, WORTHWHILE).is_none()
+                !prospect.slows_down
+                    && prospect.forbids(&ways, *step, WORTHWHILE).is_none()
                     && prospect.spares(&ways, *step)
                     && self.is_worth_it(ground, now, *step)
             })
@@ -233,7 +250,10 @@ impl<'t> Prospect<'t> {
         let here = train.locator.foresight();
         let [ahead, behind] = train.reach.map(Length::as_m);
         let ends = [here.place(&train.model, now, k) + ahead, here.place(&train.model, now, -k) - behind];
-        Self { train, here, now, usable: train.usable_steps(), k, ends }
+        let beyond = here.unsettled(&train.model, now + SOONEST);
+        let slows_down = train.told.get() < here.step() || beyond > SETTLED;
+        let changes = slows_down || train.told.get() != here.step() || beyond < -SETTLED;
+        Self { train, here, now, usable: train.usable_steps(), k, slows_down, changes, ends }
     }
 
     /// When a command can leave at the latest.
@@ -267,10 +287,22 @@ impl<'t> Prospect<'t> {
         let keeps = |step: &SpeedStep| {
             let mut told = self.here;
             told.tell(&self.train.model, self.start(), *step);
-            told.after_all(&self.train.model).fastest_settled(self.k) <= limit
+            let settled = told.after_all(&self.train.model).fastest_settled(self.k);
+            settled * self.gain_from_above(*step) <= limit
         };
         let within = self.usable.partition_point(keeps).max(1);
         self.usable.get(within - 1).copied().unwrap_or(SpeedStep::STAND)
+    }
+
+    /// By which factor it is faster at a step than if it came to it from below: a train that is told another step while
+    /// it still changes to the last one may come to it from above.
+    fn gain_from_above(&self, step: SpeedStep) -> f64 {
+        if !self.changes || step <= self.train.told {
+            return 1.0;
+        }
+        let [below, above] =
+            [Approach::Below, Approach::Above].map(|from| self.train.model.steady_speed(step, from));
+        if below > Speed::ZERO { (above / below).max(1.0) } else { 1.0 }
     }
 
     /// Whether it may be on a way already.
@@ -313,11 +345,12 @@ impl<'t> Prospect<'t> {
         way.from - self.train.reach[0].as_m()
     }
 
-    /// The fastest step below one that may be told now; the slowest that moves it where none may.
-    fn fastest_below(&self, ways: &[Slow<'_>], step: SpeedStep) -> SpeedStep {
+    /// The fastest step below one that may be told now if a slower one follows so long after; the slowest that moves it where
+    /// none may.
+    fn fastest_below(&self, ways: &[Slow<'_>], step: SpeedStep, lasting: TimeSpan) -> SpeedStep {
         let below = self.usable.partition_point(|usable| *usable < step);
         let below = self.usable.get(..below).unwrap_or_default();
-        let may = below.partition_point(|usable| self.forbids(ways, *usable, UNDONE).is_none()).max(1);
+        let may = below.partition_point(|usable| self.forbids(ways, *usable, lasting).is_none()).max(1);
         below.get(may - 1).copied().unwrap_or(step)
     }
 
