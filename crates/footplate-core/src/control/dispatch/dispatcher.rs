@@ -232,10 +232,8 @@ impl Dispatcher {
             self.take_over(now, train)?;
         }
         let taken = self.driver.order(now, order);
-        if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken)
-            && let Some(train) = self.trains.get_mut(&train)
-        {
-            train.seen_since_turn = false;
+        if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken) {
+            self.note_turned(train);
         }
         self.settle(now);
         taken

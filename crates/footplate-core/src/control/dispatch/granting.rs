@@ -109,7 +109,7 @@ impl Dispatcher {
             let Some(unobstructed) = unobstructed else {
                 if self.driver.unseen(id, now).is_none() {
                     self.cannot_go(now, id, self.no_way(id));
-                } else if !self.looks_back(id) {
+                } else if !self.begins_to_look_back(id) {
                     self.lose(now, id);
                 }
                 continue;

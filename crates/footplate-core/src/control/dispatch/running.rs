@@ -60,10 +60,17 @@ impl Dispatcher {
         self.say(DispatchNotice::HeldAsUnknown { train: id });
     }
 
+    /// A train is turned around: nothing has reported it since.
+    pub(super) fn note_turned(&mut self, id: TrainId) {
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.seen_since_turn = false;
+        }
+    }
+
     /// A train was not seen where it should have been, and ahead of it there is no way: whether it is only now that it is
     /// looked for behind. The contact that reported it last will report it again then, wherever it stands in between. One
     /// that nothing has reported since it turned around may not have left at all: behind it, and not far, the track may end.
-    pub(super) fn looks_back(&mut self, id: TrainId) -> bool {
+    pub(super) fn begins_to_look_back(&mut self, id: TrainId) -> bool {
         let Some(train) = self.trains.get_mut(&id).filter(|train| train.seen_since_turn) else {
             return false;
         };
@@ -87,9 +94,7 @@ impl Dispatcher {
             match self.driver.order(now, turn) {
                 Ok(order) => {
                     self.set_state(id, State::Turning { order });
-                    if let Some(train) = self.trains.get_mut(&id) {
-                        train.seen_since_turn = false;
-                    }
+                    self.note_turned(id);
                 }
                 Err(why) => self.withdraw(now, id, Some(why)),
             }
