@@ -9,6 +9,7 @@ mod pacing;
 mod recording;
 mod rehearsal;
 mod seeds;
+mod series;
 mod station;
 mod traffic;
 mod truth;

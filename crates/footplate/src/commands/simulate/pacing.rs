@@ -9,14 +9,12 @@ mod page;
 mod tracked;
 
 use std::io::Write;
-use std::num::NonZeroUsize;
 
 use anyhow::ensure;
 use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;
-use footplate_store::layout_named;
 
 use self::arrive::{Arrived, arrive};
 use self::follow::{Followed, Kept, follow};
@@ -26,9 +24,8 @@ use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::driving::choice::Choice;
 use super::rehearsal::{Rehearsal, Way};
-use super::seeds::Seeds;
+use super::series::Series;
 use super::written_scores::ScoreForm;
-use crate::spread::each;
 
 /// Let calibrated trains hold speeds that none of their steps has, arrive in time and follow each other, and score them by the truth.
 ///
@@ -36,20 +33,10 @@ use crate::spread::each;
 #[derive(Args)]
 #[command(after_help = "Example: footplate simulate pacing --seeds 1..4 --markdown")]
 pub(super) struct Arguments {
-    /// The layout: the name of a built-in one or a layout file.
-    #[arg(long, default_value = "track-a")]
-    layout: String,
-    /// The seed of the trains, or of many: 1..30.
-    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
-    seeds: Seeds,
-    /// Track time that each calibration may take, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
-    budget: u16,
+    #[command(flatten)]
+    series: Series,
     #[command(flatten)]
     form: ScoreForm,
-    /// How many seeds at once; without it, as many as there are cores. The result is the same.
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
 }
 
 /// Three trains, in the order in which they would follow each other.
@@ -69,11 +56,8 @@ struct Scored {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = layout_named(&self.layout)?.layout;
-        let seeds: Vec<u64> = self.seeds.iter().collect();
-        let budget = TimeSpan::from_s(f64::from(self.budget));
-        let scored = each("pacing", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
-        let page = Page { scored: &scored, asked: self.asked() };
+        let scored = self.series.score("pacing", score)?;
+        let page = Page { scored: &scored, asked: self.series.asked() };
         self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
         Ok(name_failed(&failed))
@@ -82,24 +66,8 @@ impl Arguments {
     /// What the driver did not carry out, or trains came to grief over: how others drive them is no check of ours.
     fn failure(&self, scored: &Scored) -> Option<FailedRun> {
         let (train, trouble) = scored.troubles().next()?;
-        let again = format!("simulate pacing --seed {}{}", scored.seed, self.settings());
+        let again = self.series.again("pacing", scored.seed);
         Some(FailedRun { what: format!("seed {}, train {train}: {trouble}", scored.seed), again })
-    }
-
-    /// What was asked for, as on the command line.
-    fn asked(&self) -> String {
-        format!("--seeds {}{} --markdown", self.seeds.written(), self.settings())
-    }
-
-    fn settings(&self) -> String {
-        let mut settings = String::new();
-        if self.layout != "track-a" {
-            settings += &format!(" --layout {}", self.layout);
-        }
-        if self.budget != 300 {
-            settings += &format!(" --budget {}", self.budget);
-        }
-        settings
     }
 }
 

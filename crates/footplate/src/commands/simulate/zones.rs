@@ -5,14 +5,12 @@ mod passage;
 mod ride;
 
 use std::io::Write;
-use std::num::NonZeroUsize;
 
 use anyhow::{Context, ensure};
 use clap::Args;
 use footplate_core::track::{Layout, Zone};
 use footplate_core::{EdgeId, Length, Speed, StretchId, TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;
-use footplate_store::layout_named;
 
 use self::page::Page;
 use self::ride::{Ridden, Told, ride};
@@ -20,30 +18,19 @@ use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::driving::choice::Choice;
 use super::rehearsal::{Rehearsal, Way};
-use super::seeds::Seeds;
+use super::series::Series;
 use super::written_scores::ScoreForm;
-use crate::spread::each;
 
 /// Let calibrated trains run, stop, hold speeds, arrive in time and follow each other over speed restrictions, and score their true speeds there.
 ///
-/// Each seed is a layout with three trains and other restrictions for each of them.
+/// Each seed is a layout with three trains and other restrictions for each of them; zones of its own are not heeded.
 #[derive(Args)]
 #[command(after_help = "Example: footplate simulate zones --seeds 1..4 --markdown")]
 pub(super) struct Arguments {
-    /// The layout: the name of a built-in one or a layout file. Its own zones are not heeded.
-    #[arg(long, default_value = "track-a")]
-    layout: String,
-    /// The seed of the trains and zones, or of many: 1..30.
-    #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
-    seeds: Seeds,
-    /// Track time that each calibration may take, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u16).range(30..=3600))]
-    budget: u16,
+    #[command(flatten)]
+    series: Series,
     #[command(flatten)]
     form: ScoreForm,
-    /// How many seeds at once; without it, as many as there are cores. The result is the same.
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
 }
 
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
@@ -62,11 +49,8 @@ struct Scored {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = layout_named(&self.layout)?.layout;
-        let seeds: Vec<u64> = self.seeds.iter().collect();
-        let budget = TimeSpan::from_s(f64::from(self.budget));
-        let scored = each("zones", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
-        let page = Page { scored: &scored, asked: self.asked() };
+        let scored = self.series.score("zones", score)?;
+        let page = Page { scored: &scored, asked: self.series.asked() };
         self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
         Ok(name_failed(&failed))
@@ -75,24 +59,8 @@ impl Arguments {
     fn failure(&self, scored: &Scored) -> Option<FailedRun> {
         let found = scored.rides.iter().find_map(|ride| Some((ride, ride.trouble.as_ref()?)));
         let (ride, trouble) = found?;
-        let again = format!("simulate zones --seed {}{}", scored.seed, self.settings());
+        let again = self.series.again("zones", scored.seed);
         Some(FailedRun { what: format!("seed {}, train {}: {trouble}", scored.seed, ride.train), again })
-    }
-
-    /// What was asked for, as on the command line.
-    fn asked(&self) -> String {
-        format!("--seeds {}{} --markdown", self.seeds.written(), self.settings())
-    }
-
-    fn settings(&self) -> String {
-        let mut settings = String::new();
-        if self.layout != "track-a" {
-            settings += &format!(" --layout {}", self.layout);
-        }
-        if self.budget != 300 {
-            settings += &format!(" --budget {}", self.budget);
-        }
-        settings
     }
 }
 
