@@ -249,6 +249,10 @@ impl Locator {
             let place = Guess { variance: reach.length.variance + scatter, ..reach.length };
             self.following.pass(model, time, window.variance_s2(), place);
             self.following.shift(-reach.length.mean, 0.0);
+            // Where it is the contact says all the same: what was believed is off by more than it said of itself.
+            self.following.doubt_place(short.mean * short.mean);
+            let here = Guess { mean: 0.0, variance: scatter };
+            self.following.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);

@@ -138,6 +138,32 @@ fn dirty_wheels_are_noticed_measured_and_made_up_for() {
 }
 
 #[test]
+fn a_train_that_was_held_up_is_looked_at_even_if_it_runs_on_as_before() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(20.0);
+    // Somebody had it in hand for a moment; another engine may stand there now.
+    watched.world.trains[0].wheels = 0.0;
+    watched.run(1.5);
+    watched.world.trains[0].wheels = 1.0;
+    assert!(watched.run_until(10.0, |watched| watched.alarm().is_some()), "{:#?}", watched.said);
+    assert!(matches!(watched.alarm(), Some(Alarm::Untimely(_))), "{:?}", watched.alarm());
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
+}
+
+#[test]
+fn a_late_start_is_no_disaster() {
+    let mut watched = Watched::one();
+    watched.world.trains[0].wheels = 0.0;
+    watched.go(FIRST, 9);
+    watched.run(1.5);
+    watched.world.trains[0].wheels = 1.0;
+    watched.run(40.0);
+    assert_eq!(watched.alarm(), None, "{:#?}", watched.said);
+}
+
+#[test]
 fn what_could_meet_a_train_in_danger_is_held_and_goes_on_when_it_is_over() {
     let mut watched = Watched::two();
     watched.go(FIRST, 8);

@@ -118,6 +118,7 @@ export const ENGLISH = {
   "alarm-stands-faster": "told to stand: it has become faster than it was",
   "alarm-stands-lost": "told to stand: it is lost",
   "alarm-stands-elsewhere": "told to stand: it has turned up where it cannot have run to",
+  "alarm-stands-untimely": "told to stand: it has come to a contact when it cannot have run there by itself",
   "alarm-stands-misses": "told to stand: one contact after the other has not reported it",
   "alarm-stands-silent": "told to stand: the station does not answer",
   "alarm-stands-unconfirmed": "it could not be told to stop",

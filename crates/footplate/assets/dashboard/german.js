@@ -118,6 +118,7 @@ export const GERMAN = {
   "alarm-stands-faster": "zum Stehen angewiesen: er ist schneller geworden als er war",
   "alarm-stands-lost": "zum Stehen angewiesen: er ist verloren",
   "alarm-stands-elsewhere": "zum Stehen angewiesen: er ist aufgetaucht, wohin er nicht gefahren sein kann",
+  "alarm-stands-untimely": "zum Stehen angewiesen: er kam an einen Kontakt, als er von selbst nicht dort sein konnte",
   "alarm-stands-misses": "zum Stehen angewiesen: ein Kontakt nach dem anderen hat ihn nicht gemeldet",
   "alarm-stands-silent": "zum Stehen angewiesen: die Zentrale antwortet nicht",
   "alarm-stands-unconfirmed": "er konnte nicht zum Halten angewiesen werden",

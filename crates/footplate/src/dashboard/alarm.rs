@@ -200,6 +200,7 @@ const fn told_to_stand(why: Noticed) -> &'static str {
         Noticed::Drift(Drift::Faster) => "stands-faster",
         Noticed::Lost => "stands-lost",
         Noticed::Elsewhere(_) => "stands-elsewhere",
+        Noticed::Untimely(_) => "stands-untimely",
         Noticed::Misses => "stands-misses",
         Noticed::LinkSilent => "stands-silent",
         Noticed::StopUnconfirmed => "stands-unconfirmed",

@@ -19,7 +19,8 @@ use crate::link::{
     station,
 };
 
-const TIMES: f64 = 50.0;
+/// So many times real time: a reply may take a tenth of a second of track time, and the machine be busy for a hundredth of one.
+const TIMES: f64 = 10.0;
 
 /// A station in a thread.
 struct Standing {
@@ -86,11 +87,11 @@ fn reports(machine: &Runs) -> usize {
 fn trains_run_over_a_network_as_they_do_in_process() {
     let mut standing = Standing::at_a_port();
     let mut runtime = connected(&standing.place);
-    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(60.0), Vec::new()));
+    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(30.0), Vec::new()));
     let ended = runtime.run(&mut machine, &mut until).expect("nothing is written down");
     assert!(matches!(ended, Ended::Finished), "{ended}");
     assert!(runtime.close().is_complete());
-    // Time for the last bytes, at fifty times real time.
+    // Time for the last bytes, at ten times real time.
     std::thread::sleep(std::time::Duration::from_millis(50));
     let seen = standing.end();
     assert!(reports(&machine) > 5, "{} reports, {:?}", reports(&machine), until.1);
@@ -106,7 +107,7 @@ fn a_pseudo_terminal_is_spoken_to_by_the_clock() {
     let mut standing = Standing::serve(path, incoming);
     let mut runtime = connected(&standing.place);
     assert_eq!(runtime.link().cts(), None, "it has no hand-shake that could be read");
-    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(40.0), Vec::new()));
+    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(25.0), Vec::new()));
     runtime.run(&mut machine, &mut until).expect("nothing is written down");
     runtime.close();
     std::thread::sleep(std::time::Duration::from_millis(50));
@@ -205,7 +206,7 @@ fn noise_on_the_way_is_noticed_and_trains_can_still_be_stopped() {
     let mut standing = Standing::at_a_port();
     let place = noisy(&standing.place, 97);
     let mut runtime = connected(&place);
-    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(60.0), Vec::new()));
+    let (mut machine, mut until) = (Runs::two(), Until(Timestamp::from_s(30.0), Vec::new()));
     let ended = runtime.run(&mut machine, &mut until).expect("nothing is written down");
     assert!(matches!(ended, Ended::Finished), "{ended}");
     assert!(runtime.close().is_complete());

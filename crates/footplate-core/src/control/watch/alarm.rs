@@ -15,6 +15,8 @@ pub enum Alarm {
     Lost,
     /// The train came to a contact where it cannot have run to.
     Elsewhere(SensorId),
+    /// The train came to a contact so early or so late that something was done to it on the way there.
+    Untimely(SensorId),
     /// One contact after the other did not report the train.
     Misses,
     /// The station does not answer.
@@ -34,6 +36,7 @@ impl fmt::Display for Alarm {
             Self::Drift(Drift::Faster) => "it has become faster than it was",
             Self::Lost => "it is lost",
             Self::Elsewhere(_) => "it has turned up where it cannot have run to",
+            Self::Untimely(_) => "it has come to a contact when it cannot have run there by itself",
             Self::Misses => "one contact after the other has not reported it",
             Self::LinkSilent => "the station does not answer",
             Self::StopUnconfirmed => "it could not be told to stop",

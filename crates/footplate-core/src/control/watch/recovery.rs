@@ -15,9 +15,9 @@ use super::notice::{Outcome, WatchdogNotice};
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 
-/// How far a train may be off its model in speed and stops until it has been measured again (chosen: engines of a course
-/// differ by up to a half; two standard deviations are that and more).
-pub(super) const DOUBTED: f64 = 0.3;
+/// How far a train may be off its model in speed and stops until it has been measured again, as ln: engines differ by up to
+/// a half in the middle of their speeds, but at the step where one of them barely crawls another runs three times as fast.
+pub(super) const DOUBTED: f64 = 0.8;
 /// A train that is still believed to be about where it was may be this far off after an unforeseen stop.
 const ABOUT: Length = Length::from_mm(150.0);
 /// A crawl that meets no contact is pushed up a step after this: the longest known hop, 1.5 m, at 110 mm/s.

@@ -15,12 +15,19 @@ const WILD: f64 = 6.0;
 const WILD_PART: f64 = 0.08;
 /// ... and so many in a row are a disaster, whatever sums may say.
 const WILD_IN_A_ROW: u8 = 2;
+/// A train that ran all the way is as surely not as it was if one contact is off by so many standard deviations ...
+const UNTIMELY: f64 = 8.0;
+/// ... and this part of its time, even if it runs on as before: another engine under the number may be as fast, a train
+/// that was lifted may come to the same contact.
+const UNTIMELY_PART: f64 = 0.2;
 /// Misses less what was seen in between, from which on a train is not followed any more.
 const MOST_MISSES: usize = 4;
 
 /// What is remembered of a train from contact to contact.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Vigil {
+    /// It was told to run since it stood, and has come to no contact yet: from rest, trains are late that are as they were.
+    starts: bool,
     drift: DriftTest,
     wild: u8,
     misses: usize,
@@ -31,7 +38,12 @@ pub(super) struct Vigil {
 impl Vigil {
     /// Somebody knows where it is.
     pub(super) fn place(&mut self) {
-        *self = Self { is_located: true, ..Self::default() };
+        *self = Self { starts: true, is_located: true, ..Self::default() };
+    }
+
+    /// It was told to stand: what comes next is a start.
+    pub(super) const fn stand(&mut self) {
+        self.starts = true;
     }
 
     /// Nobody does.
@@ -42,6 +54,7 @@ impl Vigil {
     /// A contact that it passed. What is unusual about it, if anything.
     pub(super) fn pass(&mut self, passed: &PassedContact) -> Option<Alarm> {
         let before = self.last.replace(passed.window.until);
+        let started = core::mem::take(&mut self.starts);
         let was_located = core::mem::replace(&mut self.is_located, true);
         let Some([late, deviation]) = passed.late else {
             self.wild = 0;
@@ -62,6 +75,10 @@ impl Vigil {
             self.wild = 0;
             let drift = if standardised > 0.0 { Drift::Slower } else { Drift::Faster };
             return Some(Alarm::Drift(drift));
+        }
+        let is_untimely = standardised.abs() >= UNTIMELY && late.as_s().abs() >= UNTIMELY_PART * took;
+        if is_untimely && !started {
+            return Some(Alarm::Untimely(passed.sensor));
         }
         drift.map(Alarm::Drift)
     }

@@ -432,6 +432,7 @@ impl Machine for Watchdog {
             if step == SpeedStep::STAND {
                 let stands = self.stands_by(train, event.time);
                 self.stops.left(train, stands);
+                self.vigils.entry(train).or_default().stand();
             } else {
                 self.stops.forget(train);
             }
