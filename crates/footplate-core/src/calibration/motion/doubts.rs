@@ -81,7 +81,7 @@ impl MotionModel {
     }
 
     /// The step whose speed is nearest; 0 for standstill.
-    fn step_near(&self, speed: f64) -> u8 {
+    pub(super) fn step_near(&self, speed: f64) -> u8 {
         let answers = self.answers();
         let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();
         (0..=self.highest().get()).min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(0)

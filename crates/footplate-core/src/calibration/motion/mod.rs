@@ -23,6 +23,7 @@ mod rows;
 mod scatter;
 mod segment;
 mod spread;
+mod standing_times;
 mod trip;
 mod unknowns;
 
@@ -35,3 +36,4 @@ pub use objective::Objective;
 pub(crate) use priors::FELT;
 pub use prospect::Prospect;
 pub use rescaled::{MeasuredRatio, Rescaling};
+pub(crate) use standing_times::StandingTimes;

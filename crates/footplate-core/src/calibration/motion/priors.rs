@@ -167,7 +167,7 @@ fn add_nodes(equations: &mut Priors, first: usize) {
     clippy::needless_range_loop,
     reason = "indices stay below the number of nodes"
 )]
-fn whitened() -> [[f64; NODES]; NODES] {
+pub(super) fn whitened() -> [[f64; NODES]; NODES] {
     let mut root = [[0.0; NODES]; NODES];
     for i in 0..NODES {
         for j in 0..=i {

@@ -304,6 +304,7 @@ impl DrivenTrain {
                     let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
                     self.task = Some(Task { goal, ..task });
                     self.plan(ground, now, out);
+                    self.keep_time(ground, now, out);
                 }
                 None => self.give_up(now, self.no_way(ground, node, &destination), out),
             },

@@ -46,7 +46,7 @@ impl DrivenTrain {
             aim: stop.aim,
             step: stop.step,
             next_round: stop.next_round,
-            in_time: false,
+            in_time: None,
         };
         ground.layout.locate(stop.target, ground.turnouts).map_err(Refusal::Place)?;
         let stands = self.stands(ground, now);
@@ -119,7 +119,7 @@ impl DrivenTrain {
             aim: Aim::Median,
             step: None,
             next_round: false,
-            in_time: false,
+            in_time: None,
         };
         self.head_for(ground, now, order, &located, destination, true, out)
     }
@@ -254,7 +254,11 @@ impl DrivenTrain {
         let Some(counted) = counted_from(ground, &self.model, at, node) else {
             return self.waypoint_again(ground, node, destination);
         };
-        if destination.in_time { self.named_again(ground, counted, destination) } else { Some(counted) }
+        if destination.in_time.is_some() {
+            self.named_again(ground, counted, destination)
+        } else {
+            Some(counted)
+        }
     }
 
     /// The turnouts lie otherwise: is the target still where it was?

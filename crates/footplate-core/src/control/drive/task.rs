@@ -42,8 +42,9 @@ pub(super) struct Destination {
     /// The step to stop from, if it was named.
     pub(super) step: Option<SpeedStep>,
     pub(super) next_round: bool,
-    /// Whether it is to be reached in time: what hops are like is learnt on the way then, and the way counted anew.
-    pub(super) in_time: bool,
+    /// When it shall stand there, if anybody asked for that: what hops are like is learnt on the way then, the way counted anew,
+    /// and the step to stop from chosen by it.
+    pub(super) in_time: Option<Timestamp>,
 }
 
 /// How far a task is.

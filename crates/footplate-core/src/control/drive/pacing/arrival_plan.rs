@@ -206,13 +206,14 @@ impl DrivenTrain {
     ) -> Means {
         let speed = |step: &SpeedStep| self.model.steady_speed(*step, Approach::Below).as_m_per_s();
         let ends = [usable.first(), usable.last()].map(|step| step.map_or(0.0, speed));
+        let stands = self.model.standing_times();
         let last = self.sure_steps(usable).into_iter().map(|step| {
             let stop = self.model.stop(step, Approach::Below);
             FinalStep {
                 step,
                 speed: speed(&step),
                 stop_way: stop.distance.as_m(),
-                stop_time: stop.time.as_s(),
+                stop_time: stands.after(speed(&step)),
             }
         });
         let [low, high] = ends;

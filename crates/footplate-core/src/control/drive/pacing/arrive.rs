@@ -1,5 +1,6 @@
 //! A train that comes to rest at a place, and does so in time.
 
+use alloc::boxed::Box;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
@@ -21,7 +22,6 @@ use crate::track::Landmark;
 use crate::units::{Length, Speed};
 
 use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, Means};
-use super::command_budget::seconds;
 use super::reference::Reference;
 use super::task::{POLL_WAIT, Pace, Pacing};
 
@@ -108,7 +108,7 @@ impl DrivenTrain {
             aim: Aim::Median,
             step: None,
             next_round: false,
-            in_time: true,
+            in_time: None,
         };
         let mut at = self.waypoint(ground, now, &located, &destination, stands);
         if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
@@ -122,6 +122,7 @@ impl DrivenTrain {
         for rounds in 0..=rounds {
             let further = round.unwrap_or(Length::ZERO) * f64::from(rounds);
             destination.at = Some(WayPoint { way: at.way + further, ..at });
+            destination.in_time = Some(now + within);
             let found = if stands {
                 self.begun_at_rest(ground, now, &located, destination, within)
             } else {
@@ -156,7 +157,7 @@ impl DrivenTrain {
         let profile = arriving.plan.map(|plan| ArrivalProfile::new(plan, arriving.begins()));
         out.say(DriveNotice::Arrives(PlannedArrival { order, train, by, starts, profile }));
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
-        self.pacing = Some(Pacing::new(Pace::Arrive(arriving), self.usable_steps(), now));
+        self.pacing = Some(Pacing::new(Pace::Arrive(Box::new(arriving)), self.usable_steps(), now));
         self.goes_by_plan(ground, now, out);
     }
 
@@ -217,11 +218,15 @@ impl DrivenTrain {
             return planned(unhurried, now + waits).ok_or(Refusal::Lost { train: self.id() });
         }
         // One step and the stop: what takes the least time, or all of it.
+        let stands = self.model.standing_times();
         let slowest = self.restricted_until(ground, now, at).into_iter().map(|(_, step)| step).min();
         let may_run = |step: SpeedStep| may_start(&step) && slowest.is_none_or(|slowest| step <= slowest);
         let runs = means.last.iter().filter(|last| may_run(last.step)).filter_map(|last| {
             match self.short_run(ground, now, at, last.step, &destination) {
-                CommandTime::At(_, rest) => Some((last.step, rest.time - now, spread(&rest))),
+                CommandTime::At(stop, rest) => {
+                    let stands = self.standing_time(&stands, [now + LINE_TIME, stop], last.step, &rest)?;
+                    Some((last.step, stands - now, spread(&rest)))
+                }
                 _ => None,
             }
         });
@@ -280,7 +285,7 @@ impl DrivenTrain {
     /// Does what comes before the plan is followed, and after; says whether it is followed now.
     pub(super) fn goes_by_plan(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) -> bool {
         let Some(task) = self.task else { return false };
-        let Some(Pacing { pace: Pace::Arrive(arriving), look, budget, .. }) = &mut self.pacing else {
+        let Some(Pacing { pace: Pace::Arrive(arriving), look, .. }) = &mut self.pacing else {
             return true;
         };
         let (begins, ends, destination) = (arriving.begins(), arriving.ends(), arriving.destination);
@@ -304,10 +309,8 @@ impl DrivenTrain {
         if now < ends {
             return true;
         }
-        let last = arriving.plan.map(|plan| plan.last.step);
-        let last = last.filter(|step| *step != self.told && budget.free() <= seconds(now));
         self.leave_to_stop(task, destination);
-        match last {
+        match self.step_in_time(ground, now, &destination) {
             Some(step) => self.tell_step(ground, now, step, out),
             None => self.plan(ground, now, out),
         }
@@ -316,7 +319,6 @@ impl DrivenTrain {
 
     /// From here on it is a stop like any other.
     fn leave_to_stop(&mut self, task: Task, destination: Destination) {
-        self.pacing = None;
         let goal = Goal::RestAt(destination);
         self.task = Some(Task { goal, phase: Phase::Running { plan: None }, ..task });
     }

@@ -10,6 +10,7 @@ mod command_budget;
 mod follow;
 mod hold;
 mod ideal_line;
+mod last_step;
 mod lead_line;
 mod pacer;
 mod passages;

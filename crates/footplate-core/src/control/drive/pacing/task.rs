@@ -1,5 +1,6 @@
 //! What a train is paced for, and when it is looked at next.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
@@ -36,7 +37,7 @@ pub(in crate::control::drive) enum Pace {
     /// To run at a speed.
     Hold(Holding),
     /// To come to rest in time.
-    Arrive(Arriving),
+    Arrive(Box<Arriving>),
     /// To keep a gap to another train.
     Follow(Following),
 }
@@ -96,7 +97,7 @@ impl DrivenTrain {
         sensor: SensorId,
         window: ContactWindow,
     ) {
-        let comes_in_time = matches!(self.goal(), Some(Goal::RestAt(Destination { in_time: true, .. })));
+        let comes_in_time = matches!(self.goal(), Some(Goal::RestAt(Destination { in_time: Some(_), .. })));
         if self.paced().is_none() && !comes_in_time {
             return;
         }
@@ -113,10 +114,8 @@ impl DrivenTrain {
         node: NodeId,
         out: &mut Outputs,
     ) {
-        let (Some(task), Some(mut pacing)) = (self.task, self.pacing.take()) else { return };
-        if task.goal != Goal::Pace {
-            return;
-        }
+        let Some(task) = self.task.filter(|task| task.goal == Goal::Pace) else { return };
+        let Some(mut pacing) = self.pacing.take() else { return };
         if let Pace::Hold(holding) = &mut pacing.pace {
             self.begin_line(ground, now, task.order, holding, out);
         }
