@@ -26,6 +26,7 @@ mod simulate;
 mod simulate_driving;
 mod simulate_line;
 mod simulate_pacing;
+mod simulate_zones;
 mod simulated;
 mod station;
 mod store;

@@ -34,6 +34,8 @@ const SOONER: f64 = 0.05;
 /// It is let go so much (m) behind a zone, and gets faster after so long (s): the poll on the line, and what decoders take.
 const SURELY: f64 = 0.025;
 const FELT: f64 = 0.3;
+/// A running train is not made slower than this: wheels that creep stick on dirt.
+pub(super) const CREEPING: Speed = Speed::from_mm_per_s(60.0);
 /// Nobody plans for longer (s).
 const LONGEST: f64 = 900.0;
 
@@ -129,6 +131,8 @@ impl ArrivalProfile {
 pub(super) struct Means {
     pub(super) speeds: [f64; 2],
     pub(super) last: Vec<FinalStep>,
+    /// Slower ones, from which it stops less surely: for zones that reach to the target.
+    pub(super) slower: Vec<FinalStep>,
     /// Where zones allow less, as m before the target.
     pub(super) slow: Vec<SlowPart>,
 }
@@ -136,13 +140,16 @@ pub(super) struct Means {
 impl Means {
     /// The plan that stands at the target after a time (s from now).
     pub(super) fn plan(&self, begins: Beginning, within: f64) -> Option<ArrivalPlan> {
-        let plans = self.last.iter().filter_map(|last| self.plan_from(begins, within, *last));
         // The least change of speed on the way is the smoothest.
         let change = |plan: &ArrivalPlan| {
             let mean = plan.profile.motion().distance() / plan.profile.motion().duration();
             (mean.as_m_per_s() - plan.last.speed).abs()
         };
-        plans.min_by(|one, other| change(one).total_cmp(&change(other)))
+        let smoothest = |last: &[FinalStep]| {
+            let plans = last.iter().filter_map(|last| self.plan_from(begins, within, *last));
+            plans.min_by(|one, other| change(one).total_cmp(&change(other)))
+        };
+        smoothest(&self.last).or_else(|| smoothest(&self.slower))
     }
 
     fn plan_from(&self, begins: Beginning, within: f64, last: FinalStep) -> Option<ArrivalPlan> {
@@ -207,7 +214,7 @@ impl DrivenTrain {
         let speed = |step: &SpeedStep| self.model.steady_speed(*step, Approach::Below).as_m_per_s();
         let ends = [usable.first(), usable.last()].map(|step| step.map_or(0.0, speed));
         let stands = self.model.standing_times();
-        let last = self.sure_steps(usable).into_iter().map(|step| {
+        let stop_from = |step: SpeedStep| {
             let stop = self.model.stop(step, Approach::Below);
             FinalStep {
                 step,
@@ -215,13 +222,17 @@ impl DrivenTrain {
                 stop_way: stop.distance.as_m(),
                 stop_time: stands.after(speed(&step)),
             }
-        });
+        };
+        let last: Vec<FinalStep> = self.sure_steps(usable).into_iter().map(stop_from).collect();
+        let slow = self.slow_parts(ground, now, at);
+        let least = last.iter().map(|last| last.speed).fold(f64::INFINITY, f64::min);
+        let is_slower =
+            |step: &SpeedStep| !slow.is_empty() && (CREEPING.as_m_per_s()..least).contains(&speed(step));
+        let slower = usable.iter().copied().filter(is_slower).map(stop_from).collect();
+        // Nobody runs faster through a zone because that were slow elsewhere.
+        let slowest = slow.iter().map(|part| part.speed).fold(slowest.as_m_per_s(), f64::min);
         let [low, high] = ends;
-        Means {
-            speeds: [(low * (1.0 + RESERVE)).max(slowest.as_m_per_s()), high * (1.0 - RESERVE)],
-            last: last.collect(),
-            slow: self.slow_parts(ground, now, at),
-        }
+        Means { speeds: [(low * (1.0 + RESERVE)).max(slowest), high * (1.0 - RESERVE)], last, slower, slow }
     }
 
     /// Where zones on the way to a target allow less, and what the step that keeps to them runs at, as m before the target.
@@ -247,7 +258,7 @@ mod tests {
     fn means() -> Means {
         let step = SpeedStep::new(6).expect("a step");
         let last = FinalStep { step, speed: 0.25, stop_way: 0.15, stop_time: 1.2 };
-        Means { speeds: [0.05, 0.5], last: alloc::vec![last], slow: Vec::new() }
+        Means { speeds: [0.05, 0.5], last: alloc::vec![last], slower: Vec::new(), slow: Vec::new() }
     }
 
     #[test]
@@ -281,6 +292,11 @@ mod tests {
         let at_the_end =
             Means { slow: alloc::vec![SlowPart { from: 0.3, to: -1.0, speed: 0.15 }], ..means() };
         assert!(at_the_end.soonest(begins).is_none());
+        // From a slower step it may be less sure, but it is there.
+        let crawls = FinalStep { speed: 0.12, stop_way: 0.05, stop_time: 0.8, ..at_the_end.last[0] };
+        let patient = Means { slower: alloc::vec![crawls], ..at_the_end };
+        let soonest = patient.soonest(begins).expect("some time");
+        assert_eq!(patient.plan(begins(0.0).expect("a state"), soonest).map(|plan| plan.last), Some(crawls));
     }
 
     #[test]

@@ -21,14 +21,12 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
 use crate::units::{Length, Speed};
 
-use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, Means};
+use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, CREEPING, Means};
 use super::reference::Reference;
 use super::task::{POLL_WAIT, Pace, Pacing};
 
 /// A standing train that has more time than this speed needs waits rather than creeps.
 const UNHURRIED: Speed = Speed::from_mm_per_s(150.0);
-/// A running train is not made slower than this: wheels that creep stick on dirt.
-const CREEPING: Speed = Speed::from_mm_per_s(60.0);
 /// A start loses time: the step to start with is that of the mean speed and so much more.
 const START_LOSS: f64 = 1.1;
 /// On a circuit a train that has time for it goes round so many times.
@@ -117,7 +115,7 @@ impl DrivenTrain {
         }
         let at = at?;
         let round = lap(ground, &self.model, at.node);
-        let mut latest = None;
+        let (mut latest, mut unreached) = (None, None);
         let rounds = if round.is_some() { MOST_ROUNDS } else { 0 };
         for rounds in 0..=rounds {
             let further = round.unwrap_or(Length::ZERO) * f64::from(rounds);
@@ -136,12 +134,17 @@ impl DrivenTrain {
                 Err(Refusal::TooSlow { latest: found, .. }) => latest = latest.or(Some(found)),
                 // There is no time for another round, and too much without.
                 Err(Refusal::TooSoon { .. }) if latest.is_some() => break,
-                Err(Refusal::OutOfReach { .. }) if round.is_some() => {}
+                Err(why @ Refusal::OutOfReach { .. }) if round.is_some() => {
+                    unreached = unreached.or(Some(why));
+                }
                 Err(why) => return Err(why),
             }
         }
         let target = ground.layout.display(target).to_string();
-        Err(Refusal::TooSlow { target, latest: latest.unwrap_or(within) })
+        Err(match latest {
+            Some(latest) => Refusal::TooSlow { target, latest },
+            None => unreached.unwrap_or(Refusal::OutOfReach { target }),
+        })
     }
 
     fn begin_arrival(
@@ -221,7 +224,8 @@ impl DrivenTrain {
         let stands = self.model.standing_times();
         let slowest = self.restricted_until(ground, now, at).into_iter().map(|(_, step)| step).min();
         let may_run = |step: SpeedStep| may_start(&step) && slowest.is_none_or(|slowest| step <= slowest);
-        let runs = means.last.iter().filter(|last| may_run(last.step)).filter_map(|last| {
+        let steps = means.last.iter().chain(&means.slower);
+        let runs = steps.filter(|last| may_run(last.step)).filter_map(|last| {
             match self.short_run(ground, now, at, last.step, &destination) {
                 CommandTime::At(stop, rest) => {
                     let stands = self.standing_time(&stands, [now + LINE_TIME, stop], last.step, &rest)?;

@@ -273,15 +273,16 @@ impl DrivenTrain {
 
     /// Whether it may be elsewhere than where it is believed to be. Contacts fail thirty times as often as trains stall: one
     /// that was silent is no doubt of a train that was seen running before, and runs too fast to stall, until the next is late.
+    /// Of one that creeps only the contact is sure that it came by last: it stalls any time, and the next is late long after.
     fn is_in_doubt(&self, ground: Ground<'_>, now: Timestamp) -> bool {
         let Some(located) = self.located(ground, now) else { return true };
+        let speed = self.model.steady_speed(self.told, Approach::Below);
         if self.unseen().is_none() {
-            return false;
+            return self.told > SpeedStep::STAND && speed < CREEPS;
         }
         let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
         let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * RAN_ON);
-        let is_lively = self.model.steady_speed(self.told, Approach::Below) >= LIVELY;
-        !(has_run && is_lively && self.missed_just_one(now))
+        !(has_run && speed >= LIVELY && self.missed_just_one(now))
     }
 
     /// The fastest step that it could be told now and still stop before the rear of its leader in a while, if neither is told

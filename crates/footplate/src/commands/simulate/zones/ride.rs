@@ -22,6 +22,8 @@ const FAR: [f64; 2] = [1800.0, 6000.0];
 const GAP: f64 = 4.0;
 /// Contacts between the two at the beginning.
 const APART: usize = 3;
+/// Who was left behind so far that its leader comes round to it ends its ride at the contact before: nobody holds back a leader.
+const ROUND: usize = 1;
 /// Between one order and the next (s).
 const PAUSE: f64 = 2.0;
 /// A time that was offered, and this part more, is asked for next.
@@ -145,6 +147,9 @@ impl Ride<'_, '_> {
                     _ => {}
                 }
             }
+            if self.told == Told::Follow && self.leader_comes_round() {
+                trouble = Some("it was left behind so far that its leader came round to it".to_owned());
+            }
             watched.look(self.stage.world().truth(), self.stage.line.now());
         }
         if self.stage.world().mishaps().len() > mishaps {
@@ -159,6 +164,18 @@ impl Ride<'_, '_> {
             done,
             trouble,
         }
+    }
+
+    /// Whether the leader is just behind its follower.
+    fn leader_comes_round(&self) -> bool {
+        let now = self.stage.line.now();
+        let nodes = &self.way.nodes;
+        let place = |train| {
+            let located = self.driver.locate(train, now)?;
+            nodes.iter().position(|node| *node == located.at.node)
+        };
+        let behind = |(train, leader)| (train + nodes.len() - leader) % nodes.len();
+        place(self.train).zip(place(self.leader)).map(behind) == Some(ROUND)
     }
 
     /// What the train's odometer shows (mm).
