@@ -155,6 +155,11 @@ impl Locator {
         self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
     }
 
+    /// Whether from now on it is told the same again and again, so that what its changes have in common is worth learning.
+    pub(crate) fn repeat(&mut self, is_repeating: bool) {
+        self.following.repeat(is_repeating);
+    }
+
     /// A command to the train has left the line. Other entries say nothing here.
     pub fn handle_command(&mut self, ground: Ground<'_>, model: &MotionModel, event: &Event) {
         let _ = ground;

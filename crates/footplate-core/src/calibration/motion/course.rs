@@ -2,15 +2,17 @@
 //!
 //! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
 //! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
-//! the laws, `r(t)` share of its change that is done. The train is at
+//! the laws, `r(t)` share of its change that is done. What is the same whenever the train does it again has letters
+//! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law, `τ` upwards and downwards, and what ln speed
+//! is off by at each of the steps met of late, `s`. With `Δ` the speed before a change less that after it, the train is at
 //!
 //! ```text
-//! x(t) = b + e^ε S(t − η) + ζ r(t)
+//! x(t) = b + e^(ε + s) S(t − η) + (ζ + τ Δ) r(t)
 //! ```
 //!
 //! [`Following`](super::Following) knows beside it how sure each letter is. What commands not given yet would come to is
 //! asked of a copy: cheap enough to look at thousands of ways to go on within a millisecond.
-#![expect(clippy::indexing_slicing, reason = "arrays of four letters, indexed below four")]
+#![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::model::MotionModel;
 pub(crate) use super::segment::Told;
@@ -20,7 +22,13 @@ pub(super) const B: usize = 0;
 pub(super) const E: usize = 1;
 pub(super) const H: usize = 2;
 pub(super) const Z: usize = 3;
-pub(super) const N: usize = 4;
+/// Upwards, and behind it downwards.
+pub(super) const LATER: usize = 4;
+/// The first of the steps met.
+const STEPS: usize = 6;
+/// Who keeps to a pace changes between three steps, each reached from below and from above.
+const STEPS_KEPT: usize = 6;
+pub(super) const N: usize = STEPS + STEPS_KEPT;
 
 /// Commands that can wait for their effect: more than a line carries within a start's delay.
 const MOST_PENDING: usize = 6;
@@ -32,8 +40,17 @@ pub(crate) struct Course {
     pub(super) segment: Segment,
     /// What the segment is an answer to.
     pub(super) step: u8,
-    /// `b`, `ε`, `η` and `ζ`.
+    /// `b`, `ε`, `η`, `ζ`, `τ` and `s`.
     pub(super) x: [f64; N],
+    /// Which steps `s` are of, and whether reached from above; the one that will be replaced next, and the letter of the one
+    /// run at.
+    met: [(u8, bool); STEPS_KEPT],
+    oldest: usize,
+    is_repeating: bool,
+    pub(super) speed: Option<usize>,
+    /// The letter of the change under way, and its `Δ` (m/s); none of a start or a stop.
+    later: usize,
+    slower: f64,
     pending: [Option<Told>; MOST_PENDING],
 }
 
@@ -43,7 +60,13 @@ impl Course {
         Self {
             segment: Segment::steady(time, 0.0),
             step: 0,
-            x: [place, 0.0, 0.0, 0.0],
+            x: core::array::from_fn(|letter| if letter == B { place } else { 0.0 }),
+            met: [(0, false); STEPS_KEPT],
+            oldest: 0,
+            is_repeating: false,
+            speed: None,
+            later: LATER,
+            slower: 0.0,
             pending: [None; MOST_PENDING],
         }
     }
@@ -104,21 +127,89 @@ impl Course {
         if told.at_rest {
             self.x[E] = 0.0;
         }
+        self.later = LATER + usize::from(told.above());
+        self.slower = if self.repeats(&told) { pace.speed - self.segment.to } else { 0.0 };
+        if told.to != 0 {
+            self.speed = self.repeats(&told).then(|| self.meet(&told));
+        }
         pace.speed
+    }
+
+    /// Whether a command is one of many that are alike.
+    pub(super) const fn repeats(&self, told: &Told) -> bool {
+        self.is_repeating && told.to != 0 && !told.at_rest
+    }
+
+    /// Whether it will do the same again and again from now on; what it learnt of that before is forgotten.
+    pub(super) fn repeat(&mut self, is_repeating: bool) {
+        self.is_repeating = is_repeating;
+        if is_repeating {
+            // What it was until now is this run's own.
+            (self.x[E], self.x[Z]) = (libm::log(self.grown()), self.displaced());
+            self.met = [(0, false); STEPS_KEPT];
+            self.x[LATER..].fill(0.0);
+            (self.speed, self.slower) = (None, 0.0);
+        }
+    }
+
+    /// The letter of the step that was told, if it is kept.
+    pub(super) fn kept(&self, told: &Told) -> Option<usize> {
+        let at = self.met.iter().position(|met| *met == (told.to, told.above()))?;
+        Some(STEPS + at)
+    }
+
+    /// Runs at the step that was told, of which nothing is known but what the model says unless it is kept.
+    fn meet(&mut self, told: &Told) -> usize {
+        self.kept(told).unwrap_or_else(|| {
+            let at = self.oldest;
+            self.oldest = (at + 1) % STEPS_KEPT;
+            self.met[at] = (told.to, told.above());
+            self.x[STEPS + at] = 0.0;
+            STEPS + at
+        })
+    }
+
+    /// Its speed over what the model says of it.
+    pub(super) fn grown(&self) -> f64 {
+        libm::exp(self.x[E] + self.speed.map_or(0.0, |letter| self.x[letter]))
+    }
+
+    /// It has been running steadily for long: ways are counted from here on.
+    pub(super) fn run_on(&mut self, time: f64, way: f64) {
+        self.x[B] = way;
+        self.segment = Segment::steady(time, self.segment.to);
+        self.slower = 0.0;
+    }
+
+    /// By how much way the change under way differs from its law once it is done.
+    fn displaced(&self) -> f64 {
+        self.x[Z] + self.slower * self.x[self.later]
+    }
+
+    /// Slopes of `x(t)` from those of `b`, `ε`, `η` and `ζ`.
+    fn slope(&self, own: [f64; 4]) -> [f64; N] {
+        let mut slope = [0.0; N];
+        slope[..4].copy_from_slice(&own);
+        if let Some(letter) = self.speed {
+            slope[letter] = own[E];
+        }
+        slope[self.later] = self.slower * own[Z];
+        slope
     }
 
     /// `x(t)` and its slopes; at an infinite time the whole way of a stop.
     pub(super) fn way_and_slope(&self, time: f64) -> (f64, [f64; N]) {
-        let grown = libm::exp(self.x[E]);
+        let grown = self.grown();
         if time.is_infinite() {
             let way = self.segment.way_to_rest();
-            return (self.x[B] + grown * way + self.x[Z], [1.0, grown * way, 0.0, 1.0]);
+            let place = self.x[B] + grown * way + self.displaced();
+            return (place, self.slope([1.0, grown * way, 0.0, 1.0]));
         }
         let late = time - self.x[H];
         let way = if self.is_still() { 0.0 } else { self.segment.way(late) };
         let (speed, share) = (self.segment.speed(late), self.segment.share(time));
-        let place = self.x[B] + grown * way + self.x[Z] * share;
-        (place, [1.0, grown * way, -grown * speed, share])
+        let place = self.x[B] + grown * way + self.displaced() * share;
+        (place, self.slope([1.0, grown * way, -grown * speed, share]))
     }
 
     pub(super) const fn is_still(&self) -> bool {
@@ -128,12 +219,12 @@ impl Course {
     /// Where it is (m), once all that has taken effect by then has been taken in.
     pub(crate) fn place(&self, time: f64) -> f64 {
         let is_done = self.rests_at(time) && !self.is_still();
-        let grown = libm::exp(self.x[E]);
+        let (grown, displaced) = (self.grown(), self.displaced());
         if is_done {
-            return self.x[B] + grown * self.segment.way_to_rest() + self.x[Z];
+            return self.x[B] + grown * self.segment.way_to_rest() + displaced;
         }
         let way = if self.is_still() { 0.0 } else { self.segment.way(time - self.x[H]) };
-        let change = if self.x[Z] == 0.0 { 0.0 } else { self.x[Z] * self.segment.share(time) };
+        let change = if displaced == 0.0 { 0.0 } else { displaced * self.segment.share(time) };
         self.x[B] + grown * way + change
     }
 
@@ -144,6 +235,6 @@ impl Course {
 
     /// How fast it is (m/s) then.
     pub(crate) fn speed(&self, time: f64) -> f64 {
-        libm::exp(self.x[E]) * self.segment.speed(time - self.x[H])
+        self.grown() * self.segment.speed(time - self.x[H])
     }
 }

@@ -128,6 +128,7 @@ impl DrivenTrain {
 
     /// Begins something else.
     pub(super) fn take(&mut self, task: Task, out: &mut Outputs) {
+        self.locator.repeat(false);
         if let Some(before) = self.task.replace(task) {
             out.say(DriveNotice::Replaced { order: before.order, train: self.id() });
         }

@@ -3,7 +3,7 @@
 pub(super) mod choice;
 mod course_project;
 mod figures;
-mod known_train;
+pub(super) mod known_train;
 mod page;
 mod trial;
 

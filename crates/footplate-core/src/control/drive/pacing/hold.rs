@@ -73,6 +73,8 @@ impl DrivenTrain {
         let holding = Holding { speed, settled: now + settles, line: None };
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
+        // Where zones are, it may have to slow down at any time, and what keeps it to them knows it as it was calibrated.
+        self.locator.repeat(ground.layout.zones().is_empty());
         if step != self.told {
             self.tell_step(ground, now, step, out);
         }
@@ -99,6 +101,21 @@ impl DrivenTrain {
         holding.line = Some(line);
         let IdealLine { way, time, speed, .. } = line;
         out.say(DriveNotice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+    }
+
+    /// How far it is ahead of its line, as far as is believed; `None` while there is none.
+    pub(in crate::control::drive) fn ahead_of_line(
+        &self,
+        ground: Ground<'_>,
+        now: Timestamp,
+    ) -> Option<Length> {
+        let Pacing { pace: Pace::Hold(Holding { line: Some(line), .. }), .. } = self.paced()? else {
+            return None;
+        };
+        let at = self.located(ground, now)?.at;
+        let line = line.counted_from(ground, at.node, now)?;
+        let way = SurveyedWay::ahead(ground, &self.model, at.node).of_felt(at.way.as_m());
+        Some(Length::from_m(way - line.place(now)))
     }
 
     /// It is slowed down for a zone: the line ends here.

@@ -6,6 +6,7 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::ids::{SensorId, TrainId};
 use crate::time::Timestamp;
+use crate::units::Length;
 
 impl Driver {
     /// Looks at the trains whose time has come.
@@ -21,6 +22,13 @@ impl Driver {
                 self.trains.insert(id, train);
             }
         }
+    }
+
+    /// How far a train that holds a speed is ahead of where it should be, in surveyed lengths, as far as is believed; `None`
+    /// for any other, and before the line begins.
+    #[must_use]
+    pub fn ahead_of_line(&self, train: TrainId, now: Timestamp) -> Option<Length> {
+        self.trains.get(&train)?.ahead_of_line(self.track.ground(), now)
     }
 
     /// The contact that a train that keeps to a pace is about to pass. Keeps in mind when that changes.

@@ -35,7 +35,7 @@ const COUNTED_LAG_S: f64 = 0.12;
 const COUNTS_PER_STEP: f64 = 9.0;
 
 /// The model of a train whose every property is known; `ahead` is the way on which its lengths are wanted.
-pub(super) fn known(
+pub(in crate::commands::simulate) fn known(
     ground: Ground<'_>,
     truth: Truth<'_, '_>,
     train: TrainId,

@@ -1,14 +1,17 @@
 //! Trains told to run at a speed that none of their steps has, beside the step that comes nearest to it.
 
 use anyhow::Context;
+use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Order, PacedLine};
+use footplate_core::estimation::Ground;
 use footplate_core::track::Layout;
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::counted::Counted;
 use super::tracked::{LOOK, Odometer, TrueWay};
 use crate::commands::simulate::driving::choice::Choice;
+use crate::commands::simulate::driving::known_train::known;
 use crate::commands::simulate::rehearsal::{Rehearsal, Way};
 
 /// Speeds that are asked for (mm/s).
@@ -29,16 +32,19 @@ const EVERY: usize = 5;
 pub(super) enum By {
     /// The driver, by changing between steps.
     Driver,
+    /// The same driver with a model made of the truth: what is left is what no calibration could take away.
+    Told,
     /// The nearest step.
     Step,
 }
 
 impl By {
-    pub(super) const ALL: [Self; 2] = [Self::Driver, Self::Step];
+    pub(super) const ALL: [Self; 3] = [Self::Driver, Self::Told, Self::Step];
 
     pub(super) const fn key(self) -> &'static str {
         match self {
             Self::Driver => "footplate",
+            Self::Told => "footplate, told the train",
             Self::Step => "nearest step",
         }
     }
@@ -51,14 +57,23 @@ pub(super) struct Held {
     pub(super) train: TrainId,
     /// What was asked for (mm/s).
     pub(super) speed: f64,
-    /// When the train was looked at (s since it began), and how far ahead of the ideal it was (mm).
-    pub(super) ahead: Vec<[f64; 2]>,
-    /// When a window began (s), and by how much the mean speed in it was off (%).
-    pub(super) off: Vec<[f64; 2]>,
+    /// What it did, ...
+    pub(super) course: Course,
+    /// ... and what the driver believed at the same time that it did.
+    pub(super) believed: Course,
     pub(super) seconds: f64,
     pub(super) commands: usize,
     /// What went wrong.
     pub(super) trouble: Option<String>,
+}
+
+/// A course beside the ideal.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Course {
+    /// When the train was looked at (s since it began), and how far ahead of the ideal it was (mm).
+    pub(super) ahead: Vec<[f64; 2]>,
+    /// When a window began (s), and by how much the mean speed in it was off (%).
+    pub(super) off: Vec<[f64; 2]>,
 }
 
 /// Everything that one train is asked to hold.
@@ -78,10 +93,26 @@ pub(super) fn hold(
         for by in By::ALL {
             let mut stage = stage.clone();
             stage.put(train, start, Length::from_mm(60.0))?;
+            if by == By::Told {
+                let told = told_the_truth(layout, &stage, way, train)?;
+                stage.models.insert(train, told);
+            }
             all.push(held(layout, stage, train, by, speed));
         }
     }
     Ok(all)
+}
+
+/// A model of a train that knows everything about it, and how long the hops on its way feel.
+fn told_the_truth(
+    layout: &Layout,
+    stage: &Rehearsal<'_>,
+    way: &Way,
+    train: TrainId,
+) -> anyhow::Result<MotionModel> {
+    let sections = SectionIndex::of(layout);
+    let ground = Ground { layout, sections: &sections, turnouts: &stage.turnouts };
+    known(ground, stage.world().truth(), train, &way.nodes)
 }
 
 /// The speeds of the slowest and the fastest step that moves a train (mm/s).
@@ -112,8 +143,8 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
         by,
         train,
         speed: asked,
-        ahead: Vec::new(),
-        off: Vec::new(),
+        course: Course::default(),
+        believed: Course::default(),
         seconds: 0.0,
         commands: 0,
         trouble: None,
@@ -122,7 +153,7 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
     let mut counted = Counted::new(stage.driver());
     let Some(model) = stage.models.get(&train) else { return held };
     let (order, settled) = match by {
-        By::Driver => (Order::Hold { train, speed: Speed::from_mm_per_s(asked) }, None),
+        By::Driver | By::Told => (Order::Hold { train, speed: Speed::from_mm_per_s(asked) }, None),
         By::Step => {
             let off = |step: &SpeedStep| (speed(model, *step) - asked).abs();
             let nearest = steps(model).min_by(|one, other| off(one).total_cmp(&off(other)));
@@ -136,6 +167,7 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
     }
     let before = stage.world().mishaps().len();
     let mut odometer = Odometer::default();
+    let mut believed: Vec<(Timestamp, f64)> = Vec::new();
     let mut ideal: Option<(Ideal, usize)> = None;
     let mut until = began + TimeSpan::from_s(PATIENCE);
     while stage.line.now() < until {
@@ -155,7 +187,10 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
             }
             Some(_) => None,
             None => {
+                let now = stage.line.now();
                 odometer.look(&stage.line, train);
+                let ahead = counted.driver.ahead_of_line(train, now);
+                believed.extend(ahead.map(|ahead| (now, ahead.as_mm())));
                 None
             }
         };
@@ -174,22 +209,32 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
     held.seconds = (stage.line.now() - ideal.time).as_s();
     held.commands = counted.steps(train) - commands;
     let way = TrueWay::since(layout, &stage.turnouts, stage.world().truth(), train, began);
-    held.compare(&way, &odometer, ideal);
+    held.course = Course::of_way(&way, &odometer, ideal, asked);
+    let believed = believed.into_iter().map(|(at, ahead)| {
+        let since = (at - ideal.time).as_s();
+        (since, asked * since + ahead)
+    });
+    held.believed = Course::beside(&believed.collect::<Vec<_>>(), asked);
     held
 }
 
-impl Held {
+impl Course {
     /// What the train did beside what it should have done.
-    fn compare(&mut self, way: &TrueWay, odometer: &Odometer, ideal: Ideal) {
+    fn of_way(way: &TrueWay, odometer: &Odometer, ideal: Ideal, speed: f64) -> Self {
         // A contact closes up to a poll before it is reported.
         let near = way.before(ideal.time + LOOK + LOOK).filter(|mark| mark.node == ideal.node);
-        let Some(near) = near else { return };
+        let Some(near) = near else { return Self::default() };
         let origin = near.surveyed + ideal.way.as_mm();
         let looks = odometer.since(ideal.time);
         let looks = looks
             .filter_map(|(at, odometer)| Some(((at - ideal.time).as_s(), way.surveyed(odometer)? - origin)));
-        let looks: Vec<(f64, f64)> = looks.collect();
-        self.ahead.extend(looks.iter().map(|(since, way)| [*since, way - self.speed * since]));
+        Self::beside(&looks.collect::<Vec<_>>(), speed)
+    }
+
+    /// A course, as the way (mm) at times (s) since it began, beside the ideal with a speed (mm/s).
+    fn beside(looks: &[(f64, f64)], speed: f64) -> Self {
+        let ahead = looks.iter().map(|(since, way)| [*since, way - speed * since]).collect();
+        let mut off = Vec::new();
         for (from, begins) in looks.iter().step_by(EVERY) {
             let ends = looks.partition_point(|(_, way)| *way < begins + WINDOW);
             let (Some(last), Some(next)) = (looks.get(ends.saturating_sub(1)), looks.get(ends)) else {
@@ -197,7 +242,8 @@ impl Held {
             };
             let part = (begins + WINDOW - last.1) / (next.1 - last.1);
             let took = last.0 + part * (next.0 - last.0) - from;
-            self.off.push([*from, 100.0 * (WINDOW / took / self.speed - 1.0)]);
+            off.push([*from, 100.0 * (WINDOW / took / speed - 1.0)]);
         }
+        Self { ahead, off }
     }
 }

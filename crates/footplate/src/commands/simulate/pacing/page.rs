@@ -9,7 +9,7 @@ use super::Scored;
 use super::arrive::{self, Arrived};
 use super::figures::{quantile, root_mean_square, shown, within_pct};
 use super::follow::{self, Followed, Kept};
-use super::hold::{By, Held};
+use super::hold::{By, Course, Held};
 use crate::commands::simulate::written_scores::WrittenScores;
 
 const HEAD: &str = "\
@@ -25,7 +25,9 @@ const HOLD: &str = "\
 Speeds of 200 to 450 mm/s, each held for two minutes, on a way round of which the calibration has seen what it chose to. *Mean speed* is over every 3 m (asked: within 0.5 %), *position* is that
 of a train that had always run at the speed, from the contact at which the driver says it begins (asked: within 15 mm in
 95 % of the time). Both are counted on the map, on which a contact is where it was surveyed, and a train between two of them
-as far along as it truly is. The *nearest step* is what there was before.
+as far along as it truly is. *As believed* is where the driver took the same trains to be at the same moments: off is what
+its choice of steps and its answers to what contacts say come to, and the rest is what it did not know. *Told the train* is the
+same driver with a model made of the truth. The *nearest step* is what there was before.
 ";
 
 const ARRIVE: &str = "\
@@ -81,11 +83,10 @@ impl WrittenScores for Page<'_> {
     }
 
     fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
-        let parts = By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)));
-        let hold = parts.map(|(by, minute, span)| {
-            let figures = Figures::of(self.held(by), span);
+        let hold = held_rows().map(|(row, minute, span)| {
+            let figures = Figures::of(self.held(row.by), row.course, span);
             json!({
-                "by": by.key(), "minute": minute, "runs": figures.runs, "means_within_0_5_pct": figures.means_within_pct,
+                "by": row.name, "minute": minute, "runs": figures.runs, "means_within_0_5_pct": figures.means_within_pct,
                 "mean_off_pct_p95": figures.mean_off, "places_within_15_mm_pct": figures.places_within_pct,
                 "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
                 "commands_per_s": figures.commands_per_s,
@@ -93,7 +94,7 @@ impl WrittenScores for Page<'_> {
         });
         let runs = self.scored.iter().flat_map(|scored| {
             scored.held.iter().map(move |held| {
-                let figures = Figures::of(core::iter::once(held), 0.0..f64::INFINITY);
+                let figures = Figures::of(core::iter::once(held), |held| &held.course, 0.0..f64::INFINITY);
                 json!({
                     "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
                     "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
@@ -247,14 +248,12 @@ impl Page<'_> {
              percentile) | most mm | commands a second |\n\
              | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for (by, minute, span) in
-            By::ALL.into_iter().flat_map(|by| MINUTES.map(|(name, span)| (by, name, span)))
-        {
-            let figures = Figures::of(self.held(by), span);
+        for (row, minute, span) in held_rows() {
+            let figures = Figures::of(self.held(row.by), row.course, span);
             writeln!(
                 output,
                 "| {} | {minute} | {} | {} % | {} | {} % | {} | {} | {:.2} |",
-                by.key(),
+                row.name,
                 figures.runs,
                 shown(figures.means_within_pct, 1),
                 shown(figures.mean_off, 2),
@@ -266,6 +265,22 @@ impl Page<'_> {
         }
         Ok(())
     }
+}
+
+/// A row of the table of held speeds: whose runs, and which course of theirs.
+#[derive(Clone, Copy)]
+struct HeldRow {
+    name: &'static str,
+    by: By,
+    course: fn(&Held) -> &Course,
+}
+
+/// All rows, for each part of a run.
+fn held_rows() -> impl Iterator<Item = (HeldRow, &'static str, Range<f64>)> {
+    let row = |by: By| HeldRow { name: by.key(), by, course: |held| &held.course };
+    let believed = HeldRow { name: "as believed", by: By::Driver, course: |held| &held.believed };
+    let rows = [row(By::Driver), believed, row(By::Told), row(By::Step)];
+    rows.into_iter().flat_map(|row| MINUTES.map(|(minute, span)| (row, minute, span)))
 }
 
 /// What several runs come to.
@@ -283,14 +298,14 @@ struct Figures {
 }
 
 impl Figures {
-    fn of<'h>(runs: impl Iterator<Item = &'h Held>, span: Range<f64>) -> Self {
+    fn of<'h>(runs: impl Iterator<Item = &'h Held>, course: fn(&Held) -> &Course, span: Range<f64>) -> Self {
         let runs: Vec<&Held> = runs.collect();
         let within = |looks: &[[f64; 2]]| {
             let looks = looks.iter().filter(|[since, _]| span.contains(since));
             looks.map(|[_, off]| *off).collect::<Vec<f64>>()
         };
-        let off = || runs.iter().flat_map(|held| within(&held.off));
-        let ahead = || runs.iter().flat_map(|held| within(&held.ahead));
+        let off = || runs.iter().flat_map(|held| within(&course(held).off));
+        let ahead = || runs.iter().flat_map(|held| within(&course(held).ahead));
         let seconds: f64 = runs.iter().map(|held| held.seconds).sum();
         let commands: usize = runs.iter().map(|held| held.commands).sum();
         Self {
