@@ -243,7 +243,9 @@ impl Locator {
         };
         let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
-        if short.mean * short.mean <= BELIEVED * BELIEVED * short.variance {
+        let contradicts = short.mean * short.mean > BELIEVED * BELIEVED * short.variance;
+        // What was believed is off by more than it said of itself; a change of speed under way will go on to be.
+        if !contradicts || self.following.doubt_change(model, time, short.mean) {
             // The contact says where the train is past it, however little is known of the way there.
             self.following.shift(-reach.length.mean, reach.length.variance);
             let here = Guess { mean: 0.0, variance: scatter };

@@ -13,6 +13,9 @@ use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
 const WANDERS_IN: f64 = 4.0;
 /// Looks at one contact from ever better points: speed and place bend the way while little is known.
 const LOOKS: usize = 3;
+/// Share of a change from which on it is to blame for what is off: earlier, what is off by little would be off by many times
+/// that in the end.
+const BEGUN: f64 = 0.3;
 /// A steady run is counted anew after this long (s): before, the law of its start and its speed are still told apart.
 const LONG_RUN: f64 = 20.0;
 /// Share of a change from which on the run is steady: what is left is less than a millimetre.
@@ -346,6 +349,22 @@ impl Following {
     pub(crate) const fn doubt_place(&mut self, variance: f64) {
         self.forget(B);
         self.p[B][B] = variance;
+    }
+
+    /// It is so far (m) from where it is believed to be as no doubt allows. While a change of speed is under way that is off,
+    /// and so is the rest of it: a start that is late, or one that goes another way. Whether there is one.
+    pub(crate) fn doubt_change(&mut self, model: &MotionModel, time: f64, off: f64) -> bool {
+        self.settle(model, time);
+        let share = self.course.segment.share(time);
+        if !(BEGUN..STEADY).contains(&share) {
+            return false;
+        }
+        let (_, slope) = self.course.way_and_slope(time);
+        let letter = if self.course.segment.from.speed == 0.0 { H } else { Z };
+        let wide = off / slope[letter];
+        self.forget(letter);
+        self.p[letter][letter] = wide * wide;
+        wide.is_finite()
     }
 
     /// All ways are counted from elsewhere from now on, which is so far (m), with its variance.
