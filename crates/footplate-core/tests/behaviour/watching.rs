@@ -253,6 +253,36 @@ fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_
 }
 
 #[test]
+fn what_waited_for_a_train_that_a_person_put_down_is_said_to_be_dropped() {
+    let mut watched = Watched::two();
+    watched.go(FIRST, 8);
+    watched.go(SECOND, 8);
+    watched.run(4.0);
+    watched.world.trains.retain(|train| train.id != FIRST);
+    let asks = |watched: &Watched| {
+        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(250.0, asks), "{:#?}", watched.said);
+    assert!(watched.dog.is_held(SECOND), "{:#?}", watched.said);
+    let from = watched.said.len();
+    watched.world.put(24, "D1", 100.0);
+    let node = watched.world.layout.node_named("D1").expect("a node");
+    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(100.0) };
+    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.listen();
+    assert!(!watched.dog.is_held(SECOND));
+    assert!(
+        watched.said.iter().skip(from).any(|notice| matches!(
+            notice,
+            WatchdogNotice::Dropped { train: SECOND, order: Order::Speed { train: SECOND, .. } }
+        )),
+        "{:#?}",
+        watched.said
+    );
+    watched.go(SECOND, 8);
+}
+
+#[test]
 fn who_is_asked_first_waits_for_the_answer() {
     let mut watched = Watched::one();
     watched.dog.ask_before_crawling();
@@ -352,9 +382,8 @@ proptest! {
                 Happening::Placed(node, mm) => {
                     let at = footplate_core::estimation::WayPoint { node: NodeId(node), way: Length::from_mm(mm) };
                     dog.place(now, FIRST, at, Length::from_mm(5.0));
-                    if !dog.is_held(FIRST) {
-                        must_stand.remove(&FIRST);
-                    }
+                    // With the last danger goes what others were held for.
+                    must_stand.retain(|train| dog.is_held(*train));
                 }
                 Happening::Distrusted(train) => dog.distrust(now, train),
             }

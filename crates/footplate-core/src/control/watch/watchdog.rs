@@ -136,7 +136,8 @@ impl Watchdog {
     }
 
     /// A person put a train there, or read off where it stands; a train that could not be brought back is trusted again
-    /// with that, as it was before.
+    /// with that, as it was before. When nobody is in danger then, those that were held are not any more; what they were
+    /// doing is dropped, and said to be.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
         if let Some(base) = given_up.map(|danger| danger.base().clone()) {
@@ -147,7 +148,12 @@ impl Watchdog {
         self.vigils.entry(train).or_default().place();
         self.note_place(now, train);
         if self.dangers.is_empty() {
-            self.held.clear();
+            // A hand was at the track: nothing that waited sets off by itself.
+            for (train, order) in core::mem::take(&mut self.held) {
+                if let Some((_, order)) = order {
+                    self.say(WatchdogNotice::Dropped { train, order });
+                }
+            }
         }
         self.drain(now);
     }
