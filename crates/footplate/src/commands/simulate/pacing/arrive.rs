@@ -6,7 +6,7 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::counted::Counted;
-use super::hold::{speed, steps};
+use super::hold::{speed, steps, told_the_truth};
 use super::tracked::LOOK;
 use crate::commands::simulate::driving::choice::Choice;
 use crate::commands::simulate::rehearsal::{Rehearsal, Way};
@@ -34,16 +34,19 @@ const STANDS_WITHIN: f64 = 4.0;
 pub(super) enum By {
     /// The driver, in time.
     Driver,
+    /// The same driver with a model made of the truth: what is left is what no calibration could take away.
+    Told,
     /// The driver, which stops there from the step with the mean speed.
     Step,
 }
 
 impl By {
-    pub(super) const ALL: [Self; 2] = [Self::Driver, Self::Step];
+    pub(super) const ALL: [Self; 3] = [Self::Driver, Self::Told, Self::Step];
 
     pub(super) const fn key(self) -> &'static str {
         match self {
             Self::Driver => "footplate",
+            Self::Told => "footplate, told the train",
             Self::Step => "step of the mean speed",
         }
     }
@@ -79,6 +82,10 @@ pub(super) fn arrive(
     for by in By::ALL {
         let mut stage = stage.clone();
         stage.put(train, start, Length::from_mm(60.0))?;
+        if by == By::Told {
+            let told = told_the_truth(layout, &stage, way, train)?;
+            stage.models.insert(train, told);
+        }
         let mut trip = Trip {
             layout,
             way,
@@ -199,7 +206,7 @@ impl Trip<'_, '_> {
     fn order(&mut self, target: Landmark, within: TimeSpan, mean: f64) -> Result<OrderId, Refusal> {
         let train = self.train;
         let order = match self.by {
-            By::Driver => Order::Arrive { train, target, within },
+            By::Driver | By::Told => Order::Arrive { train, target, within },
             By::Step => {
                 let step = Some(self.nearest(mean));
                 Order::Stop(StopOrder { step, ..StopOrder::at(train, target) })

@@ -104,7 +104,7 @@ pub(super) fn hold(
 }
 
 /// A model of a train that knows everything about it, and how long the hops on its way feel.
-fn told_the_truth(
+pub(super) fn told_the_truth(
     layout: &Layout,
     stage: &Rehearsal<'_>,
     way: &Way,
