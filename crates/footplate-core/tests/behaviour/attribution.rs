@@ -10,6 +10,8 @@ use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
 const FIRST: TrainId = TrainId(24);
 const SECOND: TrainId = TrainId(58);
+/// How long trains run of which anything may be asked (s).
+const RUNS_FOR: f64 = 26.0;
 
 fn run(driver: &mut Driver, world: &ToyRailway, train: TrainId, step: SpeedStep) {
     driver.order(world.now, Order::Speed { train, step }).expect("a train and a step");
@@ -196,13 +198,15 @@ proptest! {
         world.dead.insert(SensorId(silent));
         let (mut closes, by_themselves) = (closes.clone(), closes.len());
         closes.sort_by(|(_, one), (_, other)| one.total_cmp(other));
-        // Toy trains run through each other: not so fast that one catches up with the other.
+        // Toy trains run through each other: not so fast, and not so long, that one catches up with the other; but long
+        // enough for three passages when one of two slow trains is lost, to a contact that closed half a second before
+        // it came there and a silent one after that.
         run(&mut driver, &world, FIRST, step(pace));
         run(&mut driver, &world, SECOND, step(pace + faster - 1));
-        for (sensor, at) in closes.into_iter().chain([(0, 20.0)]) {
+        for (sensor, at) in closes.into_iter().chain([(0, RUNS_FOR)]) {
             let waits = (Timestamp::from_s(at) - world.now).as_s();
             world.run(&mut driver, waits);
-            if at < 20.0 {
+            if at < RUNS_FOR {
                 world.close(SensorId(sensor));
             }
         }
