@@ -92,8 +92,9 @@ impl MotionFit {
         let columns = Columns::of(trips, highest);
         let mut x = self.start(&columns);
         let known = priors(&columns, trips, sections, &x, highest);
+        let stop_shape_error = self.model.stop_shape_error();
         let rows_at = |x: &[f64], scale: f64, with_slopes: bool| {
-            Point { trips, columns: &columns, x, highest, scale }.rows(with_slopes)
+            Point { trips, columns: &columns, x, highest, scale, stop_shape_error }.rows(with_slopes)
         };
         let mut scale = 1.0;
         let mut rows = rows_at(&x, scale, true);

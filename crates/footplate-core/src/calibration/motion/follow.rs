@@ -6,6 +6,7 @@
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::course::{B, Course, E, H, LATER, N, Told, Z};
+use super::decoder_kind::SHAPE_ERROR;
 use super::model::MotionModel;
 use super::priors::{LATE_START, TRIP_DEVIATION, WANDER, change_error};
 
@@ -30,10 +31,8 @@ const LATER_CHANGE: f64 = 0.03;
 /// the state in which a train was told something fades over some dozens of changes (chosen by how well speeds are held).
 const LATER_WALK: f64 = 0.004;
 const STEP_WALK: f64 = 0.0005;
-/// Part of a change's displacement by which no shape is true in its middle, ...
-const SHAPE_ERROR: f64 = 0.04;
-/// ... and part of its change of speed by which the speed there is not: an eased ramp (3τ² − 2τ³) and an even one are apart
-/// by up to 0.096.
+/// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
+/// (3τ² − 2τ³) and an even one are apart by up to 0.096.
 const SHAPE_SPEED_ERROR: f64 = 0.07;
 /// Bounds of what one run may differ from all others: beyond, the model is wrong.
 const FARTHEST_DEVIATION: f64 = 1.5;

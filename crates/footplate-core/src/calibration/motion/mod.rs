@@ -8,6 +8,7 @@
 mod bits;
 mod chain;
 mod course;
+mod decoder_kind;
 mod doubts;
 mod fit;
 mod follow;

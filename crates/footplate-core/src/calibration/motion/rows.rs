@@ -3,6 +3,7 @@
 
 use alloc::vec::Vec;
 
+use super::decoder_kind::SHAPE_ERROR;
 use super::parameters::{Answers, SPEEDS, hysteresis_at, speed_at};
 use super::scatter::usual_scatter;
 use super::segment::Segment;
@@ -11,8 +12,6 @@ use super::unknowns::Columns;
 
 /// Contacts close a little earlier or later from one passage to the next (m).
 const CONTACT_SCATTER: f64 = 0.0015;
-/// Part of a change's displacement by which no shape is true in its middle.
-const SHAPE_ERROR: f64 = 0.04;
 /// What a tape or the train's own settling leaves of a place of rest (m).
 const REST_SCATTER: f64 = 0.0005;
 
@@ -72,6 +71,8 @@ pub(super) struct Point<'p> {
     pub(super) highest: usize,
     /// How far stops scatter against what trains usually do.
     pub(super) scale: f64,
+    /// Part of a stop's displacement by which its shape is not true in its middle.
+    pub(super) stop_shape_error: f64,
 }
 
 impl Point<'_> {
@@ -87,13 +88,13 @@ impl Point<'_> {
 
 /// Adds the equations of one trip.
 fn trip_rows(point: &Point<'_>, place: usize, with_slopes: bool, rows: &mut Vec<Linear>) {
-    let Point { trips, columns, x, highest, scale } = *point;
+    let Point { trips, columns, x, highest, scale, stop_shape_error } = *point;
     let Some(trip) = trips.get(place) else { return };
     let own = columns.own(place, trip, x);
     let mut segments = Vec::new();
     let mut numbers = x[..columns.lasting].to_vec();
     let here = outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments);
-    let doubts = doubts(trip, &own, &segments);
+    let doubts = doubts(trip, &own, &segments, stop_shape_error);
     let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
 
     let mut slopes: Vec<(usize, Outcome)> = Vec::new();
@@ -172,14 +173,15 @@ fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
 }
 
 /// Speed (m/s) at each contact, and by how much the law's shape may be off there (m).
-fn doubts(trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(f64, f64)> {
+fn doubts(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk::new(trip, own, segments);
     trip.contacts
         .iter()
         .map(|contact| {
             walk.way(contact.time);
             let (middle, displacement) = walk.in_change(contact.time);
-            (walk.speed(contact.time), SHAPE_ERROR * middle * displacement.abs())
+            let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
+            (walk.speed(contact.time), shape_error * middle * displacement.abs())
         })
         .collect()
 }

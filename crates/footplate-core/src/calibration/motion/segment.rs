@@ -181,6 +181,11 @@ impl Segment {
         Pace { speed: self.speed(time), set }
     }
 
+    /// Whether it ends at rest.
+    pub(super) const fn is_stop(&self) -> bool {
+        self.braking.is_some()
+    }
+
     /// The share of the change that is done.
     pub(super) fn share(&self, time: f64) -> f64 {
         self.done(time - self.begins)

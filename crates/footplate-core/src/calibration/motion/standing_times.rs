@@ -1,131 +1,30 @@
-//! When a train that was told to stop stands, by the kind of decoder that it most likely has.
+//! When a train that was told to stop stands, by the [kind of decoder](DecoderKind) that it most likely has.
 //!
 //! One set of numbers tells the ways of all decoders, and says little of their times: a stop that dies away and one that ends
 //! may be as long and half a second, or two, apart. Nobody sees a train come to rest, so that the kind is told by how ways
-//! grow with speed. It is one of three, and each knows something beforehand that the [model](MotionModel) of all does not:
+//! grow with speed.
 //!
-//! | kind | its set speed | knows | stands after |
-//! |---|---|---|---|
-//! | lagging | jumps, the motor lags behind | no ramp: κ and ρ are nothing | `q + θ ln(1 + v/fθ)`, when friction ends it |
-//! | even | falls evenly, rounded or eased alike at both ends | ρ is nothing, θ is short | `q + 2D`: it is as late at the end as in the middle |
-//! | counted | falls step by step through the speed table | κ is nearly nothing, θ is short | `q + D/m`, `m` the mean of the speeds passed over the first |
+//! | kind | stands after |
+//! |---|---|
+//! | lagging | `q + θ ln(1 + v/fθ)`, when friction ends it |
+//! | even | `q + 2D`: it is as late at the end as in the middle |
+//! | counted | `q + D/m`, `m` the mean of the speeds passed over the first |
 //!
-//! with `q` the delay until it takes effect and `D` the way from there over the speed `v`. What laws leave over is little in
-//! each. What the numbers are for a kind follows from their covariance: what was thought of them beforehand is exchanged for
-//! what the kind knows (Gauss; Kalman, 1960), nothing is fitted anew. How well they bear that is the evidence for the kind
-//! (MacKay, 1992), and the kind with most of it is taken.
-#![expect(
-    clippy::indexing_slicing,
-    reason = "places of single numbers and nodes are below the side of the matrix"
-)]
+//! with `q` the delay until it takes effect and `D` the way from there over the speed `v`. The numbers are those that the kind
+//! makes of the model's.
 
 use alloc::vec::Vec;
 
+use super::decoder_kind::DecoderKind;
 use super::model::MotionModel;
-use super::parameters::{Answers, DOWN, NODES, PRIOR, SPEEDS, STOP_NODES};
-use super::priors::whitened;
+use super::parameters::Answers;
 use super::segment::{Pace, Segment, Told};
-
-/// Places of lag, `κ` and `ρ` on the way down.
-const LAG: usize = DOWN + 1;
-const KAPPA: usize = DOWN + 2;
-const RHO: usize = DOWN + 3;
-
-/// No ramp by speed (s² per m), give or take a tenth of a second of a usual stop.
-const NO_KAPPA: (f64, f64) = (0.0, 0.2);
-/// No ramp by step (s), give or take a tenth of a second of a usual stop.
-const NO_RHO: (f64, f64) = (0.0, 0.015);
-/// The speeds that a counter passes are no straight line: a stop from a faster step takes a little more for each, or less.
-const LITTLE_KAPPA: (f64, f64) = (0.0, 1.0);
-/// Motors that are held to a set speed follow within a tenth of a second; windows that round a ramp are up to 0.9 s, half of
-/// which counts as lag.
-const SHORT_LAG: (f64, f64) = (0.15, 0.15);
-/// What the law of a kind leaves over, as part of what one for all does (published fits of stops: 1.6 to 3.6 mm by the right
-/// law, where others miss by 10 to 16).
-const LEFT_OVER: f64 = 0.3;
-
-/// What a decoder makes of a stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Lagging,
-    Even,
-    Counted,
-}
-
-impl Kind {
-    const ALL: [Self; 3] = [Self::Lagging, Self::Counted, Self::Even];
-
-    /// What it knows: places with mean and standard deviation.
-    const fn knows(self) -> [(usize, (f64, f64)); 2] {
-        match self {
-            Self::Lagging => [(KAPPA, NO_KAPPA), (RHO, NO_RHO)],
-            Self::Even => [(RHO, NO_RHO), (LAG, SHORT_LAG)],
-            Self::Counted => [(KAPPA, LITTLE_KAPPA), (LAG, SHORT_LAG)],
-        }
-    }
-}
-
-/// A model's numbers as they are if something is known that its prior did not say.
-struct Supposed {
-    /// The model's, of which the first [`SPEEDS`] are exchanged.
-    values: Vec<f64>,
-    /// Their covariance, row after row.
-    covariance: Vec<f64>,
-    /// ln of how many times as likely it makes what was seen.
-    evidence: f64,
-}
-
-impl Supposed {
-    fn of(model: &MotionModel, kind: Kind) -> Self {
-        let covariance =
-            (0..SPEEDS * SPEEDS).map(|place| model.spread.between(place / SPEEDS, place % SPEEDS));
-        let mut supposed =
-            Self { values: model.values.clone(), covariance: covariance.collect(), evidence: 0.0 };
-        for (place, known) in kind.knows() {
-            supposed.exchange(&[(place, 1.0)], PRIOR[place], known);
-        }
-        for (node, weights) in whitened().iter().enumerate() {
-            let mut sum = [(STOP_NODES, 0.0); NODES];
-            for (place, term) in sum.iter_mut().enumerate().take(node + 1) {
-                *term = (STOP_NODES + place, weights[place]);
-            }
-            supposed.exchange(&sum, (0.0, 1.0), (0.0, LEFT_OVER));
-        }
-        supposed
-    }
-
-    /// Of a sum of numbers times slopes `before` was thought; now it is `known`, more narrowly. Both are a mean and a standard
-    /// deviation. The ratio of two normal densities is a measurement.
-    fn exchange(&mut self, sum: &[(usize, f64)], before: (f64, f64), known: (f64, f64)) {
-        let [weight_before, weight] = [before, known].map(|(_, deviation)| 1.0 / (deviation * deviation));
-        let precision = weight - weight_before;
-        let measured = (weight * known.0 - weight_before * before.0) / precision;
-        let mut with = [0.0; SPEEDS];
-        for (place, covariance) in with.iter_mut().enumerate() {
-            *covariance =
-                sum.iter().map(|(other, slope)| slope * self.covariance[place * SPEEDS + other]).sum();
-        }
-        let variance = sum.iter().map(|(place, slope)| slope * with[*place]).sum::<f64>() + 1.0 / precision;
-        let off = measured - sum.iter().map(|(place, slope)| slope * self.values[*place]).sum::<f64>();
-        let means = weight * known.0 * known.0
-            - weight_before * before.0 * before.0
-            - precision * measured * measured;
-        self.evidence += libm::log(before.1 / known.1)
-            - 0.5 * (means + libm::log(precision * variance) + off * off / variance);
-        for place in 0..SPEEDS {
-            self.values[place] += with[place] * off / variance;
-            for other in 0..SPEEDS {
-                self.covariance[place * SPEEDS + other] -= with[place] * with[other] / variance;
-            }
-        }
-    }
-}
 
 /// When a train stands that was told to stop.
 #[derive(Debug, Clone)]
 pub(crate) struct StandingTimes<'m> {
     model: &'m MotionModel,
-    kind: Kind,
+    kind: DecoderKind,
     /// Its numbers, if it is of the kind.
     values: Vec<f64>,
 }
@@ -133,12 +32,8 @@ pub(crate) struct StandingTimes<'m> {
 impl MotionModel {
     /// When it stands that was told to stop.
     pub(crate) fn standing_times(&self) -> StandingTimes<'_> {
-        let supposed = Kind::ALL.map(|kind| (kind, Supposed::of(self, kind)));
-        let best =
-            supposed.into_iter().max_by(|(_, one), (_, other)| one.evidence.total_cmp(&other.evidence));
-        let (kind, values) =
-            best.map_or_else(|| (Kind::Even, self.values.clone()), |(kind, best)| (kind, best.values));
-        StandingTimes { model: self, kind, values }
+        let (kind, supposed) = self.supposed();
+        StandingTimes { model: self, kind, values: supposed.values }
     }
 }
 
@@ -149,9 +44,9 @@ impl StandingTimes<'_> {
         let stop = self.stop(&answers, speed);
         let late = stop.way_to_rest() / speed.max(f64::MIN_POSITIVE);
         match self.kind {
-            Kind::Lagging => stop.settled(),
-            Kind::Even => stop.begins + 2.0 * late,
-            Kind::Counted => stop.begins + late / self.mean_part(&answers, speed),
+            DecoderKind::Lagging => stop.settled(),
+            DecoderKind::Even => stop.begins + 2.0 * late,
+            DecoderKind::Counted => stop.begins + late / self.mean_part(&answers, speed),
         }
     }
 
@@ -186,7 +81,7 @@ impl StandingTimes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::motion::parameters::{FRICTION, speed_at};
+    use crate::calibration::motion::parameters::{FRICTION, SPEEDS, speed_at};
     use crate::ids::{SpeedStep, TrainId};
 
     /// A train of which ways are known well that stop from 0.1 to 0.5 m/s, whatever the numbers are by which they are told:
@@ -261,7 +156,7 @@ mod tests {
         for table in [even, steep] {
             let model = known(|speed| 0.2 * speed + speed * speed / 0.4, table);
             let times = model.standing_times();
-            assert_eq!(times.kind, Kind::Even);
+            assert_eq!(times.kind, DecoderKind::Even);
             for speed in [0.2, 0.3, 0.4] {
                 let stands = 0.2 + speed / 0.2;
                 assert!((times.after(speed) - stands).abs() < 0.1, "{} {stands}", times.after(speed));
@@ -278,7 +173,7 @@ mod tests {
         };
         let model = known(way, steep);
         let times = model.standing_times();
-        assert_eq!(times.kind, Kind::Counted);
+        assert_eq!(times.kind, DecoderKind::Counted);
         for speed in [0.2, 0.3, 0.4] {
             let stands = 0.2 + 0.25 * libm::sqrt(speed / 0.0032);
             assert!((times.after(speed) - stands).abs() < 0.15, "{} {stands}", times.after(speed));
@@ -292,12 +187,24 @@ mod tests {
         let lasts = |speed: f64| lag * libm::log1p(speed / (friction * lag));
         let model = known(|speed| (0.2 + lag) * speed - friction * lag * lasts(speed), steep);
         let times = model.standing_times();
-        assert_eq!(times.kind, Kind::Lagging);
+        assert_eq!(times.kind, DecoderKind::Lagging);
         assert!((times.values[FRICTION] - friction).abs() < 0.002, "{}", times.values[FRICTION]);
         for speed in [0.2, 0.3, 0.4] {
             let stands = 0.2 + lasts(speed);
             assert!((times.after(speed) - stands).abs() < 0.15, "{} {stands}", times.after(speed));
         }
+    }
+
+    #[test]
+    fn the_shape_of_a_stop_is_trusted_where_a_lag_is_clearly_the_kind() {
+        let (lag, friction) = (1.2, 0.020);
+        let lasts = |speed: f64| lag * libm::log1p(speed / (friction * lag));
+        let lagging = known(|speed| (0.2 + lag) * speed - friction * lag * lasts(speed), steep);
+        let braking = known(|speed| 0.2 * speed + speed * speed / 0.4, steep);
+        assert!(lagging.stop_shape_error() < 0.5 * braking.stop_shape_error());
+        // Nobody knows of a train that has not stopped yet.
+        let unknown = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        assert!((unknown.stop_shape_error() - braking.stop_shape_error()).abs() < 1e-12);
     }
 
     #[test]

@@ -181,6 +181,11 @@ impl<'t> Walk<'t> {
         self.deviation() * self.segments.get(self.segment).map_or(0.0, |segment| segment.speed(time))
     }
 
+    /// Whether the change under way ends at rest.
+    pub(super) fn is_stopping(&self) -> bool {
+        self.segments.get(self.segment).is_some_and(Segment::is_stop)
+    }
+
     /// How much of the change under way is neither begun nor done (0 to 1, most at its middle), and its displacement (m).
     pub(super) fn in_change(&self, time: f64) -> (f64, f64) {
         self.segments.get(self.segment).map_or((0.0, 0.0), |segment| {
