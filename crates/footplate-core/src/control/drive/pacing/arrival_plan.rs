@@ -36,6 +36,10 @@ const SURELY: f64 = 0.025;
 const FELT: f64 = 0.3;
 /// A running train is not made slower than this: wheels that creep stick on dirt.
 pub(super) const CREEPING: Speed = Speed::from_mm_per_s(60.0);
+/// No change of speed takes less (s).
+const LEAST_CHANGE: f64 = 0.1;
+/// A motion is looked at so often when it is asked whether a train can follow it.
+const LOOKS: u32 = 12;
 /// Nobody plans for longer (s).
 const LONGEST: f64 = 900.0;
 
@@ -130,6 +134,8 @@ impl ArrivalProfile {
 #[derive(Debug, Clone)]
 pub(super) struct Means {
     pub(super) speeds: [f64; 2],
+    /// How fast it gets faster, and slower (m/s²).
+    pub(super) rates: [f64; 2],
     pub(super) last: Vec<FinalStep>,
     /// Slower ones, from which it stops less surely: for zones that reach to the target.
     pub(super) slower: Vec<FinalStep>,
@@ -168,13 +174,15 @@ impl Means {
         let (length, span) = (Length::from_m(way), TimeSpan::from_s(time));
         let [from, to] = [begins.speed, last.speed].map(Speed::from_m_per_s);
         let smooth = MinimumJerk::new(length, from, to, span);
-        if smooth.speeds().into_iter().all(is_held) && slow.iter().all(|part| part.allows(&smooth)) {
+        let is_slow_enough = |motion: &dyn Motion| slow.iter().all(|part| part.allows(motion));
+        let is_followed = |motion: &dyn Motion| is_slow_enough(motion) && self.is_followed(motion);
+        if smooth.speeds().into_iter().all(is_held) && is_followed(&smooth) {
             return Some(ArrivalPlan { begins, profile: Profile::LeastJerk(smooth), last });
         }
         let change = (CHANGE_PART * time).clamp(CHANGE[0], CHANGE[1]).min(0.5 * time);
         let law = SpeedLaw::Smooth;
         let kept = Transit::new(length, [from, to], span, law, TimeSpan::from_s(change));
-        let kept = kept.filter(|kept| is_held(kept.kept()) && slow.iter().all(|part| part.allows(kept)));
+        let kept = kept.filter(|kept| is_held(kept.kept()) && is_followed(kept));
         let profile = kept.map(Profile::Kept).or_else(|| {
             let ends = [begins.speed, last.speed];
             let speeds = [slowest, fastest];
@@ -182,6 +190,15 @@ impl Means {
             zoned.flatten().map(Profile::Zoned)
         })?;
         Some(ArrivalPlan { begins, profile, last })
+    }
+
+    /// Whether the train gets faster and slower as fast as a motion does.
+    fn is_followed(&self, motion: &dyn Motion) -> bool {
+        let look = motion.duration().as_s() / f64::from(LOOKS);
+        let speed =
+            |looks: u32| motion.state_at(TimeSpan::from_s(look * f64::from(looks))).speed.as_m_per_s();
+        let [up, down] = self.rates.map(|rate| rate * look);
+        (0..LOOKS).all(|looks| (-down..=up).contains(&(speed(looks + 1) - speed(looks))))
     }
 
     /// The shortest time (s) for which there is a plan; `None` if there is none at all.
@@ -232,7 +249,15 @@ impl DrivenTrain {
         // Nobody runs faster through a zone because that were slow elsewhere.
         let slowest = slow.iter().map(|part| part.speed).fold(slowest.as_m_per_s(), f64::min);
         let [low, high] = ends;
-        Means { speeds: [(low * (1.0 + RESERVE)).max(slowest), high * (1.0 - RESERVE)], last, slower, slow }
+        // From its slowest step to its fastest, and back, lags included.
+        let (first, top) = (usable.first(), usable.last());
+        let rate = |from: Option<&SpeedStep>, to: Option<&SpeedStep>| {
+            let takes = from.zip(to).map_or(0.0, |(from, to)| self.model.settles_within(*from, *to).as_s());
+            (high - low) / takes.max(LEAST_CHANGE)
+        };
+        let rates = [rate(first, top), rate(top, first)];
+        let speeds = [(low * (1.0 + RESERVE)).max(slowest), high * (1.0 - RESERVE)];
+        Means { speeds, rates, last, slower, slow }
     }
 
     /// Where zones on the way to a target allow less, and what the step that keeps to them runs at, as m before the target.
@@ -258,7 +283,13 @@ mod tests {
     fn means() -> Means {
         let step = SpeedStep::new(6).expect("a step");
         let last = FinalStep { step, speed: 0.25, stop_way: 0.15, stop_time: 1.2 };
-        Means { speeds: [0.05, 0.5], last: alloc::vec![last], slower: Vec::new(), slow: Vec::new() }
+        Means {
+            speeds: [0.05, 0.5],
+            rates: [0.15, 0.15],
+            last: alloc::vec![last],
+            slower: Vec::new(),
+            slow: Vec::new(),
+        }
     }
 
     #[test]
@@ -297,6 +328,22 @@ mod tests {
         let patient = Means { slower: alloc::vec![crawls], ..at_the_end };
         let soonest = patient.soonest(begins).expect("some time");
         assert_eq!(patient.plan(begins(0.0).expect("a state"), soonest).map(|plan| plan.last), Some(crawls));
+    }
+
+    #[test]
+    fn nobody_is_planned_to_change_speed_faster_than_a_train_does() {
+        // A short way: without that it would be at its last step in no time.
+        let begins = Beginning { after: 3.0, left: 1.1, speed: 0.12 };
+        let sluggish = Means { rates: [0.08, 0.08], ..means() };
+        let brisk = Means { rates: [10.0, 10.0], ..means() };
+        let [earlier, later] =
+            [brisk, sluggish.clone()].map(|means| means.soonest(|_| Some(begins)).expect("some time"));
+        assert!(later > earlier + 0.4, "{later} after {earlier}");
+        let plan = sluggish.plan(begins, later).expect("a plan");
+        let motion = plan.profile.motion();
+        let speed = |tenth: u32| motion.state_at(TimeSpan::from_s(0.1 * f64::from(tenth))).speed.as_m_per_s();
+        let tenths = (10.0 * motion.duration().as_s()) as u32;
+        assert!((1..tenths).all(|tenth| (speed(tenth) - speed(tenth - 1)).abs() < 0.1 * 0.1));
     }
 
     #[test]

@@ -220,19 +220,23 @@ impl DrivenTrain {
             let waits = TimeSpan::from_s(seconds - unhurried);
             return planned(unhurried, now + waits).ok_or(Refusal::Lost { train: self.id() });
         }
-        // One step and the stop: what takes the least time, or all of it.
+        // One step and the stop, from one that is sure or slower: on a short way that is steady by then where a fast one is not.
         let stands = self.model.standing_times();
         let slowest = self.restricted_until(ground, now, at).into_iter().map(|(_, step)| step).min();
-        let may_run = |step: SpeedStep| may_start(&step) && slowest.is_none_or(|slowest| step <= slowest);
-        let steps = means.last.iter().chain(&means.slower);
-        let runs = steps.filter(|last| may_run(last.step)).filter_map(|last| {
-            match self.short_run(ground, now, at, last.step, &destination) {
-                CommandTime::At(stop, rest) => {
-                    let stands = self.standing_time(&stands, [now + LINE_TIME, stop], last.step, &rest)?;
-                    Some((last.step, stands - now, spread(&rest)))
-                }
-                _ => None,
+        let creeps = |step: SpeedStep| self.model.steady_speed(step, Approach::Below) < CREEPING;
+        let sure = || means.last.iter().map(|last| last.step);
+        let fastest = sure().max().into_iter().chain(slowest).min();
+        let may_run = |step: &SpeedStep| {
+            let is_sure = sure().any(|sure| sure == *step);
+            fastest.is_none_or(|fastest| *step <= fastest) && (is_sure || !creeps(*step))
+        };
+        let steps = starts.iter().copied().filter(may_run);
+        let runs = steps.filter_map(|step| match self.short_run(ground, now, at, step, &destination) {
+            CommandTime::At(stop, rest) => {
+                let stands = self.standing_time(&stands, [now + LINE_TIME, stop], step, &rest)?;
+                Some((step, stands - now, spread(&rest)))
             }
+            _ => None,
         });
         let runs: Vec<_> = runs.collect();
         let in_time = runs.iter().filter(|(_, takes, _)| *takes <= within);

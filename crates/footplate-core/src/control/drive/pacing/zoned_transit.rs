@@ -34,7 +34,7 @@ impl SlowPart {
     }
 
     /// Whether a motion is no faster there.
-    pub(super) fn allows(&self, motion: &impl Motion) -> bool {
+    pub(super) fn allows(&self, motion: &dyn Motion) -> bool {
         let seconds = motion.duration().as_s();
         (0..=SAMPLES).all(|nth| {
             let state = motion.state_at(TimeSpan::from_s(seconds * f64::from(nth) / f64::from(SAMPLES)));
