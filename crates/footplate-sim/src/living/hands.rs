@@ -50,6 +50,7 @@ impl LivingLayout<'_> {
         self.take_up(place);
         self.trains[place].is_wrecked = false;
         self.trains[place].body = body;
+        self.trains[place].put_down_at = self.trains[place].odometer;
         self.find_near();
         self.remind(place, self.now());
         Ok(())

@@ -71,6 +71,8 @@ pub(crate) struct LiveTrain {
     /// Speed with dirty wheels over speed with clean ones.
     pub(crate) wheels: f64,
     pub(crate) odometer: f64,
+    /// What that showed when a hand put the train down last.
+    pub(crate) put_down_at: f64,
     /// Since when it has stood, while it stands.
     pub(crate) stands_since: Option<Timestamp>,
     /// Nothing that it was told will move it.
@@ -111,6 +113,7 @@ impl LiveTrain {
             speed: 0.0,
             wheels: 1.0,
             odometer: 0.0,
+            put_down_at: 0.0,
             stands_since: Some(Timestamp::ZERO),
             sleeps: true,
             is_wrecked: false,

@@ -127,6 +127,8 @@ impl<'w, 'l> Truth<'w, 'l> {
         let found = self.found(train)?;
         let by = |pass: &&PassTruth| pass.train == Some(train) && pass.sensor == sensor;
         let passed = self.world.s88.passes.iter().rev().find(by);
+        // What it passed before a hand took it elsewhere is no way from here.
+        let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
         let before = self.way_to(found.body.as_ref()?.place()?, sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };

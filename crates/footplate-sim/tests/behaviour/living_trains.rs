@@ -1,7 +1,8 @@
 //! Trains on a living layout go where turnouts lead them, close what they come to, and come to grief.
 
-use footplate_core::track::Leg;
-use footplate_core::{SensorId, TurnoutId};
+use footplate_core::track::{Leg, Position};
+use footplate_core::{Length, SensorId, TurnoutId};
+use footplate_sim::living::End;
 use footplate_sim::{CtsSwitch, LivingSwitches, MishapKind, StationSwitches, VirtualStation};
 
 use crate::yard::{OTHER, TRAIN, empty, put, say, two_loops, wait};
@@ -180,6 +181,32 @@ fn hands_lift_push_dirty_and_swap() {
     station.world_mut().swap(TRAIN, other.clone(), 1.0).unwrap();
     assert_eq!(station.world().truth().engine(TRAIN), Some(&other));
     assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+}
+
+#[test]
+fn what_a_train_passed_before_a_hand_took_it_elsewhere_is_no_way_from_there() {
+    let layout = two_loops();
+    let mut station = empty(&layout, StationSwitches::default());
+    put(&mut station, TRAIN, "S1", "S2", 300.0);
+    let node = |name| layout.node_named(name).unwrap();
+    let behind = layout.sensor_at(node("S2")).unwrap();
+    let past = |station: &VirtualStation<'_>| station.world().truth().past(TRAIN, behind).unwrap().as_mm();
+    say(&mut station, &[10, 24]);
+    while sensors_passed(&station).is_empty() {
+        wait(&mut station, 0.2);
+    }
+    say(&mut station, &[0, 24]);
+    wait(&mut station, 8.0);
+    assert!(past(&station) > 0.0);
+    let edge = layout.edge_between(node("S2"), node("S3")).unwrap();
+    let mut put_down = |mm: f64| {
+        let at = Position { edge, offset: Length::from_mm(mm) };
+        station.world_mut().place(TRAIN, at, End::Nose).unwrap();
+        past(&station)
+    };
+    // It has not come by there since: the next time is nearly a round ahead.
+    let (first, second) = (put_down(250.0), put_down(300.0));
+    assert!(first < -1000.0 && (second - first - 50.0).abs() < 1e-6, "{first} {second}");
 }
 
 #[test]
