@@ -52,12 +52,35 @@ impl By {
     }
 }
 
+/// What the train does that is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Began {
+    /// It stands, far from the place.
+    Rest,
+    /// It stands less than that before the place, as it comes to those that are a round and a little ahead.
+    RestNearBy,
+    /// It runs.
+    Run,
+}
+
+impl Began {
+    pub(super) const ALL: [Self; 3] = [Self::Rest, Self::RestNearBy, Self::Run];
+
+    pub(super) const fn key(self) -> &'static str {
+        match self {
+            Self::Rest => "at rest",
+            Self::RestNearBy => "at rest, near by",
+            Self::Run => "on the run",
+        }
+    }
+}
+
 /// One order.
 #[derive(Debug, Clone)]
 pub(super) struct Arrived {
     pub(super) by: By,
     pub(super) train: TrainId,
-    pub(super) from_rest: bool,
+    pub(super) from: Began,
     /// The time that was asked for (s) and the way (mm).
     pub(super) asked: [f64; 2],
     /// How late it stood (s), and how far beyond (mm).
@@ -131,8 +154,9 @@ impl Trip<'_, '_> {
         nearest.unwrap_or(SpeedStep::STAND)
     }
 
-    /// A place about so far ahead (mm), and how far exactly.
-    fn target(&mut self, far: f64) -> Option<(Landmark, f64)> {
+    /// A place about so far ahead (mm), and how far exactly it is to where it comes first: further than a round is beyond the
+    /// place at which it was a round before.
+    fn target(&mut self, far: f64, from_rest: bool) -> Option<(Landmark, f64)> {
         let located = self.counted.driver.locate(self.train, self.now())?;
         let mut at = self.way.nodes.iter().position(|node| *node == located.at.node)?;
         let mut way = -located.at.way.as_mm();
@@ -141,7 +165,16 @@ impl Trip<'_, '_> {
             let length = self.layout.open_hops_from(node, &self.stage.turnouts).next()?.length.as_mm();
             if way + length >= far {
                 let offset = (far - way).max(0.0);
-                return Some((Landmark { node, offset: Length::from_mm(offset) }, way + offset));
+                let round: f64 = self
+                    .way
+                    .edges
+                    .iter()
+                    .filter_map(|edge| Some(self.layout.edge(*edge)?.length.as_mm()))
+                    .sum();
+                // Who runs cannot stop for what is too near, and takes it the next time.
+                let is_first = from_rest && way + offset > round;
+                let ahead = if is_first { way + offset - round } else { way + offset };
+                return Some((Landmark { node, offset: Length::from_mm(offset) }, ahead));
             }
             way += length;
             at = (at + 1) % self.way.nodes.len();
@@ -153,7 +186,7 @@ impl Trip<'_, '_> {
         let mut arrived = Arrived {
             by: self.by,
             train: self.train,
-            from_rest,
+            from: if from_rest { Began::Rest } else { Began::Run },
             asked: [0.0; 2],
             late_and_beyond: None,
             refused: false,
@@ -168,11 +201,14 @@ impl Trip<'_, '_> {
         }
         let far = self.choice.between(FAR[0], FAR[1]);
         let mean = self.choice.between(MEAN[0], MEAN[1]);
-        let Some((target, way)) = self.target(far) else {
+        let Some((target, way)) = self.target(far, from_rest) else {
             arrived.trouble = Some("nobody knows where it is".to_owned());
             return arrived;
         };
-        let mut within = TimeSpan::from_s(way / mean + if from_rest { START_AND_STOP } else { 0.0 });
+        if from_rest && way < FAR[0] {
+            arrived.from = Began::RestNearBy;
+        }
+        let mut within = TimeSpan::from_s(far / mean + if from_rest { START_AND_STOP } else { 0.0 });
         let before = self.counted.steps(self.train);
         let mut order = self.order(target, within, mean);
         if let Err(Refusal::TooSoon { earliest: time, .. } | Refusal::TooSlow { latest: time, .. }) = &order {
@@ -235,8 +271,8 @@ impl Trip<'_, '_> {
         let past = truth.past(self.train, self.layout.sensor_at(target.node)?)?;
         let beyond = (past - target.offset).as_mm();
         let lap: f64 = self.way.edges.iter().map(|edge| truth.track().length(*edge).as_mm()).sum();
-        // A contact that it has not come by yet is a round behind it.
-        let beyond = if beyond < -0.5 * lap { beyond + lap } else { beyond };
+        // A contact that it has not come by yet is a round behind it, and the one behind it a round ahead.
+        let beyond = beyond - lap * (beyond / lap).round();
         Some([(stood - by).as_s(), beyond])
     }
 }

@@ -34,8 +34,10 @@ const ARRIVE: &str = "\
 ## In time at a place
 
 Places 1.8 to 6 m ahead, each to be stood at after a time that asks for 170 to 320 mm/s on the way; every other train runs
-when it is asked. Who cannot be in time is asked again for the time that it offers. True times and places of rest (asked:
-0.3 s and 25 mm at the 95th percentile), median / 95th percentile. The *step of the mean speed* stops at the same place.
+when it is asked. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
+little ahead do: it waits, and moves up. Who cannot be in time is asked again for the time that it offers. True times and places
+of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. *Told the train* is the same driver with a
+model made of the truth. The *step of the mean speed* stops at the same place.
 ";
 
 const FOLLOW: &str = "\
@@ -106,7 +108,7 @@ impl WrittenScores for Page<'_> {
         let arrived = self.scored.iter().flat_map(|scored| {
             scored.arrived.iter().map(move |arrived| {
                 json!({
-                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from_rest": arrived.from_rest,
+                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from": arrived.from.key(),
                     "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
                     "late_s": arrived.late_and_beyond.map(|[late, _]| late),
                     "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
@@ -199,9 +201,9 @@ impl Page<'_> {
         )
     }
 
-    fn arrived(&self, by: arrive::By, from_rest: bool) -> impl Iterator<Item = &Arrived> {
+    fn arrived(&self, by: arrive::By, from: arrive::Began) -> impl Iterator<Item = &Arrived> {
         let all = self.scored.iter().flat_map(|scored| &scored.arrived);
-        all.filter(move |arrived| arrived.by == by && arrived.from_rest == from_rest)
+        all.filter(move |arrived| arrived.by == by && arrived.from == from)
     }
 
     fn write_arrived(&self, output: &mut dyn Write) -> io::Result<()> {
@@ -210,8 +212,9 @@ impl Page<'_> {
             "| driven by | asked | orders | other time offered | failed | late or early s | off mm | commands each |\n\
              | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for (by, from_rest) in arrive::By::ALL.into_iter().flat_map(|by| [(by, true), (by, false)]) {
-            let all: Vec<&Arrived> = self.arrived(by, from_rest).collect();
+        for (by, from) in arrive::By::ALL.into_iter().flat_map(|by| arrive::Began::ALL.map(|from| (by, from)))
+        {
+            let all: Vec<&Arrived> = self.arrived(by, from).collect();
             let off = |which: usize| {
                 let values = all.iter().filter_map(|arrived| arrived.late_and_beyond);
                 let values: Vec<f64> = values.map(|off| off[which].abs()).collect();
@@ -223,7 +226,7 @@ impl Page<'_> {
                 output,
                 "| {} | {} | {} | {} | {} | {} / {} | {} / {} | {:.1} |",
                 by.key(),
-                if from_rest { "at rest" } else { "on the run" },
+                from.key(),
                 all.len(),
                 all.iter().filter(|arrived| arrived.refused).count(),
                 all.iter().filter(|arrived| arrived.trouble.is_some()).count(),

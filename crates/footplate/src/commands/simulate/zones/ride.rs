@@ -4,7 +4,7 @@ use anyhow::Context;
 use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Driver, Gap, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
-use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Approach, EdgeId, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 
 use super::passage::{Passage, Watched};
 use crate::commands::simulate::driving::choice::Choice;
@@ -22,8 +22,9 @@ const FAR: [f64; 2] = [1800.0, 6000.0];
 const GAP: f64 = 4.0;
 /// Contacts between the two at the beginning.
 const APART: usize = 3;
-/// Who was left behind so far that its leader comes round to it ends its ride at the contact before: nobody holds back a leader.
-const ROUND: usize = 1;
+/// Who was left behind so far that its leader comes round to it ends its ride when that is so near (mm): nobody holds back a
+/// leader.
+const ROUND: f64 = 500.0;
 /// Between one order and the next (s).
 const PAUSE: f64 = 2.0;
 /// A time that was offered, and this part more, is asked for next.
@@ -168,14 +169,16 @@ impl Ride<'_, '_> {
 
     /// Whether the leader is just behind its follower.
     fn leader_comes_round(&self) -> bool {
-        let now = self.stage.line.now();
-        let nodes = &self.way.nodes;
+        let length = |edge: EdgeId| self.driver.layout().edge(edge).map_or(0.0, |edge| edge.length.as_mm());
+        let edges = &self.way.edges;
+        let round: f64 = edges.iter().map(|edge| length(*edge)).sum();
         let place = |train| {
-            let located = self.driver.locate(train, now)?;
-            nodes.iter().position(|node| *node == located.at.node)
+            let at = self.driver.position(train, self.stage.line.now())?;
+            let nth = edges.iter().position(|edge| *edge == at.edge)?;
+            Some(edges.iter().take(nth).map(|edge| length(*edge)).sum::<f64>() + at.offset.as_mm())
         };
-        let behind = |(train, leader)| (train + nodes.len() - leader) % nodes.len();
-        place(self.train).zip(place(self.leader)).map(behind) == Some(ROUND)
+        let behind = |(train, leader): (f64, f64)| (train - leader).rem_euclid(round);
+        place(self.train).zip(place(self.leader)).map(behind).is_some_and(|behind| behind < ROUND)
     }
 
     /// What the train's odometer shows (mm).
