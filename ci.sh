@@ -139,7 +139,7 @@ each_table() {
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
-  "$1" pacing-unseen simulate pacing --seeds 31..36 --markdown
+  "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..100 --teeth 80,100,200 --markdown
 }
