@@ -207,13 +207,14 @@ fn two_trains_whose_ways_cross_are_sent_at_once_and_both_arrive() {
     let link = "sim:track-a?seed=7&faults=none&trains=24,58";
     let store = store_that_knows("crossing-store", link, &["24", "58"]);
     // While it learns, train 24 gets stuck once; that it was pushed says nothing of how it starts.
-    // Each is found, one after the other; then both are sent over the same necks at once, and again.
+    // Each is found, one after the other; then both are sent over the same necks at once, and again: the
+    // one to where the other comes by.
     let finds = |train: u16| {
         format!("speed {train} 9\nwait {train} located\nwait 15s\nstop {train}\nwait {train} at rest\n")
     };
     let script = format!(
         "turnout all straight\nlength 24 pickup 45mm overhang 110mm\nlength 58 pickup 45mm overhang 110mm\n{}{}\
-         go 24 to E7+200mm\ngo 58 to B5+100mm\nwait 24 at rest\nwait 58 at rest\ngo 24 to A4+100mm\ngo 58 to C6+200mm\n",
+         go 24 to E7+200mm\ngo 58 to B5+100mm\nwait 24 at rest\nwait 58 at rest\ngo 24 to A4+100mm\ngo 58 to C14+100mm\n",
         finds(24),
         finds(58)
     );
