@@ -86,6 +86,14 @@ impl Watched {
         self.dog.order(self.world.now, Order::Speed { train, step: step(number) }).expect("free to go");
     }
 
+    /// A person puts the first train down, and says where.
+    fn put_first_down(&mut self) {
+        self.world.put(24, "D1", 100.0);
+        let node = self.world.layout.node_named("D1").expect("a node");
+        let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(100.0) };
+        self.dog.place(self.world.now, FIRST, at, Length::from_mm(3.0));
+    }
+
     fn alarm(&self) -> Option<Alarm> {
         self.said.iter().find_map(|notice| match notice {
             WatchdogNotice::Danger { why, .. } => Some(*why),
@@ -243,10 +251,7 @@ fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_
     };
     assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
     assert!(watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) }).is_err());
-    watched.world.put(24, "D1", 100.0);
-    let node = watched.world.layout.node_named("D1").expect("a node");
-    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(100.0) };
-    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.put_first_down();
     watched.go(FIRST, 8);
     watched.run(10.0);
     assert!(!watched.dog.is_held(FIRST));
@@ -265,10 +270,7 @@ fn what_waited_for_a_train_that_a_person_put_down_is_said_to_be_dropped() {
     assert!(watched.run_until(250.0, asks), "{:#?}", watched.said);
     assert!(watched.dog.is_held(SECOND), "{:#?}", watched.said);
     let from = watched.said.len();
-    watched.world.put(24, "D1", 100.0);
-    let node = watched.world.layout.node_named("D1").expect("a node");
-    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(100.0) };
-    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.put_first_down();
     watched.listen();
     assert!(!watched.dog.is_held(SECOND));
     assert!(

@@ -3,8 +3,9 @@
 //! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
 //! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
 //! the laws, `r(t)` share of its change that is done. What is the same whenever the train does it again has letters
-//! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law, `τ` upwards and downwards, and what ln speed
-//! is off by at each of the steps met of late, `s`. With `Δ` the speed before a change less that after it, the train is at
+//! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law,
+//! `τ` upwards and downwards, and what ln speed is off by at each of the steps met of late, `s`. With `Δ` the speed before
+//! a change less that after it, the train is at
 //!
 //! ```text
 //! x(t) = b + e^(ε + s) S(t − η) + (ζ + τ Δ) r(t)

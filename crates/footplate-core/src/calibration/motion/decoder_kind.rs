@@ -130,8 +130,8 @@ impl Supposed {
 impl MotionModel {
     /// The kind of decoder that its numbers bear best, with what they are then.
     pub(super) fn supposed(&self) -> (DecoderKind, Supposed) {
-        let [lagging, counted, even] = DecoderKind::ALL.map(|kind| (kind, Supposed::of(self, kind)));
-        [counted, even]
+        let [lagging, others @ ..] = self.kinds();
+        others
             .into_iter()
             .fold(lagging, |best, other| if other.1.evidence >= best.1.evidence { other } else { best })
     }
@@ -139,7 +139,11 @@ impl MotionModel {
     /// Part of a stop's displacement by which no shape is true in its middle. Where a lag is clearly the kind there is no
     /// ramp whose rounding the shape could miss.
     pub(super) fn stop_shape_error(&self) -> f64 {
-        let [lagging, counted, even] = DecoderKind::ALL.map(|kind| Supposed::of(self, kind).evidence);
+        let [lagging, counted, even] = self.kinds().map(|(_, supposed)| supposed.evidence);
         if lagging > counted.max(even) + CLEARLY { LAG_SHAPE_ERROR } else { SHAPE_ERROR }
+    }
+
+    fn kinds(&self) -> [(DecoderKind, Supposed); 3] {
+        DecoderKind::ALL.map(|kind| (kind, Supposed::of(self, kind)))
     }
 }
