@@ -165,12 +165,7 @@ impl Trip<'_, '_> {
             let length = self.layout.open_hops_from(node, &self.stage.turnouts).next()?.length.as_mm();
             if way + length >= far {
                 let offset = (far - way).max(0.0);
-                let round: f64 = self
-                    .way
-                    .edges
-                    .iter()
-                    .filter_map(|edge| Some(self.layout.edge(*edge)?.length.as_mm()))
-                    .sum();
+                let round = self.way.surveyed(self.layout, self.way.edges.len());
                 // Who runs cannot stop for what is too near, and takes it the next time.
                 let is_first = from_rest && way + offset > round;
                 let ahead = if is_first { way + offset - round } else { way + offset };

@@ -20,6 +20,12 @@ pub(crate) struct Way {
 }
 
 impl Way {
+    /// The surveyed lengths (mm) of its first edges, summed.
+    pub(crate) fn surveyed(&self, layout: &Layout, edges: usize) -> f64 {
+        let edges = self.edges.iter().take(edges).filter_map(|edge| layout.edge(*edge));
+        edges.map(|edge| edge.length.as_mm()).sum()
+    }
+
     /// The longest that there is.
     pub(crate) fn round(layout: &Layout) -> Self {
         let turnouts: TurnoutStates =

@@ -4,7 +4,7 @@ use anyhow::Context;
 use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Driver, Gap, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
-use footplate_core::{Approach, EdgeId, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 
 use super::passage::{Passage, Watched};
 use crate::commands::simulate::driving::choice::Choice;
@@ -169,13 +169,12 @@ impl Ride<'_, '_> {
 
     /// Whether the leader is just behind its follower.
     fn leader_comes_round(&self) -> bool {
-        let length = |edge: EdgeId| self.driver.layout().edge(edge).map_or(0.0, |edge| edge.length.as_mm());
-        let edges = &self.way.edges;
-        let round: f64 = edges.iter().map(|edge| length(*edge)).sum();
+        let (layout, edges) = (self.driver.layout(), &self.way.edges);
+        let round = self.way.surveyed(layout, edges.len());
         let place = |train| {
             let at = self.driver.position(train, self.stage.line.now())?;
             let nth = edges.iter().position(|edge| *edge == at.edge)?;
-            Some(edges.iter().take(nth).map(|edge| length(*edge)).sum::<f64>() + at.offset.as_mm())
+            Some(self.way.surveyed(layout, nth) + at.offset.as_mm())
         };
         let behind = |(train, leader): (f64, f64)| (train - leader).rem_euclid(round);
         place(self.train).zip(place(self.leader)).map(behind).is_some_and(|behind| behind < ROUND)
