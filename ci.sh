@@ -12,7 +12,13 @@
 #   scenarios    the tables in docs/tables are what the program and its examples print
 #   browser      a report opens in a browser: every chart drawn, dark and light, on a phone, by keyboard
 #
-# And one that changes files, never part of "every step":
+# And two that are never part of "every step". One drives every scorer on seeds that nobody chose, drawn from the hash of
+# the commit, prints how often happened what must not, with 95 % intervals, and fails on grief: trains that touched,
+# derailed or ran off the track. It takes hours; FRESH_SEEDS=4 makes it short.
+#
+#   fresh        every scorer on FRESH_SEEDS (64 unless set) fresh seeds
+#
+# The other changes files:
 #
 #   expected     refreshes the committed outputs; read the diff and explain it in the commit
 #
@@ -129,19 +135,20 @@ refresh_example() {
 }
 
 # Calls $1 with the name of each table and what prints it: arguments of the program, or an example and its name. The
-# tests built both already.
+# tests built both already. Seeds here are regression seeds: they were looked at while the program was made.
 each_table() {
   cargo build --quiet --workspace --bins --examples --profile test
   "$1" prediction predict testdata/sensor-logs/*.csv --layout track-a --markdown
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
+  "$1" worlds simulate worlds --seeds fresh:3@4b2f3adebb65132c21b1a2dd5eddba5c840b81d2 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
-  "$1" odometry simulate line --score --seeds 1..100 --teeth 80,100,200 --markdown
+  "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
 }
 
 # What is odd in the logs is said in testdata/sensor-logs/README.md.
@@ -188,6 +195,57 @@ refresh_table() {
   mv "$TARGET/$1.md" "$TABLES/$1.md"
 }
 
+# Scorers with their seeds, a share of FRESH_SEEDS each: what takes longer has fewer.
+each_scorer() {
+  local all="${FRESH_SEEDS:-64}"
+  "$1" "$all" driving
+  "$1" "$all" pacing
+  "$1" "$all" disasters
+  "$1" "$all" zones
+  "$1" "$all" traffic --hours 1
+  "$1" "$(((all + 3) / 4))" worlds
+}
+
+# Prints the rates of a scorer on fresh seeds; runs that failed are kept in the form of testdata/seeds.txt.
+print_rates() {
+  local count=$1 scorer=$2 status=0
+  shift 2
+  "$TARGET/debug/footplate" simulate "$scorer" --seeds "fresh:$count" --rates "$@" \
+    2>"$TARGET/fresh-$scorer.err" | tee -a "$TARGET/fresh.md" || status=$?
+  sed -n 's/^failed: \(.*\); only this again: footplate \(.*\)$/\2   # \1/p' "$TARGET/fresh-$scorer.err" \
+    >>"$TARGET/fresh-failed.txt"
+  # Status 1 says that something falls short, which the table shows.
+  [[ $status -le 1 ]] || {
+    cat "$TARGET/fresh-$scorer.err"
+    return "$status"
+  }
+}
+
+step_fresh() {
+  need_compiler
+  need git git # seeds are drawn from the commit
+  cargo build --quiet --workspace --bins --profile test
+  : >"$TARGET/fresh.md"
+  : >"$TARGET/fresh-failed.txt"
+  echo "fresh seeds of commit $(git rev-parse --short=12 HEAD)$([[ -z $(git status --porcelain -uno) ]] || echo ', changed')"
+  echo
+  echo "| scorer | what should not happen | times | of | % | 95 % interval |"
+  echo "| --- | --- | ---: | ---: | ---: | ---: |"
+  each_scorer print_rates
+  echo
+  # Status 1 says that something falls short, which the table shows.
+  "$TARGET/debug/footplate" simulate line --score --seeds "fresh:${FRESH_SEEDS:-64}" --markdown || [[ $? -eq 1 ]]
+  if [[ -s $TARGET/fresh-failed.txt ]]; then
+    echo
+    echo "regression seeds to keep in testdata/seeds.txt:"
+    cat "$TARGET/fresh-failed.txt"
+  fi
+  if grep -q '\*\*came to grief\*\*' "$TARGET/fresh.md"; then
+    echo "trains came to grief on fresh seeds"
+    return 1
+  fi
+}
+
 step_expected() {
   need_compiler
   each_example refresh_example
@@ -223,7 +281,7 @@ if [[ ${#steps[@]} -eq 0 || ${steps[*]} == all ]]; then
 fi
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step is called '$step'; there are: all ${ALL_STEPS[*]} expected" >&2
+    echo "ci.sh: no step is called '$step'; there are: all ${ALL_STEPS[*]} expected fresh" >&2
     exit 2
   fi
 done

@@ -47,8 +47,11 @@ fn whole(means: &'static str, round: &Round, settings: OdometrySettings) -> Oper
 }
 
 fn dependent_on_all_of(estimate: &MotionEstimate) -> f64 {
-    let speeds = estimate.speed + estimate.speed_low + estimate.speed_high + estimate.speed_deviation;
-    let distances = estimate.distance + estimate.distance_low + estimate.distance_high;
+    let speeds = estimate.speed
+        + estimate.guaranteed.speed_low
+        + estimate.confidence.speed_high
+        + estimate.speed_deviation;
+    let distances = estimate.distance + estimate.guaranteed.distance_low + estimate.confidence.distance_high;
     let amounts = estimate.over + estimate.under;
     let shares: f64 = estimate.shares.iter().sum();
     let states = estimate.wheels[0] as u8 + estimate.wheels[1] as u8 + estimate.mode as u8;

@@ -28,6 +28,8 @@ pub(crate) enum Purpose {
     Scenario = 6,
     /// A living layout: what its trains, turnouts and people draw from.
     Living = 7,
+    /// Physics from outside the usual ranges: see `PhysicsRange`.
+    Physics = 8,
 }
 
 /// One stream of draws.

@@ -13,6 +13,8 @@
 //! host  script        the program that polls and the person with the tape
 //! rolling  load       a train on rails       poller  contacts  gates
 //! motor  law  train  speed_table             path  railway  circuit  track
+//! physics_range  traits  other_law           worlds that no estimator is built on
+//! electric                                   a second train model, by other equations
 //! draws
 //! ```
 //!
@@ -22,6 +24,7 @@
 mod circuit;
 mod contacts;
 mod draws;
+mod electric;
 mod gates;
 mod host;
 mod law;
@@ -29,7 +32,9 @@ pub mod line;
 pub mod living;
 mod load;
 mod motor;
+mod other_law;
 mod path;
+mod physics_range;
 mod poller;
 mod railway;
 mod recording;
@@ -40,16 +45,20 @@ mod script;
 mod speed_table;
 mod track;
 mod train;
+mod traits;
 mod truth;
 
 pub use circuit::{Circuit, CircuitError};
 pub use contacts::{Cause, Faults};
+pub use electric::ElectricEngine;
 pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use living::{
     CoilAlarm, CtsSwitch, End, FromStation, HandError, LivingLayout, LivingSwitches, Mishap, MishapKind,
     PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualStation,
 };
+pub use other_law::OtherLaw;
+pub use physics_range::PhysicsRange;
 pub use poller::Link;
 pub use railway::Railway;
 pub use recording::SimulatedRecording;
@@ -59,4 +68,5 @@ pub use script::{Order, Script, Start, What, When};
 pub use speed_table::{Shape, SpeedTable};
 pub use track::TrueTrack;
 pub use train::{StopScatter, Train};
+pub use traits::{SessionSpread, StickyStarts, Traits};
 pub use truth::{CommandTruth, Motion, ReportTruth, RunTruth, StopTruth};

@@ -2,9 +2,12 @@
 
 use core::ops::Deref;
 
+use footplate_core::Approach;
+
 use crate::draws::Draws;
 use crate::motor::STEP_S;
 use crate::train::Train;
+use crate::traits::Session;
 
 /// Time in which a train's speed takes in a change of the rail under it (chosen: a coach length at mid speed).
 const RAIL_LAG_S: f64 = 0.15;
@@ -31,6 +34,8 @@ pub(crate) struct Load<T> {
     warmth: f64,
     /// The factor after the lag.
     factor: f64,
+    /// What this session has of its own.
+    session: Session,
 }
 
 impl<T: Deref<Target = Train>> Load<T> {
@@ -38,7 +43,9 @@ impl<T: Deref<Target = Train>> Load<T> {
     pub(crate) fn new(train: T, warmth: f64, rail: f64, mut draws: Draws) -> Self {
         let run = draws.normal(1.0, train.run_deviation.as_parts());
         let wander = draws.normal(0.0, train.wander.as_parts());
-        let mut load = Self { train, draws, run, wander, until_slow: SLOW_STEP_S, warmth, factor: 1.0 };
+        let session = Session::AVERAGE;
+        let mut load =
+            Self { train, draws, run, wander, until_slow: SLOW_STEP_S, warmth, factor: 1.0, session };
         load.factor = load.goal(rail);
         load
     }
@@ -47,6 +54,18 @@ impl<T: Deref<Target = Train>> Load<T> {
     pub(crate) fn begin_run(&mut self, rail: f64) {
         self.run = self.draws.normal(1.0, self.train.run_deviation.as_parts());
         self.factor = self.goal(rail);
+    }
+
+    /// Another session begins, with what it has of its own.
+    pub(crate) fn begin_session(&mut self, session: Session) {
+        self.session = session;
+    }
+
+    /// Speed over that of an average session at a wheel speed (mm/s).
+    pub(crate) fn of_session(&self, wheel: f64) -> f64 {
+        let top = self.train.speeds.speed(self.train.speeds.highest(), Approach::Below).as_mm_per_s();
+        let part = wheel / top.max(1.0);
+        self.session.speed * (1.0 + self.session.top * part * part)
     }
 
     /// The train has stood for a while; the same as as many steps at rest, all at once.

@@ -15,6 +15,7 @@ use footplate_core::{Acceleration, Approach, Speed, SpeedStep, TimeSpan};
 use crate::draws::Draws;
 use crate::law::{COUNTS_PER_STEP, Law};
 use crate::train::Train;
+use crate::traits::Session;
 
 /// The step of the integration. The shortest time constant of a drawn train is forty times longer.
 pub(crate) const STEP_S: f64 = 1e-3;
@@ -37,6 +38,8 @@ const STRETCH: core::ops::RangeInclusive<f64> = 0.75..=1.25;
 const TRIAL_STRETCH: f64 = 0.01;
 /// Samples in the longest moving average (chosen: ten seconds of them).
 const MOST_SAMPLES: f64 = 10_000.0;
+/// Friction of a train that rolls downhill without drive, over that on the level, at the least (chosen: worm gears).
+const LEAST_FRICTION: f64 = 0.3;
 /// No stop takes longer than this (chosen: ten times the longest measured).
 const LONGEST_STOP_S: f64 = 60.0;
 
@@ -55,6 +58,8 @@ enum Process {
     Counted { up_s: f64, down_s: f64, count: u16, until_next: f64, play: f64 },
     /// A ramp upwards, a jump downwards.
     RampUp { up: f64 },
+    /// A law of no usual family; `phase` is the time in s since its last jump.
+    Other { phase: f64 },
 }
 
 /// A decoder and its motor under way; `T` is how its train is held, borrowed or shared.
@@ -76,6 +81,12 @@ pub(crate) struct Motor<T> {
     breakaway: Option<f64>,
     /// How fast the decoder's time runs: 1, but for stops, which scatter.
     pace: f64,
+    /// By how much the next start comes earlier than usual, in s.
+    hastened: f64,
+    /// What this session has of its own.
+    session: Session,
+    /// What the gradient under it takes from its speed each second while nothing drives it, in mm/s².
+    pub(crate) slope: f64,
 }
 
 impl<T: Deref<Target = Train> + Clone> Motor<T> {
@@ -83,6 +94,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
     pub(crate) fn at_rest(train: T) -> Self {
         let mm = Acceleration::as_mm_per_s2;
         let process = match train.law {
+            _ if train.traits.other_law.is_some() => Process::Other { phase: 0.0 },
             Law::Constant { up, down } => Process::Ramp { up: mm(up), down: mm(down) },
             Law::Smooth { up, down, shortest } => Process::Eased {
                 up: mm(up),
@@ -118,6 +130,9 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
             pending: None,
             breakaway: Some(0.0),
             pace: 1.0,
+            hastened: 0.0,
+            session: Session::AVERAGE,
+            slope: 0.0,
         }
     }
 
@@ -137,7 +152,11 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
                 *count = counts;
                 *play = above(approach);
             }
-            Process::Ramp { .. } | Process::Eased { .. } | Process::Direct | Process::RampUp { .. } => {}
+            Process::Ramp { .. }
+            | Process::Eased { .. }
+            | Process::Direct
+            | Process::RampUp { .. }
+            | Process::Other { .. } => {}
         }
         motor.set_speed = speed;
         motor.wheel_speed = speed;
@@ -150,7 +169,15 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         if self.is_at_rest() && self.step == SpeedStep::STAND {
             let breakaway = self.train.breakaway.as_mm_per_s();
             self.breakaway = Some(breakaway * draws.normal_within(1.0, START_SD, 2.5));
-            let dead_time = self.train.start_dead_time.as_s() * draws.normal_within(1.0, DEAD_TIME_SD, 2.5);
+            let mut dead_time =
+                self.train.start_dead_time.as_s() * draws.normal_within(1.0, DEAD_TIME_SD, 2.5);
+            if let Some(sticky) = self.train.traits.sticky {
+                match sticky.draw(draws) {
+                    Some(late) => dead_time = (dead_time + late).max(0.0),
+                    None => self.stall(),
+                }
+            }
+            dead_time -= std::mem::take(&mut self.hastened);
             self.pending = Some((step, dead_time));
             return;
         }
@@ -163,7 +190,8 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
             let per_stretch = (slower.way_to_rest_mm() - usual) / TRIAL_STRETCH;
             let scatter = self.train.stop_scatter.sd(Speed::from_mm_per_s(self.wheel_speed)).as_mm();
             let sd = if per_stretch > scatter { scatter / per_stretch } else { 0.0 };
-            self.pace = 1.0 / draws.normal(1.0, sd).clamp(*STRETCH.start(), *STRETCH.end());
+            let stretch = draws.normal(1.0, sd).clamp(*STRETCH.start(), *STRETCH.end());
+            self.pace = self.session.stop / stretch;
         }
     }
 
@@ -190,6 +218,26 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
             way += 0.5 * (before + self.advance()) * STEP_S;
         }
         way
+    }
+
+    /// Another session begins, with what it has of its own.
+    pub(crate) fn begin_session(&mut self, session: Session) {
+        self.session = session;
+    }
+
+    /// The next start from rest comes earlier by a time in s.
+    pub(crate) fn hasten_next_start(&mut self, by: f64) {
+        self.hastened = by;
+    }
+
+    /// The same train at rest in the same session, its decoder knowing nothing.
+    pub(crate) fn reset(&self) -> Self {
+        Self {
+            session: self.session,
+            slope: self.slope,
+            hastened: self.hastened,
+            ..Self::at_rest(self.train.clone())
+        }
     }
 
     /// Contact with the rail is lost at a crawl: the wheels stick until a higher step is commanded.
@@ -245,7 +293,8 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
             return;
         }
         // A stalled train gets going again when it is pushed up a step.
-        if step > self.step && self.breakaway == Some(f64::INFINITY) {
+        let is_pushed = self.step != SpeedStep::STAND && step > self.step;
+        if is_pushed && self.breakaway == Some(f64::INFINITY) {
             self.breakaway = Some(self.train.breakaway.as_mm_per_s());
         }
         self.aim(step, if step < self.step { Approach::Above } else { Approach::Below });
@@ -296,6 +345,10 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
                 self.train.speeds.mm_per_s(f64::from(*count) / f64::from(COUNTS_PER_STEP), *play)
             }
             Process::RampUp { up } => toward(self.set_speed, target, *up * dt, f64::INFINITY),
+            Process::Other { phase } => match self.train.traits.other_law {
+                Some(law) => law.advance(self.set_speed, target, dt, phase),
+                None => target,
+            },
         }
     }
 
@@ -312,8 +365,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         let stuck = self.breakaway.is_some();
         let drive = if stuck { 0.0 } else { self.set_speed };
         let lag = if stuck { RAMPED_MOTOR_LAG_S } else { self.lag(drive > self.wheel_speed) };
-        let friction =
-            if drive == 0.0 { self.train.friction.as_mm_per_s2().min(self.wheel_speed / dt) } else { 0.0 };
+        let friction = if drive == 0.0 { self.rolling_friction().min(self.wheel_speed / dt) } else { 0.0 };
         // Semi-implicit: the new speed on both sides, so that no lag however short can overshoot.
         let next = (self.wheel_speed + dt * (drive / lag - friction)) / (1.0 + dt / lag);
         self.wheel_speed = if drive == 0.0 && next < REST_MM_PER_S { 0.0 } else { next };
@@ -322,8 +374,19 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
+    /// What slows it down while nothing drives it, in mm/s²; a gear never rolls on by itself.
+    fn rolling_friction(&self) -> f64 {
+        let flat = self.train.friction.as_mm_per_s2();
+        (flat + self.slope).max(LEAST_FRICTION * flat)
+    }
+
     fn lag(&self, speeds_up: bool) -> f64 {
+        self.session.mass * self.unloaded_lag(speeds_up)
+    }
+
+    fn unloaded_lag(&self, speeds_up: bool) -> f64 {
         match self.train.law {
+            _ if self.train.traits.other_law.is_some() => RAMPED_MOTOR_LAG_S,
             Law::Lag { up, down } | Law::Mixed { up_lag: up, down, .. } => {
                 TimeSpan::as_s(if speeds_up { up } else { down }).max(STEP_S)
             }

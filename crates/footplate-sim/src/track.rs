@@ -95,6 +95,11 @@ impl TrueTrack {
         Length::from_mm(self.contact_offsets_mm.get(&sensor).copied().unwrap_or(0.0))
     }
 
+    /// A contact closes further along by so much, in mm.
+    pub(crate) fn move_contact(&mut self, sensor: SensorId, by_mm: f64) {
+        *self.contact_offsets_mm.entry(sensor).or_insert(0.0) += by_mm;
+    }
+
     /// Speed on an edge over speed on a level straight one, for a train that feels curves fully.
     #[must_use]
     pub fn speed_factor(&self, edge: EdgeId) -> Ratio {

@@ -6,6 +6,7 @@ use crate::draws::{Draws, Purpose};
 use crate::law::{Law, LawFamily};
 use crate::motor::{Motor, STEP_S};
 use crate::speed_table::{Shape, SpeedTable};
+use crate::traits::Traits;
 
 /// How far stops from one speed scatter, over and above what run deviation and command jitter do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,6 +80,8 @@ pub struct Train {
     pub nose: Length,
     /// From the shoe's end at the tail to the end of the train.
     pub tail: Length,
+    /// What else is peculiar to it; nothing, unless the world draws from a wider range.
+    pub traits: Traits,
 }
 
 impl Train {
@@ -131,6 +134,7 @@ impl Train {
             // Measured: the shoe comes 2 cm behind the front of an engine one way and 9 cm the other way.
             nose: Length::from_mm(draws.uniform(15.0..25.0)),
             tail: Length::from_mm(draws.uniform(80.0..100.0)),
+            traits: Traits::default(),
         }
     }
 

@@ -1,19 +1,25 @@
-//! Recordings in, a calibration out: gathers the runs of recordings, or of a store at a date, for the batch fit.
+//! Recordings in, motion models out: gathers the runs of recordings, or of a store at a date, and fits every train.
 
-use footplate_core::calibration::{Calibration, RunPassages, SectionIndex};
-use footplate_core::estimation::Predictor;
+use footplate_core::calibration::{Review, RunPassages, SectionIndex};
 use footplate_core::latency::{PollTiming, PollTimingEstimator};
 use footplate_core::track::Layout;
 use footplate_core::{Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
+use crate::motion_replay::{MotionReplay, RunBegin};
+use crate::poll_rhythm::poll_rhythm;
 use crate::recording::{Recording, Run};
 use crate::store::{Store, StoreError};
+
+/// The highest steps that decoders have (NMRA S-9.2).
+const DECODERS: [u8; 3] = [14, 28, 126];
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchRun {
     /// The recording it is of.
     pub recording: String,
+    /// Whether that is a live session.
+    pub is_live: bool,
     /// Its number there.
     pub id: RunId,
     /// When its clock stood at zero, since the Unix epoch, where the recording tells.
@@ -50,10 +56,19 @@ pub struct Polling {
     pub period: Option<Estimate<TimeSpan>>,
 }
 
-/// Runs, what they told, and what was made of it.
+/// One train of a batch.
+#[derive(Debug)]
+pub struct BatchTrain {
+    /// Its motion model, and what that was fitted to.
+    pub replay: MotionReplay,
+    /// What its runs show beside the model.
+    pub review: Review,
+}
+
+/// Runs, what they reported, and what was made of it.
 #[derive(Debug)]
 pub struct Batch {
-    /// The runs, numbered as the calibration numbers them.
+    /// The runs, numbered as reviews number them.
     pub runs: Vec<BatchRun>,
     /// The passages read from each.
     pub passages: Vec<RunPassages>,
@@ -61,8 +76,8 @@ pub struct Batch {
     pub polling: Vec<Polling>,
     /// The stretches by which lengths are kept.
     pub sections: SectionIndex,
-    /// The fit of all of it.
-    pub calibration: Calibration,
+    /// The trains, by number.
+    pub trains: Vec<BatchTrain>,
     /// Runs of live sessions in which several trains moved, whose contacts nobody has told apart.
     pub left_out: Vec<LeftOut>,
 }
@@ -82,7 +97,7 @@ pub struct LeftOut {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BatchError {
-    /// No run passes two contacts in a row at a settled speed.
+    /// No run passes two contacts in a row.
     #[error(
         "nothing to calibrate in {runs} runs with {passages} passages of contacts: at least one run should pass \
          two contacts that the layout links, at a speed that no longer changes"
@@ -113,7 +128,10 @@ pub enum BatchError {
 }
 
 impl Batch {
-    /// Calibrates from recordings just read; of one train only where it is given.
+    /// Calibrates from recordings; of one train, or of all that are in them.
+    ///
+    /// # Errors
+    /// [`BatchError`].
     pub fn of_recordings(
         layout: &Layout,
         recordings: &[Recording],
@@ -128,13 +146,16 @@ impl Batch {
                     stored_as: None,
                     excluded: false,
                 });
-                runs.extend(batch_run(&recording.name, run, events.collect(), train)?);
+                runs.extend(batch_run(&recording.name, false, run, events.collect(), train)?);
             }
         }
         Self::of_runs(layout, runs, Vec::new())
     }
 
     /// Calibrates from everything a store held at a date of one layout, less what was excluded at that date.
+    ///
+    /// # Errors
+    /// [`BatchError`].
     pub fn of_store(
         layout: &Layout,
         store: &Store,
@@ -150,11 +171,10 @@ impl Batch {
                     stored_as: Some(event.key.0),
                     excluded: event.is_excluded(),
                 });
-                match batch_run(&recording.name, &stored.accepted(), events.collect(), train) {
+                let (accepted, is_live) = (stored.accepted(), recording.is_live());
+                match batch_run(&recording.name, is_live, &accepted, events.collect(), train) {
                     // A person who records trains one by one wants to know; a session goes as it goes.
-                    Err(BatchError::SeveralTrains { recording: name, run, trains })
-                        if recording.is_live() =>
-                    {
+                    Err(BatchError::SeveralTrains { recording: name, run, trains }) if is_live => {
                         left_out.push(LeftOut { recording: name, run, trains });
                     }
                     run => runs.extend(run?),
@@ -166,49 +186,84 @@ impl Batch {
 
     fn of_runs(layout: &Layout, runs: Vec<BatchRun>, left_out: Vec<LeftOut>) -> Result<Self, BatchError> {
         let sections = SectionIndex::of(layout);
-        let mut polling: Vec<Polling> = Vec::new();
+        let (mut polling, mut rhythms) = (Vec::new(), Vec::new());
         let mut passages: Vec<RunPassages> = Vec::new();
         for recording in runs.chunk_by(|one, next| one.recording == next.recording) {
-            let timing = rhythm(recording);
+            // An excluded report still shows when polls were.
+            let rhythm = poll_rhythm(recording.iter().map(|run| run.events.iter().map(|event| &event.event)));
             let name = recording.first().map_or_else(String::new, |run| run.recording.clone());
-            polling.push(Polling { recording: name, timing: timing.timing(), period: timing.period() });
+            polling.push(Polling { recording: name, timing: rhythm.timing(), period: rhythm.period() });
             for run in recording {
                 let place = passages.len();
                 let events = run.events.iter().map(|event| (&event.event, event.excluded));
-                passages.push(RunPassages::read(layout, run.train, run.step, place, events, &timing));
+                passages.push(RunPassages::read(layout, run.train, run.step, place, events, &rhythm));
+                rhythms.push(rhythm.clone());
             }
         }
-        let calibration =
-            Calibration::of(layout, &sections, &passages).ok_or_else(|| BatchError::NothingSettled {
+        if passages.iter().flat_map(|run| &run.passages).all(|passage| passage.way.is_none()) {
+            return Err(BatchError::NothingSettled {
                 runs: runs.len(),
                 passages: passages.iter().map(|run| run.passages.len()).sum(),
-            })?;
-        Ok(Self { runs, passages, polling, sections, calibration, left_out })
+            });
+        }
+        let mut numbers: Vec<TrainId> = runs.iter().map(|run| run.train).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let trains = numbers.into_iter().map(|train| {
+            let replay = replayed(layout, &sections, train, &runs, &rhythms);
+            let review = Review::of(layout, &sections, replay.fit.model(), &passages);
+            BatchTrain { replay, review }
+        });
+        Ok(Self { trains: trains.collect(), runs, passages, polling, sections, left_out })
     }
 
-    /// The event that a calibration means by run and entry.
+    /// The event that a review means by run and entry.
     #[must_use]
     pub fn event(&self, run: usize, entry: usize) -> Option<&BatchEvent> {
         self.runs.get(run)?.events.get(entry)
     }
+}
 
-    /// Walks the runs of one train in order through a predictor that knows nothing, as a live session would
-    /// have.
-    pub fn walk(&self, layout: &Layout, train: TrainId) -> Predictor {
-        let mut predictor = Predictor::new(layout);
-        for run in self.runs.iter().filter(|run| run.train == train) {
-            predictor.begin_run(run.train, run.step);
-            for event in run.events.iter().filter(|event| !event.excluded) {
-                predictor.take(layout, &event.event);
-            }
-        }
-        predictor.end_run();
-        predictor
+fn replayed(
+    layout: &Layout,
+    sections: &SectionIndex,
+    train: TrainId,
+    runs: &[BatchRun],
+    rhythms: &[PollTimingEstimator],
+) -> MotionReplay {
+    let own = || runs.iter().zip(rhythms).filter(|(run, _)| run.train == train);
+    let mut replay = MotionReplay::empty(train, highest(own().map(|(run, _)| run)));
+    for (run, rhythm) in own() {
+        let begin = RunBegin {
+            recording: &run.recording,
+            is_live: run.is_live,
+            step: run.step,
+            began_at: run.began_at,
+        };
+        let accepted = run.events.iter().filter(|event| !event.excluded).map(|event| &event.event);
+        replay.take_run(layout, sections, begin, accepted, rhythm);
     }
+    replay.end(sections);
+    replay
+}
+
+/// The highest step of the train's decoder: of the kinds there are the smallest that has all steps seen.
+fn highest<'r>(runs: impl Iterator<Item = &'r BatchRun>) -> SpeedStep {
+    let commanded = |run: &BatchRun| {
+        let steps = run.events.iter().filter_map(|event| match event.event.kind {
+            EventKind::Speed { train, step } if train == run.train => Some(step),
+            _ => None,
+        });
+        steps.max().unwrap_or_default().max(run.step)
+    };
+    let seen = runs.map(commanded).max().unwrap_or_default();
+    let has_all = DECODERS.into_iter().find(|highest| *highest >= seen.get());
+    has_all.and_then(SpeedStep::new).unwrap_or(seen)
 }
 
 fn batch_run(
     recording: &str,
+    is_live: bool,
     run: &Run,
     events: Vec<BatchEvent>,
     wanted: Option<TrainId>,
@@ -228,31 +283,11 @@ fn batch_run(
     };
     Ok(wanted.is_none_or(|wanted| wanted == only.train).then(|| BatchRun {
         recording: recording.to_owned(),
+        is_live,
         id: run.id,
         began_at: run.began_at,
         train: only.train,
         step: only.step,
         events,
     }))
-}
-
-/// The rhythm of a recording's link, from all its reports: an excluded report still shows when polls were.
-fn rhythm(runs: &[BatchRun]) -> PollTimingEstimator {
-    let mut timing = PollTimingEstimator::default();
-    let mut last = Timestamp::ZERO;
-    for run in runs {
-        timing.restart();
-        for BatchEvent { event, .. } in &run.events {
-            match event.kind {
-                EventKind::Sensor(_) => timing.report(event.time),
-                EventKind::Stopped { .. } => {}
-                EventKind::Speed { .. } | EventKind::Reverse { .. } | EventKind::Turnout { .. } => {
-                    timing.command_sent();
-                }
-            }
-            last = event.time;
-        }
-    }
-    timing.fit(last);
-    timing
 }

@@ -5,22 +5,25 @@
 //! kept for ever in a [`Store`].
 
 mod batch;
-mod calibration_file;
 mod content_hash;
 mod decimal;
 mod described;
 mod document;
+mod findings;
 mod layout_file;
 mod line_file;
 mod motion_file;
 mod motion_replay;
 pub mod odometry;
+mod poll_rhythm;
 mod published_table;
+mod quantity;
 mod railtoolkit;
 mod recording;
 pub mod score;
 mod sensor_log;
 mod sensor_names;
+mod session_check;
 mod store;
 mod table;
 mod tachometer;
@@ -30,15 +33,13 @@ mod vehicle_file;
 mod whole_file;
 mod written_table;
 
-pub use batch::{Batch, BatchError, BatchEvent, BatchRun, LeftOut, Polling};
-pub use calibration_file::{
-    CalibrationFile, CalibrationFileError, ComparedLawForm, HysteresisForm, LawForm, MODEL_VERSION,
-    PollingForm, Quantity, SectionForm, SpeedForm, StopForm, StopLawForm, StopStepForm, SuspicionForm,
-    TrainForm,
-};
+pub use batch::{Batch, BatchError, BatchEvent, BatchRun, BatchTrain, LeftOut, Polling};
 pub use content_hash::{ContentHash, HashingReader};
 pub use described::{Described, parse_described, read_described};
 pub use document::{DocumentError, DocumentProblem, LARGEST_DOCUMENT};
+pub use findings::{
+    ComparedLawForm, Findings, LawForm, PollingForm, SuspicionForm, TapedStopForm, TrainFindings,
+};
 pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
     LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
@@ -54,15 +55,17 @@ pub use published_table::{
     CheckedFigure, CountedFrom, CrossCheck, NothingToCompare, PublishedFigure, PublishedQuantity,
     PublishedTableError, TeamSummary, read_published_table,
 };
+pub use quantity::Quantity;
 pub use recording::{Form, GatePass, Note, Oddity, RawEvent, Recording, Run, TrainAtStart};
 pub use sensor_log::{
     LogContext, RecordingError, WriteLogError, parse_sensor_log, read_sensor_log, write_sensor_log,
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
+pub use session_check::{SessionCheck, SessionFigure, standardised};
 pub use store::{
-    Calibration, CalibrationKind, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark,
-    MarkKind, NewCalibration, NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store,
-    StoreError, StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced, salvage,
+    Calibration, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind, NewCalibration,
+    NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store, StoreError, StoredEvent,
+    StoredMachine, StoredRecording, StoredRun, Traced, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

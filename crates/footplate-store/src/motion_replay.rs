@@ -1,4 +1,4 @@
-//! How a train moves, learnt anew from what a store has kept of the sessions in which it was driven.
+//! How a train moves, learnt anew from recordings: from what a store has kept, or from files.
 //!
 //! The events are the truth and a model is what follows from them, so a session that was killed loses nothing: the next one
 //! replays what was written down and goes on from there. Events that a person has excluded are left out, and where a run
@@ -9,16 +9,18 @@
 //! to the same numbers to the last bit. Where anything differs, be it one excluded event, all is replayed.
 
 mod fingerprint;
+mod run_reader;
 
 use fingerprint::Fingerprint;
 use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::MotionFit;
-use footplate_core::calibration::motion::StepUse;
+use footplate_core::calibration::motion::{MotionFit, StepUse};
+use footplate_core::latency::PollTimingEstimator;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
-use footplate_core::{Approach, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
-
+use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use run_reader::RunReader;
 use serde::{Deserialize, Serialize};
 
+use crate::poll_rhythm::poll_rhythm;
 use crate::recording::Run;
 use crate::store::{KeptReplay, Store, StoreError};
 
@@ -26,17 +28,19 @@ use crate::store::{KeptReplay, Store, StoreError};
 /// train stood, and so on how fast it is known to stop.
 const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 
-/// A train that runs and is told one step more when no contact and no command has been for so long was pushed: it had not come
-/// where it should, and the calibration took it for stuck. No trip of an experiment takes as long between two of either.
-const PUSHED_AFTER: TimeSpan = TimeSpan::from_ms(4_000);
+/// A recording that begins so long after the last one ended is of another session: engines have cooled down by then. Those
+/// that have no date count as one session with the one before.
+const ANOTHER_SESSION: TimeSpan = TimeSpan::from_ms(3_600_000);
 
 /// What sessions told of one train.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MotionReplay {
     /// What follows from it, fitted.
     pub fit: MotionFit,
-    /// How the turnouts lay at the end, as far as was said.
+    /// How the turnouts lay at the end of the last live session, as far as it was recorded.
     pub turnouts: TurnoutStates,
+    /// How those of the recording under way lie, if it was read from a file.
+    turnouts_of_file: TurnoutStates,
     /// Sessions in which the train was driven, by name.
     pub recordings: Vec<String>,
     /// Runs that were used.
@@ -64,31 +68,44 @@ impl MotionReplay {
         highest: SpeedStep,
         as_of: Timestamp,
     ) -> Result<Self, StoreError> {
-        let mut runs: Vec<(String, Run)> = Vec::new();
+        let mut runs: Vec<StoredReplayRun> = Vec::new();
         for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
-            let stored = store.runs(recording.key, as_of)?;
-            runs.extend(stored.iter().map(|run| (recording.name.clone(), run.accepted())));
+            let accepted: Vec<Run> =
+                store.runs(recording.key, as_of)?.iter().map(crate::StoredRun::accepted).collect();
+            let rhythm = poll_rhythm(accepted.iter().map(|run| run.events.iter().map(|raw| &raw.event)));
+            let of = |run| StoredReplayRun {
+                recording: recording.name.clone(),
+                is_live: recording.is_live(),
+                run,
+                rhythm: rhythm.clone(),
+            };
+            runs.extend(accepted.into_iter().map(of));
         }
         let mut fingerprint = Fingerprint::of(layout, train, highest);
         let behind: Vec<Fingerprint> = runs
             .iter()
-            .map(|(recording, run)| {
-                fingerprint = fingerprint.with(recording, run);
+            .map(|stored| {
+                fingerprint = fingerprint.with(&stored.recording, &stored.run, stored.rhythm.timing());
                 fingerprint
             })
             .collect();
         let (mut replay, gone) =
             Self::kept(store, layout, train, &behind)?.unwrap_or_else(|| (Self::empty(train, highest), 0));
         let sections = SectionIndex::of(layout);
-        for (recording, run) in runs.iter().skip(gone) {
-            replay.take(layout, &sections, recording, run);
+        for stored in runs.iter().skip(gone) {
+            replay.take_stored(layout, &sections, stored);
         }
         if !replay.is_empty() && gone < runs.len() {
             replay.keep(store, layout, fingerprint);
         }
-        replay.fit.refit(&sections);
-        replay.note_steps(highest);
+        replay.end(&sections);
         Ok(replay)
+    }
+
+    /// Fits to all that was taken in.
+    pub(crate) fn end(&mut self, sections: &SectionIndex) {
+        self.fit.refit(sections);
+        self.note_steps();
     }
 
     /// How far the last replay came, and behind how many of the runs that was; `behind` are their fingerprints.
@@ -110,10 +127,12 @@ impl MotionReplay {
         let _ = store.keep_replay(self.fit.model().train(), layout.name(), &kept);
     }
 
-    fn empty(train: TrainId, highest: SpeedStep) -> Self {
+    /// Nothing taken in yet.
+    pub(crate) fn empty(train: TrainId, highest: SpeedStep) -> Self {
         Self {
             fit: MotionFit::new(train, highest),
             turnouts: TurnoutStates::unknown(),
+            turnouts_of_file: TurnoutStates::unknown(),
             recordings: Vec::new(),
             runs: 0,
             events: 0,
@@ -130,8 +149,8 @@ impl MotionReplay {
 
     /// A step at which contacts were passed moves the train. Those at which it stalled show by themselves when they are
     /// tried again.
-    fn note_steps(&mut self, highest: SpeedStep) {
-        for step in (1..=highest.get()).filter_map(SpeedStep::new) {
+    fn note_steps(&mut self) {
+        for step in (1..=self.fit.model().highest().get()).filter_map(SpeedStep::new) {
             let passed = |approach| self.fit.model().speed(step, approach).count > 0;
             if passed(Approach::Below) || passed(Approach::Above) {
                 self.fit.note_use(step, StepUse::Moves);
@@ -139,56 +158,96 @@ impl MotionReplay {
         }
     }
 
-    fn take(&mut self, layout: &Layout, sections: &SectionIndex, recording: &str, run: &Run) {
-        let mut fitted: Option<Timestamp> = None;
-        let (mut told, mut last, mut is_pushed) = (SpeedStep::STAND, Timestamp::ZERO, false);
-        let moving: Vec<TrainId> = run.moving().iter().map(|at_start| at_start.train).collect();
+    fn take_stored(&mut self, layout: &Layout, sections: &SectionIndex, stored: &StoredReplayRun) {
+        let StoredReplayRun { recording, is_live, run, rhythm } = stored;
         let train = self.fit.model().train();
-        self.fit.interrupt();
-        let is_own = moving == [train];
-        if moving.contains(&train) && !is_own {
-            self.left_out.push((recording.to_owned(), run.id));
-        }
-        for raw in &run.events {
-            let is_about_it = match raw.event.kind {
-                EventKind::Turnout { turnout, curved } => {
-                    self.turnouts.set(turnout, Leg::from_curved(curved));
-                    false
+        let moving = run.moving();
+        let events = || run.events.iter().map(|raw| &raw.event);
+        match moving.as_slice() {
+            [only] if only.train == train => {
+                let begin =
+                    RunBegin { recording, is_live: *is_live, step: only.step, began_at: run.began_at };
+                self.take_run(layout, sections, begin, events(), rhythm);
+            }
+            several => {
+                if several.iter().any(|at_start| at_start.train == train) {
+                    self.left_out.push((recording.clone(), run.id));
                 }
-                EventKind::Sensor(_) => true,
-                EventKind::Speed { train: of, .. }
-                | EventKind::Reverse { train: of }
-                | EventKind::Stopped { train: of, .. } => of == train,
-            };
-            if is_own && is_about_it {
-                let starts =
-                    matches!(raw.event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
-                if starts && fitted.is_none_or(|fitted| raw.event.time - fitted >= REFIT_AFTER) {
-                    fitted = Some(raw.event.time);
-                    self.fit.refit(sections);
+                if *is_live {
+                    events().for_each(|event| note_turnout(&mut self.turnouts, event));
                 }
-                match raw.event.kind {
-                    EventKind::Speed { step, .. } => {
-                        let is_one_more = told > SpeedStep::STAND && step.get() == told.get() + 1;
-                        is_pushed |= is_one_more && raw.event.time - last >= PUSHED_AFTER;
-                        told = step;
-                    }
-                    // How long it was stuck says nothing of how it starts and runs.
-                    EventKind::Sensor(_) if core::mem::take(&mut is_pushed) => self.fit.interrupt(),
-                    _ => {}
-                }
-                last = raw.event.time;
-                self.fit.take(layout, &self.turnouts, &raw.event);
-                self.events += 1;
-                let at = run.began_at.map(|began_at| began_at + (raw.event.time - Timestamp::ZERO));
-                self.newest = self.newest.max(at);
             }
         }
-        if is_own {
-            self.runs += 1;
-            if self.recordings.last().is_none_or(|last| last != recording) {
-                self.recordings.push(recording.to_owned());
+    }
+
+    /// Takes in a run in which no other train moves: how it began, its events in order less those that a person excluded,
+    /// and the rhythm of its link.
+    pub(crate) fn take_run<'e>(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        begin: RunBegin<'_>,
+        events: impl Iterator<Item = &'e Event>,
+        rhythm: &PollTimingEstimator,
+    ) {
+        let train = self.fit.model().train();
+        if self.recordings.last().is_none_or(|last| last != begin.recording) {
+            let last = self.newest.zip(begin.began_at);
+            if last.is_some_and(|(newest, began)| began - newest >= ANOTHER_SESSION) {
+                self.fit.begin_session(sections);
             }
+            self.recordings.push(begin.recording.to_owned());
+            self.turnouts_of_file = TurnoutStates::unknown();
         }
+        self.runs += 1;
+        self.fit.begin_run(begin.step);
+        let turnouts = if begin.is_live { &mut self.turnouts } else { &mut self.turnouts_of_file };
+        let mut reader = RunReader::new(train, begin.step);
+        let mut fitted: Option<Timestamp> = None;
+        for event in events {
+            note_turnout(turnouts, event);
+            let Some(read) = reader.take(event, rhythm.timing()) else { continue };
+            let time = read.event.time;
+            let starts = matches!(read.event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
+            if starts && time - *fitted.get_or_insert(time) >= REFIT_AFTER {
+                fitted = Some(time);
+                self.fit.refit(sections);
+            }
+            if read.was_pushed {
+                // How long it was stuck says nothing of how it starts and runs.
+                self.fit.interrupt();
+            }
+            self.fit.take(layout, turnouts, &read.event);
+            self.events += 1;
+            let at = begin.began_at.map(|began_at| began_at + (time - Timestamp::ZERO));
+            self.newest = self.newest.max(at);
+        }
+    }
+}
+
+/// A run as a store keeps it, with the rhythm of the link of its recording.
+struct StoredReplayRun {
+    recording: String,
+    is_live: bool,
+    run: Run,
+    rhythm: PollTimingEstimator,
+}
+
+/// How a run begins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunBegin<'r> {
+    /// The recording that it is of.
+    pub(crate) recording: &'r str,
+    /// Whether that is a live session, after which turnouts lie as they lay.
+    pub(crate) is_live: bool,
+    /// The step at which the train had been running for long; 0 at rest.
+    pub(crate) step: SpeedStep,
+    /// When the clock of the run stood at zero, since the Unix epoch.
+    pub(crate) began_at: Option<Timestamp>,
+}
+
+fn note_turnout(turnouts: &mut TurnoutStates, event: &Event) {
+    if let EventKind::Turnout { turnout, curved } = event.kind {
+        turnouts.set(turnout, Leg::from_curved(curved));
     }
 }

@@ -5,7 +5,7 @@ use core::fmt::{Display, Formatter, Result as FmtResult};
 
 use footplate_core::{Command, Event, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 
-use crate::marklin_serial::EncodeError;
+use crate::marklin_serial::{EncodeError, ModuleReads};
 
 /// What the loop around a command station's line hands over and asks for.
 ///
@@ -113,6 +113,8 @@ pub enum LinkNotice {
         /// The contact.
         sensor: SensorId,
     },
+    /// The interface does not answer all reads of sensor modules.
+    Reads(ModuleReads),
     /// The solenoid of a turnout has been powered for longer than it bears.
     SolenoidLate {
         /// The turnout.
@@ -218,6 +220,7 @@ impl Display for LinkNotice {
             Self::HeldClosed { sensor } => {
                 write!(f, "contact {sensor} is closed from the start: a train stands on it, or it is stuck")
             }
+            Self::Reads(reads) => write!(f, "the interface {reads}"),
             Self::SolenoidLate { turnout, held } => write!(
                 f,
                 "turnout {turnout} was powered for {:.0} ms; feel whether its coil is hot",

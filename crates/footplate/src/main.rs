@@ -4,6 +4,7 @@ mod clock;
 mod commands;
 mod counted;
 mod dashboard;
+mod layout_check;
 mod link;
 mod live_lines;
 mod progress;

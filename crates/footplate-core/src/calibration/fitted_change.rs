@@ -1,17 +1,14 @@
-//! A change of speed as the fitted law of its train has it, laid through the contacts that were measured.
+//! A change of speed as the best law of its direction has it, laid through the contacts that were measured.
 
 use alloc::vec::Vec;
 
-use super::calibrate::{Calibration, step_table};
-use super::law_fit::{FittedLaw, LawKind, at, motion, residuals};
+use super::law_fit::{FittedLaw, at, motion, residuals};
+use super::motion::MotionModel;
+use super::review::{Review, step_table};
 use super::transient::Transient;
 use crate::kinematics::{Motion, MotionState, StepTable};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
-
-/// Half the time over which the speed of a look-up table is differenced for its acceleration (s): short beside a
-/// change, long beside rounding.
-const HALF_DIFFERENCE_S: f64 = 0.05;
 
 /// A law through the contacts of one change.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,14 +19,18 @@ pub struct FittedChange {
     pub residuals: Vec<Length>,
 }
 
-impl Calibration {
-    /// The law that was found for the direction of a change, through its contacts: where the train was at the
+impl Review {
+    /// The law that describes the direction of a change best, through its contacts: where the train was at the
     /// command is fitted (x₀ of the law fit). `times` are since the command. `None` where no law was found.
     #[must_use]
-    pub fn fitted_change(&self, change: &Transient, times: &[TimeSpan]) -> Option<FittedChange> {
-        let comparison = self.laws.get(&(change.train, change.direction()))?;
-        let law = comparison.laws.get(comparison.best)?;
-        let table = step_table(&self.fit, change.train);
+    pub fn fitted_change(
+        &self,
+        model: &MotionModel,
+        change: &Transient,
+        times: &[TimeSpan],
+    ) -> Option<FittedChange> {
+        let law = self.laws.get(&change.direction())?.laws.first()?;
+        let table = step_table(model);
         let state = |since: f64| law_state(law, change, table.as_ref(), since);
         let ways: Vec<(f64, f64)> = change
             .points
@@ -57,16 +58,6 @@ fn law_state(
     table: Option<&StepTable>,
     since_command: f64,
 ) -> Option<MotionState> {
-    if let (LawKind::Table, Some(curve)) = (law.kind, &law.curve) {
-        let speed = |time: f64| curve.at(change.speeds, time).1;
-        let gained = speed(since_command + HALF_DIFFERENCE_S) - speed(since_command - HALF_DIFFERENCE_S);
-        let (way, now) = curve.at(change.speeds, since_command);
-        return Some(MotionState {
-            distance: Length::from_m(way),
-            speed: Speed::from_m_per_s(now),
-            acceleration: Acceleration::from_m_per_s2(gained / (2.0 * HALF_DIFFERENCE_S)),
-        });
-    }
     let [pace, _] = law.pace;
     let [delay, _] = law.delay;
     let motion = motion(law.kind, pace, change, table)?;

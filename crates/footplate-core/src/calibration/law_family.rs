@@ -33,14 +33,6 @@ const EXPECTED_TIME_S: f64 = 3.0;
 const EXPECTED_SPREAD: f64 = 0.4;
 
 impl LawFamily {
-    /// Those that the live estimator weighs against each other: the three shapes that published decoders
-    /// were found to follow.
-    pub const LIVE: [Self; 3] = [
-        Self { law: SpeedLaw::ConstantAcceleration, constant: Constant::Acceleration },
-        Self { law: SpeedLaw::Smooth, constant: Constant::Acceleration },
-        Self { law: SpeedLaw::Lag, constant: Constant::Time },
-    ];
-
     /// Every one there is: each shape with each constant, but a lag, which has only its time.
     pub fn all() -> impl Iterator<Item = Self> {
         SpeedLaw::ALL.into_iter().flat_map(|law| {

@@ -13,7 +13,6 @@
 use alloc::vec::Vec;
 
 use super::law_family::{Constant, LawFamily};
-use super::speed_curve::SpeedCurve;
 use super::transient::Transient;
 use crate::kinematics::{Motion, StepRamp, StepTable};
 use crate::time::TimeSpan;
@@ -42,8 +41,6 @@ pub enum LawKind {
     Family(LawFamily),
     /// So many seconds a step through the train's own speed table (momentum, CV 3 and CV 4).
     StepRamp,
-    /// A table of the share of the change done by time, read off the data: the fall-back.
-    Table,
 }
 
 /// One law as fitted.
@@ -51,13 +48,10 @@ pub enum LawKind {
 pub struct FittedLaw {
     /// Which.
     pub kind: LawKind,
-    /// Its pace (m/s² or s, see [`Constant`]; s a step for a ramp) and one standard deviation; for a table the
-    /// scale of its time.
+    /// Its pace (m/s² or s, see [`Constant`]; s a step for a ramp) and one standard deviation.
     pub pace: [f64; 2],
     /// Delay from command to effect and one standard deviation (s).
     pub delay: [f64; 2],
-    /// Covariance of ln pace and delay.
-    pub covariance: [[f64; 2]; 2],
     /// Sum of squared residuals over their variances; wild ones count linearly.
     pub chi_square: f64,
     /// Contacts less unknowns.
@@ -66,8 +60,6 @@ pub struct FittedLaw {
     pub criterion: f64,
     /// Root mean square error on changes held out of the fit (mm of way).
     pub held_out_mm: f64,
-    /// The table, for [`LawKind::Table`].
-    pub curve: Option<SpeedCurve>,
 }
 
 /// What the comparison came to.
@@ -75,8 +67,6 @@ pub struct FittedLaw {
 pub struct LawComparison {
     /// Every law, the best by criterion first.
     pub laws: Vec<FittedLaw>,
-    /// The law to use; the table when none fits and it forecasts better.
-    pub best: usize,
     /// Whether the best explains the data within three times what poll and scatter allow.
     pub fits: bool,
     /// Whether held-out error and criterion name the same law, or one within a tenth of its error.
@@ -93,20 +83,12 @@ pub fn compare_laws(changes: &[Transient], table: Option<&StepTable>) -> Option<
     }
     let kinds = LawFamily::all().map(LawKind::Family).chain(table.map(|_| LawKind::StepRamp));
     let mut laws: Vec<FittedLaw> = kinds.filter_map(|kind| fitted(kind, changes, table)).collect();
-    let curve = fitted_curve(changes, &laws);
-    laws.extend(curve);
     laws.sort_by(|one, other| one.criterion.total_cmp(&other.criterion));
-    let (table_last, named) = (laws.iter().position(|law| law.kind == LawKind::Table), |law: &FittedLaw| {
-        law.kind != LawKind::Table
-    });
-    let first = laws.iter().position(named)?;
-    let fits = laws[first].chi_square < FITS * laws[first].freedom.max(1) as f64;
-    // The table has more unknowns, so it has to forecast better, not only to describe better.
-    let better = |table: &usize| laws[*table].held_out_mm < laws[first].held_out_mm;
-    let best = if fits { first } else { table_last.filter(better).unwrap_or(first) };
+    let first = laws.first()?;
+    let fits = first.chi_square < FITS * first.freedom.max(1) as f64;
     let least = laws.iter().map(|law| law.held_out_mm).fold(f64::INFINITY, f64::min);
-    let agreed = laws[best].held_out_mm <= 1.1 * least;
-    Some(LawComparison { best, fits, agreed, changes: changes.len(), laws })
+    let agreed = first.held_out_mm <= 1.1 * least;
+    Some(LawComparison { fits, agreed, changes: changes.len(), laws })
 }
 
 /// The motion of a change under a law, since its effect began.
@@ -128,7 +110,6 @@ pub(super) fn motion<'t>(
                 TimeSpan::from_s(pace),
             )))
         }
-        LawKind::Table => None,
     }
 }
 
@@ -210,7 +191,6 @@ fn minimise(kind: LawKind, changes: &[Transient], table: Option<&StepTable>) -> 
         LawKind::Family(family) => family.expected_ln_pace(),
         // 14 steps in three seconds, as long as a whole change takes.
         LawKind::StepRamp => (libm::log(3.0 / 14.0), 0.4 * 0.4),
-        LawKind::Table => return None,
     };
     let prior = [
         (start, spread * PRIOR_WIDENED * PRIOR_WIDENED),
@@ -313,12 +293,10 @@ fn fitted(kind: LawKind, changes: &[Transient], table: Option<&StepTable>) -> Op
         kind,
         pace: [pace, pace * libm::sqrt(covariance[0][0])],
         delay: [found.x[1].max(0.0), libm::sqrt(covariance[1][1])],
-        covariance,
         chi_square: found.chi_square,
         freedom,
         criterion: criterion(found.chi_square, n, unknowns),
         held_out_mm: held_out?,
-        curve: None,
     })
 }
 
@@ -343,52 +321,13 @@ fn held_out(
     (count > 0.0).then(|| 1e3 * libm::sqrt(sum / count))
 }
 
-fn curve_residuals(curve: &SpeedCurve, changes: &[Transient]) -> Vec<(f64, f64)> {
-    changes
-        .iter()
-        .flat_map(|change| {
-            let ways: Vec<(f64, f64)> =
-                change.points.iter().map(|point| curve.at(change.speeds, point.since_command)).collect();
-            residuals(&ways, change)
-        })
-        .collect()
-}
-
-/// The fall-back: the best law between two speeds sets the scale of time, a table the shape.
-fn fitted_curve(changes: &[Transient], laws: &[FittedLaw]) -> Option<FittedLaw> {
-    let scale = laws
-        .iter()
-        .filter(|law| matches!(law.kind, LawKind::Family(_)))
-        .min_by(|one, other| one.criterion.total_cmp(&other.criterion))?;
-    let LawKind::Family(family) = scale.kind else { return None };
-    let shape =
-        |changes: &[Transient]| SpeedCurve::of(changes, family.constant, scale.pace[0], scale.delay[0]);
-    let curve = shape(changes)?;
-    let chi_square = total_cost(&curve_residuals(&curve, changes));
-    let n = points(changes);
-    let unknowns = SpeedCurve::UNKNOWNS + 2 + changes.len();
-    let held_out = held_out(changes, |others, change| {
-        Some(curve_residuals(&shape(others)?, core::slice::from_ref(change)))
-    });
-    Some(FittedLaw {
-        kind: LawKind::Table,
-        chi_square,
-        freedom: n.saturating_sub(unknowns),
-        criterion: criterion(chi_square, n, unknowns),
-        held_out_mm: held_out?,
-        curve: Some(curve),
-        ..scale.clone()
-    })
-}
-
 impl LawKind {
-    /// What stays the same between changes, for the unit of the pace; `None` for a table.
+    /// What stays the same between changes, for the unit of the pace.
     #[must_use]
-    pub const fn constant(self) -> Option<Constant> {
+    pub const fn constant(self) -> Constant {
         match self {
-            Self::Family(family) => Some(family.constant),
-            Self::StepRamp => Some(Constant::Time),
-            Self::Table => None,
+            Self::Family(family) => family.constant,
+            Self::StepRamp => Constant::Time,
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Recordings hold more reports than passages: a contact repeats in every poll while the shoe is on it, a
 //! station still remembers a contact from before the start, and now and then a contact stays silent. What
-//! each report is taken for is said here once, for the batch fit and the live estimator alike.
+//! each report is taken for is said here once, for whoever reviews runs and for the live estimator alike.
 
 use crate::event::{Approach, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
@@ -13,9 +13,13 @@ use crate::track::{Layout, Leg, Reach, TurnoutStates};
 /// A report this soon after a start from rest is of a contact the train stood on, or that the station still
 /// remembered: command delay (0.1 to 0.6 s measured) and the first 0.5 s of any start move a train by less
 /// than its shoe is long.
-const STANDING: TimeSpan = TimeSpan::from_ms(1_000);
+pub const STALE_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 /// Contacts that may stay silent in a row before the way is no longer believed.
 const BELIEVED_MISSED: usize = 2;
+
+/// Commands that follow one another this fast keep the line busy: a solenoid is switched off 150 to 200 ms after it is switched
+/// on, and the next one behind it.
+const SAME_BURST: TimeSpan = TimeSpan::from_ms(250);
 
 /// What a train was told last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +84,8 @@ pub struct PassageTracker {
     last_sensor: Option<SensorId>,
     last_report: Option<Timestamp>,
     timing: PollTimingEstimator,
+    /// The first and the last of the commands that were sent one right after the other.
+    burst: Option<[Timestamp; 2]>,
     turnouts: TurnoutStates,
     entries: usize,
 }
@@ -95,6 +101,7 @@ impl PassageTracker {
             last_sensor: None,
             last_report: None,
             timing,
+            burst: None,
             turnouts: TurnoutStates::unknown(),
             entries: 0,
         }
@@ -106,6 +113,7 @@ impl PassageTracker {
         self.at = None;
         self.last_sensor = None;
         self.last_report = None;
+        self.burst = None;
         self.entries = 0;
         self.timing.restart();
     }
@@ -117,12 +125,15 @@ impl PassageTracker {
         self.entries += 1;
         match event.kind {
             EventKind::Sensor(report) => {
-                let window = ContactWindow::of_report(
+                let mut window = ContactWindow::of_report(
                     event.time,
                     report.poll_interval,
                     self.last_report,
                     self.timing.timing(),
                 );
+                if report.poll_interval.is_none() {
+                    window.after = window.after.min(self.pushed_from(event.time));
+                }
                 self.timing.report(event.time);
                 self.last_report = Some(event.time);
                 if self.last_sensor == Some(report.sensor) {
@@ -131,14 +142,14 @@ impl PassageTracker {
                 Some(self.sight(layout, report.sensor, window, entry))
             }
             EventKind::Speed { train, step } => {
-                self.timing.command_sent();
+                self.command_sent(event.time);
                 if train == self.train && step != self.drive.step {
                     self.drive = Drive { step, from: self.drive.step, commanded: Some(event.time) };
                 }
                 None
             }
             EventKind::Reverse { train } => {
-                self.timing.command_sent();
+                self.command_sent(event.time);
                 if train == self.train {
                     // The contact behind becomes the one ahead, at an unknown distance.
                     self.at = None;
@@ -147,11 +158,32 @@ impl PassageTracker {
                 None
             }
             EventKind::Turnout { turnout, curved } => {
-                self.timing.command_sent();
+                self.command_sent(event.time);
                 self.turnouts.set(turnout, Leg::from_curved(curved));
                 None
             }
             EventKind::Stopped { .. } => None,
+        }
+    }
+
+    /// A command went over the line before the next poll.
+    fn command_sent(&mut self, time: Timestamp) {
+        self.timing.command_sent();
+        self.burst = match self.burst {
+            Some([first, last]) if time - last < SAME_BURST => Some([first, time]),
+            _ => Some([time, time]),
+        };
+    }
+
+    /// Since when the sensor of a report may have been closed: commands right before it pushed its poll, and the last poll
+    /// before them is as old as they are.
+    fn pushed_from(&self, stamp: Timestamp) -> Timestamp {
+        let period = self.timing.timing().period;
+        match self.burst {
+            Some([first, last]) if stamp - last < SAME_BURST + period + period => {
+                (first - period).max(self.last_report.unwrap_or(first - period))
+            }
+            _ => stamp,
         }
     }
 
@@ -185,7 +217,7 @@ impl PassageTracker {
     fn stands_until(&self) -> Option<Timestamp> {
         match self.drive.commanded {
             None if self.drive.step == SpeedStep::STAND => Some(Timestamp::from_ns(i64::MAX)),
-            Some(commanded) if self.drive.from == SpeedStep::STAND => Some(commanded + STANDING),
+            Some(commanded) if self.drive.from == SpeedStep::STAND => Some(commanded + STALE_WITHIN),
             _ => None,
         }
     }

@@ -103,28 +103,5 @@ impl RunPassages {
                 settled(one) && settled(next) && one.drive == next.drive && next.way.is_some()
             })
             .filter(|chain| chain.len() > 1)
-            .flat_map(|chain| Overlapping { chain })
-    }
-}
-
-/// Passages of one stretch at most: on longer ones the speed has wandered too far to be one number.
-const LONGEST_STRETCH: usize = 40;
-
-/// A long chain cut into stretches that share their end passages.
-struct Overlapping<'r> {
-    chain: &'r [Passage],
-}
-
-impl<'r> Iterator for Overlapping<'r> {
-    type Item = &'r [Passage];
-
-    fn next(&mut self) -> Option<&'r [Passage]> {
-        if self.chain.len() < 2 {
-            return None;
-        }
-        let cut = self.chain.len().min(LONGEST_STRETCH);
-        let stretch = self.chain.get(..cut)?;
-        self.chain = self.chain.get(cut - 1..)?;
-        Some(stretch)
     }
 }

@@ -2,13 +2,14 @@
 
 use alloc::vec::Vec;
 
-use super::joint_fit::{JointFit, SpeedKey};
-use super::length_table::SectionIndex;
+use super::motion::MotionModel;
 use super::passage::{Drive, Passage};
 use super::run::RunPassages;
+use super::section_index::SectionIndex;
+use super::settled::{SettledRunning, path_length, settles_within};
 use crate::ids::{SpeedStep, TrainId};
-use crate::time::TimeSpan;
-use crate::units::{Length, Speed};
+use crate::track::Layout;
+use crate::units::Speed;
 
 /// Contacts after the change was over that are kept with it: they pin down where the train was.
 const SETTLED_KEPT: usize = 3;
@@ -40,7 +41,7 @@ pub struct TransientPoint {
     pub since_command: f64,
     /// Variance of that, from the poll (s²).
     pub variance: f64,
-    /// Way since the first contact of the change (m), as the fit has the lengths.
+    /// Path since the first contact of the change (m), with the lengths of the motion model.
     pub way: f64,
     /// The entry of the run that reported it.
     pub entry: usize,
@@ -72,84 +73,82 @@ impl Transient {
     }
 }
 
-/// Doubt of the way between two contacts beyond their scatter (m): what is left of ten millimetres of survey
+/// Uncertainty of the path between two contacts beyond their scatter (m): what is left of ten millimetres of survey
 /// once a section was passed a few times.
-const WAY_DOUBT_M: f64 = 0.005;
+const PATH_UNCERTAINTY_M: f64 = 0.005;
 
-/// All changes of speed in some runs of which enough was seen. `settle` says how long after a command the
-/// speed is settled.
-#[must_use]
-pub fn transients(
-    sections: &SectionIndex,
-    runs: &[RunPassages],
-    fit: &JointFit,
-    settle: &dyn Fn(TrainId, Drive) -> TimeSpan,
-) -> Vec<Transient> {
-    runs.iter().flat_map(|run| of_run(sections, run, fit, settle)).collect()
+/// What a change is read with: the model of its train, and its settled running.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ChangeReader<'r> {
+    pub(super) layout: &'r Layout,
+    pub(super) sections: &'r SectionIndex,
+    pub(super) model: &'r MotionModel,
+    pub(super) running: &'r SettledRunning,
 }
 
-fn of_run(
-    sections: &SectionIndex,
-    run: &RunPassages,
-    fit: &JointFit,
-    settle: &dyn Fn(TrainId, Drive) -> TimeSpan,
-) -> Vec<Transient> {
-    let changes = run.passages.chunk_by(|one, next| one.drive == next.drive && next.way.is_some());
-    changes.filter_map(|chain| of_change(sections, run, chain, fit, settle)).collect()
-}
+impl ChangeReader<'_> {
+    /// All changes of speed in a run of which enough was seen.
+    pub(super) fn changes(&self, run: &RunPassages) -> Vec<Transient> {
+        let chains = run.passages.chunk_by(|one, next| one.drive == next.drive && next.way.is_some());
+        let mut before: Option<Drive> = None;
+        chains
+            .filter_map(|chain| {
+                let drive = chain.first()?.drive;
+                let change = self.change(run, chain, before);
+                before = Some(drive);
+                change
+            })
+            .collect()
+    }
 
-fn of_change(
-    sections: &SectionIndex,
-    run: &RunPassages,
-    chain: &[Passage],
-    fit: &JointFit,
-    settle: &dyn Fn(TrainId, Drive) -> TimeSpan,
-) -> Option<Transient> {
-    let drive = chain.first()?.drive;
-    let commanded = drive.commanded?;
-    let ends = settle(run.train, drive);
-    let speed = |step: SpeedStep, drive: Option<Drive>| {
-        if step == SpeedStep::STAND {
-            return Some(Speed::ZERO);
+    fn change(&self, run: &RunPassages, chain: &[Passage], before: Option<Drive>) -> Option<Transient> {
+        let drive = chain.first()?.drive;
+        let commanded = drive.commanded?;
+        let ends = settles_within(self.model, drive);
+        // The speed of this very run where it was seen, the model's where it was not.
+        let after = self
+            .running
+            .speed_in_run(run.run, drive)
+            .unwrap_or_else(|| self.model.steady_speed(drive.step, drive.approach()));
+        let from = match before.filter(|before| before.step == drive.from) {
+            _ if drive.from == SpeedStep::STAND => Speed::ZERO,
+            Some(before) => self
+                .running
+                .speed_in_run(run.run, before)
+                .unwrap_or_else(|| self.model.steady_speed(before.step, before.approach())),
+            None => self.model.steady_speed(drive.from, crate::event::Approach::Below),
+        };
+        let to = if drive.step == SpeedStep::STAND { Speed::ZERO } else { after };
+        let mut way = 0.0;
+        let mut settled = 0;
+        let mut points = Vec::new();
+        for (place, passage) in chain.iter().enumerate() {
+            if let (true, Some(reach)) = (place > 0, &passage.way) {
+                way += path_length(self.layout, self.sections, self.model, reach).as_m();
+            }
+            let since = passage.window.middle() - commanded;
+            settled += usize::from(since > ends);
+            if settled > SETTLED_KEPT {
+                break;
+            }
+            points.push(TransientPoint {
+                since_command: since.as_s(),
+                variance: passage.window.variance_s2(),
+                way,
+                entry: passage.entry,
+            });
         }
-        let approach = drive.map_or(crate::event::Approach::Below, Drive::approach);
-        // The speed of this very run where it was seen, the table's where it was not.
-        let key = SpeedKey { train: run.train, step, approach };
-        let own = fit.passages.iter().find(|passage| passage.run == run.run && passage.key == key);
-        own.map(|passage| passage.stretch_speed).or_else(|| Some(fit.speed(run.train, step, approach)?.value))
-    };
-    let speeds = [speed(drive.from, None)?, speed(drive.step, Some(drive))?];
-    let mut way = 0.0;
-    let mut settled = 0;
-    let mut points = Vec::new();
-    for (place, passage) in chain.iter().enumerate() {
-        if let (true, Some(reach)) = (place > 0, &passage.way) {
-            let correction = fit.correction(sections, run.train, passage).map_or(0.0, Length::as_m);
-            way += reach.length.as_m() + correction;
+        let changing = points.iter().any(|point| point.since_command < ends.as_s());
+        if points.len() < FEWEST || !changing {
+            return None;
         }
-        let since = passage.window.middle() - commanded;
-        settled += usize::from(since > ends);
-        if settled > SETTLED_KEPT {
-            break;
-        }
-        points.push(TransientPoint {
-            since_command: since.as_s(),
-            variance: passage.window.variance_s2(),
-            way,
-            entry: passage.entry,
-        });
+        Some(Transient {
+            train: run.train,
+            run: run.run,
+            steps: [drive.from, drive.step],
+            speeds: [from, to],
+            points,
+            way_doubt: libm::hypot(self.running.contact_scatter.as_m(), PATH_UNCERTAINTY_M),
+        })
     }
-    let changing = points.iter().any(|point| point.since_command < ends.as_s());
-    if points.len() < FEWEST || !changing {
-        return None;
-    }
-    let scatter = fit.contact_scatter.get(&run.train).map_or(0.0, |scatter| scatter.as_m());
-    Some(Transient {
-        train: run.train,
-        run: run.run,
-        steps: [drive.from, drive.step],
-        speeds,
-        points,
-        way_doubt: libm::hypot(scatter, WAY_DOUBT_M),
-    })
 }

@@ -11,7 +11,7 @@ use super::outlook::Outlook;
 use crate::calibration::motion::{Following, Guess, MotionModel};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
-use crate::latency::ContactWindow;
+use crate::latency::{ContactWindow, TruncatedNormal};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
@@ -85,8 +85,10 @@ pub struct DueContact {
 pub struct PassedContact {
     /// The contact.
     pub sensor: SensorId,
-    /// When it closed.
+    /// When it closed, as the report has it.
     pub window: ContactWindow,
+    /// When it closed most likely, as report and forecast have it together.
+    pub at: Timestamp,
     /// How much later than expected the middle of the window was, and one standard deviation of that expectation with
     /// the window in it; `None` for the first contact after the train was lost.
     pub late: Option<[TimeSpan; 2]>,
@@ -230,7 +232,7 @@ impl Locator {
         window: ContactWindow,
     ) -> PassedContact {
         let time = self.seconds(window.middle());
-        let known = PassedContact { sensor, window, late: None, short: None, missed: 0 };
+        let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
         let Some(node) = ground.node_of(sensor) else { return known };
         let Some((reach, short, _)) = self.best_reach(ground, model, sensor, window) else {
             // Lost until now, or no way leads here: it is here all the same, as fast as it was.
@@ -244,8 +246,11 @@ impl Locator {
         let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let contradicts = short.mean * short.mean > BELIEVED * BELIEVED * short.variance;
-        // What was believed is off by more than it said of itself; a change of speed under way will go on to be.
-        if !contradicts || self.following.doubt_change(model, time, short.mean) {
+        let mut at = window.middle();
+        if !contradicts {
+            at = self.fuse(model, &reach, window, time + short.mean / speed);
+        } else if self.following.doubt_change(model, time, short.mean) {
+            // What was believed is off by more than it said of itself; a change of speed under way will go on to be.
             // The contact says where the train is past it, however little is known of the way there.
             self.following.shift(-reach.length.mean, reach.length.variance);
             let here = Guess { mean: 0.0, variance: scatter };
@@ -264,11 +269,34 @@ impl Locator {
         self.node = Some(node);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
         PassedContact {
+            at,
             late: Some(late),
             short: Some(Length::from_m(short.mean)),
             missed: reach.missed,
             ..known
         }
+    }
+
+    /// Takes in a report that agrees with the forecast, by which the train was due at a time (s): it came to the sensor
+    /// within the window, and no time in it is more likely than the forecast makes it. Places are counted from there
+    /// from now on. Returns when the train was there most likely.
+    fn fuse(&mut self, model: &MotionModel, reach: &FeltReach, window: ContactWindow, due: f64) -> Timestamp {
+        let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
+        let time = due.clamp(after, until.max(after));
+        let place = self.following.place(model, time);
+        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
+        let short = TruncatedNormal {
+            mean: reach.length.mean - place.mean,
+            variance: place.variance + reach.length.variance + scatter,
+            low: speed * (after - time),
+            high: speed * (until - time),
+        };
+        let (measured, variance) = short.as_measurement();
+        self.following.shift(-reach.length.mean, reach.length.variance);
+        let here = Guess { mean: -measured, variance: scatter + variance };
+        self.following.pass(model, time, 0.0, here);
+        self.timestamp(time + short.moments().0 / speed)
     }
 
     /// Where it is at a time that is not before the last entry; `None` while it is lost.

@@ -4,9 +4,10 @@ use alloc::vec::Vec;
 
 use super::forecast::Forecast;
 use super::polls::Polls;
-use super::train_model::TrainModel;
-use crate::calibration::{Drift, LengthTable, Passage, PassageTracker, SectionIndex, Sighting};
-use crate::event::Event;
+use super::train_forecaster::{TrainForecaster, expected_length};
+use crate::calibration::motion::MotionModel;
+use crate::calibration::{Drift, Passage, PassageTracker, SectionIndex, Sighting};
+use crate::event::{Event, EventKind};
 use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::latency::PollTimingEstimator;
 use crate::track::Layout;
@@ -44,7 +45,7 @@ pub struct Hit {
 #[derive(Debug, Clone)]
 pub struct Predictor {
     sections: SectionIndex,
-    trains: Vec<TrainModel>,
+    trains: Vec<TrainForecaster>,
     /// Which of `trains` the run is of, and its tracker.
     under_way: Option<(usize, PassageTracker)>,
     timing: PollTimingEstimator,
@@ -74,81 +75,72 @@ impl Predictor {
         self.under_way = Some((place, PassageTracker::new(train, step, self.timing.clone())));
     }
 
-    /// The run is over: what it showed of the train's speed goes into the table.
+    /// The run is over: what it showed of the train goes into its motion model.
     pub fn end_run(&mut self) {
         if let Some((place, tracker)) = self.under_way.take() {
             self.timing = tracker.timing().clone();
-            if let Some(model) = self.trains.get_mut(place) {
-                model.end_run();
+            if let Some(train) = self.trains.get_mut(place) {
+                train.end_run(&self.sections);
             }
         }
     }
 
     /// The next entry of the run. A hit where it is a report of a passage; `None` for all else and outside
     /// a run.
-    #[inline]
     pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Hit> {
         let (place, tracker) = self.under_way.as_mut()?;
         let before = tracker.drive();
         let polls = Polls::of(tracker.timing());
-        match tracker.take(layout, event) {
+        let sighting = tracker.take(layout, event);
+        let (now, turnouts) = (tracker.drive(), tracker.turnouts());
+        let (others, rest) = self.trains.split_at_mut_checked(*place)?;
+        let (train, more) = rest.split_first_mut()?;
+        match sighting {
             Some(Sighting::Passage(passage)) => {
-                let place = *place;
-                let prior = self.lengths_ahead(place, &passage);
-                let model = self.trains.get_mut(place)?;
-                Some(model.pass(layout, &self.sections, passage, polls, &prior))
+                let others = || others.iter().chain(more.iter());
+                let prior =
+                    |model: &MotionModel, section| expected_length(model, others(), &self.sections, section);
+                Some(train.pass(layout, &self.sections, turnouts, passage, polls, prior))
             }
             Some(_) => None,
             None => {
-                let now = tracker.drive();
                 if now != before {
-                    let model = self.trains.get_mut(*place)?;
-                    model.command(now);
+                    train.command(layout, &self.sections, turnouts, event, now);
+                } else if matches!(event.kind, EventKind::Stopped { .. } | EventKind::Reverse { .. }) {
+                    train.note(layout, turnouts, event);
                 }
                 None
             }
         }
     }
 
-    /// What other trains found on the sections of a way on which this train never was, as (section, by,
-    /// variance) rows that its own table takes over. Empty on every later pass.
-    fn lengths_ahead(&self, place: usize, passage: &Passage) -> Vec<(usize, f64, f64)> {
-        let (Some(way), Some(model)) = (&passage.way, self.trains.get(place)) else { return Vec::new() };
-        let own = model.lengths();
-        way.hops()
-            .iter()
-            .filter_map(|hop| self.sections.section(*hop))
-            .filter(|section| own.get(*section).is_none())
-            .map(|section| {
-                let others = self.trains.iter().map(TrainModel::lengths);
-                let (by, variance) =
-                    LengthTable::pooled(others, section, self.sections.survey_variance(section));
-                (section, by, variance)
-            })
-            .collect()
-    }
-
     /// The forecast for the contact named next, as things stand: before any further report.
     #[must_use]
     pub fn forecast(&self, layout: &Layout) -> Option<Forecast> {
         let (place, tracker) = self.under_way.as_ref()?;
-        self.trains.get(*place)?.forecast(layout, &self.sections, tracker)
+        let train = self.trains.get(*place)?;
+        let others = || self.trains.iter().filter(|other| other.train() != train.train());
+        let prior = |model: &MotionModel, section| expected_length(model, others(), &self.sections, section);
+        train.forecast(layout, &self.sections, tracker, prior)
     }
 
     /// What is known of a train.
     #[must_use]
-    pub fn train(&self, train: TrainId) -> Option<&TrainModel> {
+    pub fn train(&self, train: TrainId) -> Option<&TrainForecaster> {
         self.trains.iter().find(|model| model.train() == train)
     }
 
-    /// The same, to take over a calibration.
-    pub fn train_mut(&mut self, train: TrainId) -> Option<&mut TrainModel> {
-        let place = self.place_of(train);
-        self.trains.get_mut(place)
+    /// Takes over a model from elsewhere, such as a calibration. It counts until the runs of its train have passed more sensors
+    /// than it was made of.
+    pub fn know(&mut self, model: MotionModel) {
+        let place = self.place_of(model.train());
+        if let Some(train) = self.trains.get_mut(place) {
+            train.know(model);
+        }
     }
 
     /// All trains seen, in the order of their first run.
-    pub fn trains(&self) -> impl Iterator<Item = &TrainModel> {
+    pub fn trains(&self) -> impl Iterator<Item = &TrainForecaster> {
         self.trains.iter()
     }
 
@@ -166,7 +158,7 @@ impl Predictor {
 
     fn place_of(&mut self, train: TrainId) -> usize {
         self.trains.iter().position(|model| model.train() == train).unwrap_or_else(|| {
-            self.trains.push(TrainModel::new(train));
+            self.trains.push(TrainForecaster::new(train));
             self.trains.len() - 1
         })
     }

@@ -21,11 +21,11 @@ pub struct UniformNormal {
 /// dividing by it would only lose digits.
 const NEGLIGIBLE: f64 = 1e-4;
 
-fn normal_cdf(z: f64) -> f64 {
+pub(super) fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
-fn normal_density(z: f64) -> f64 {
+pub(super) fn normal_density(z: f64) -> f64 {
     libm::exp(-0.5 * z * z) / libm::sqrt(2.0 * PI)
 }
 

@@ -5,19 +5,42 @@
 //! measurement of one unknown. Priors keep `a` positive definite, so no rank has to be guessed.
 #![expect(
     clippy::indexing_slicing,
-    clippy::needless_range_loop,
-    reason = "all indices stay below `unknowns`, the size both vectors are made for, and run as in the formulas"
+    reason = "all indices stay below `unknowns`, the size both vectors are made for"
 )]
 
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::cholesky::{backward, cholesky, first_of_inverse, forward, row};
+
 /// The sum of what all measurements and priors say of the unknowns.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "Written"))]
 pub struct NormalEquations {
     unknowns: usize,
     a: Vec<f64>,
     b: Vec<f64>,
+}
+
+/// Equations as they stand in a file, before their sizes are checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Written {
+    unknowns: usize,
+    a: Vec<f64>,
+    b: Vec<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Written> for NormalEquations {
+    type Error = &'static str;
+
+    fn try_from(Written { unknowns, a, b }: Written) -> Result<Self, Self::Error> {
+        let fits = b.len() == unknowns
+            && unknowns.checked_add(1).is_some_and(|n| unknowns.checked_mul(n) == Some(2 * a.len()));
+        fits.then_some(Self { unknowns, a, b })
+            .ok_or("the information matrix does not have the size of its vector")
+    }
 }
 
 /// The best values of the unknowns and how they are known.
@@ -27,11 +50,6 @@ pub struct Solution {
     pub values: Vec<f64>,
     /// Lower triangle of the inverse of the information matrix, as far as it was asked for.
     covariance: Vec<f64>,
-}
-
-/// Where row `i` of a lower triangle begins.
-const fn row(i: usize) -> usize {
-    i * (i + 1) / 2
 }
 
 impl NormalEquations {
@@ -59,24 +77,79 @@ impl NormalEquations {
         }
     }
 
-    /// Adds measurements that share unknowns of their own, which nobody else asks for: the unknowns of
-    /// `group` are taken out by the Schur complement, so thousands of groups cost no more than their rows.
-    pub fn add_group<const LOCAL: usize>(&mut self, group: &Group<LOCAL>) {
-        let Some(inverse) = invert(group.local_a) else {
-            debug_assert!(false, "a group bounds its own unknowns by priors");
-            return;
-        };
-        for (place, &i) in group.shared.iter().enumerate() {
-            let left = group.cross[place];
-            let weighed: [f64; LOCAL] =
-                core::array::from_fn(|k| (0..LOCAL).map(|l| left[l] * inverse[l][k]).sum());
-            self.b[i] += group.shared_b[place] - dot(&weighed, &group.local_b);
-            for (other, &j) in group.shared.iter().enumerate() {
-                if j <= i {
-                    let low = row(place.max(other)) + place.min(other);
-                    self.a[row(i) + j] += group.shared_a[low] - dot(&weighed, &group.cross[other]);
-                }
+    /// How many unknowns there are.
+    #[must_use]
+    pub const fn unknowns(&self) -> usize {
+        self.unknowns
+    }
+
+    /// Appends unknowns of which nothing is known.
+    pub fn append(&mut self, count: usize) {
+        self.unknowns += count;
+        self.a.resize(row(self.unknowns), 0.0);
+        self.b.resize(self.unknowns, 0.0);
+    }
+
+    /// Exchanges the last two unknowns.
+    pub fn swap_last_two(&mut self) {
+        let Some(first) = self.unknowns.checked_sub(2) else { return };
+        let (one, other) = (row(first), row(first + 1));
+        for j in 0..first {
+            self.a.swap(one + j, other + j);
+        }
+        self.a.swap(one + first, other + first + 1);
+        self.b.swap(first, first + 1);
+    }
+
+    /// Takes the last unknown out, so that the others are known as well as before without it (Schur complement).
+    /// `None` when it is tied to others without being bounded, which only rounding can bring about.
+    pub fn eliminate_last(&mut self) -> Option<Eliminated> {
+        let last = self.unknowns.checked_sub(1)?;
+        let mut line = self.a.split_off(row(last));
+        let pivot = line.pop()?;
+        let right = self.b.pop()?;
+        self.unknowns = last;
+        if pivot.is_nan() || pivot <= 0.0 {
+            let is_free = pivot == 0.0 && line.iter().all(|tie| *tie == 0.0);
+            return is_free.then_some(Eliminated { line, pivot: 1.0, right });
+        }
+        for i in 0..last {
+            let factor = line[i] / pivot;
+            if factor == 0.0 {
+                continue;
             }
+            self.b[i] -= factor * right;
+            for (sum, tie) in self.a[row(i)..=row(i) + i].iter_mut().zip(&line) {
+                *sum -= factor * tie;
+            }
+        }
+        Some(Eliminated { line, pivot, right })
+    }
+
+    /// By how much these values are less likely than the best: the sum of squares over variances, but for a constant.
+    #[must_use]
+    pub fn cost(&self, x: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (i, value) in x.iter().enumerate().take(self.unknowns) {
+            let line = &self.a[row(i)..row(i) + i];
+            let others: f64 = line.iter().zip(x).map(|(tie, other)| tie * other).sum();
+            sum += value * (2.0 * others + self.a[row(i) + i] * value - 2.0 * self.b[i]);
+        }
+        sum
+    }
+
+    /// Adds variances (the lower triangle of a covariance, row after row) to what is known of the unknowns: they may have
+    /// changed by so much since they were measured. Every unknown has to be bounded.
+    pub fn widen(&mut self, by: &[f64]) {
+        let Some(mut solution) = self.solve() else { return };
+        for (variance, more) in solution.covariance.iter_mut().zip(by) {
+            *variance += more;
+        }
+        let Some(factor) = cholesky(&solution.covariance, self.unknowns) else { return };
+        self.a = first_of_inverse(&factor, self.unknowns, self.unknowns);
+        for i in 0..self.unknowns {
+            self.b[i] =
+                (0..self.unknowns).map(|j| self.a[row(i.max(j)) + i.min(j)] * solution.values[j]).sum();
         }
     }
 
@@ -110,113 +183,21 @@ impl NormalEquations {
     }
 }
 
-/// Measurements that have `LOCAL` unknowns of their own beside the shared ones.
+/// An unknown that was taken out of equations, to be found again from the others.
 #[derive(Debug, Clone)]
-pub struct Group<const LOCAL: usize> {
-    /// The shared unknowns that occur here.
-    shared: Vec<usize>,
-    shared_a: Vec<f64>,
-    shared_b: Vec<f64>,
-    /// Information between each shared unknown and the local ones.
-    cross: Vec<[f64; LOCAL]>,
-    local_a: [[f64; LOCAL]; LOCAL],
-    local_b: [f64; LOCAL],
+pub struct Eliminated {
+    line: Vec<f64>,
+    pivot: f64,
+    right: f64,
 }
 
-impl<const LOCAL: usize> Group<LOCAL> {
-    /// A group whose own unknowns are bounded only by these prior variances about zero.
+impl Eliminated {
+    /// Its value where these are the values of the unknowns before it.
     #[must_use]
-    pub fn new(prior_variances: [f64; LOCAL]) -> Self {
-        let mut local_a = [[0.0; LOCAL]; LOCAL];
-        for (i, variance) in prior_variances.iter().enumerate() {
-            local_a[i][i] = 1.0 / variance;
-        }
-        Self {
-            shared: Vec::new(),
-            shared_a: Vec::new(),
-            shared_b: Vec::new(),
-            cross: Vec::new(),
-            local_a,
-            local_b: [0.0; LOCAL],
-        }
+    pub fn value(&self, others: &[f64]) -> f64 {
+        let tied: f64 = self.line.iter().zip(others).map(|(tie, value)| tie * value).sum();
+        (self.right - tied) / self.pivot
     }
-
-    /// Adds `Σ weight·shared + local·own = measured` with this variance.
-    pub fn add(&mut self, terms: &[(usize, f64)], local: [f64; LOCAL], measured: f64, variance: f64) {
-        debug_assert!(variance > 0.0 && measured.is_finite());
-        let places: Vec<(usize, f64)> = terms.iter().map(|&(unknown, w)| (self.place(unknown), w)).collect();
-        for &(i, left) in &places {
-            self.shared_b[i] += left * measured / variance;
-            for k in 0..LOCAL {
-                self.cross[i][k] += left * local[k] / variance;
-            }
-            for &(j, right) in &places {
-                if j <= i {
-                    self.shared_a[row(i) + j] += left * right / variance;
-                }
-            }
-        }
-        for k in 0..LOCAL {
-            self.local_b[k] += local[k] * measured / variance;
-            for l in 0..LOCAL {
-                self.local_a[k][l] += local[k] * local[l] / variance;
-            }
-        }
-    }
-
-    /// The group's own unknowns and their covariance once the shared ones are solved; the doubt of the
-    /// shared ones is not in it.
-    #[must_use]
-    pub fn own(&self, solution: &Solution) -> Option<([f64; LOCAL], [[f64; LOCAL]; LOCAL])> {
-        let inverse = invert(self.local_a)?;
-        let mut right = self.local_b;
-        for (place, &unknown) in self.shared.iter().enumerate() {
-            for k in 0..LOCAL {
-                right[k] -= self.cross[place][k] * solution.values[unknown];
-            }
-        }
-        Some((core::array::from_fn(|k| dot(&inverse[k], &right)), inverse))
-    }
-
-    fn place(&mut self, unknown: usize) -> usize {
-        self.shared.iter().position(|known| *known == unknown).unwrap_or_else(|| {
-            self.shared.push(unknown);
-            self.shared_a.resize(row(self.shared.len()), 0.0);
-            self.shared_b.push(0.0);
-            self.cross.push([0.0; LOCAL]);
-            self.shared.len() - 1
-        })
-    }
-}
-
-fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
-    left.iter().zip(right).map(|(l, r)| l * r).sum()
-}
-
-/// The inverse of a small positive definite matrix by Gauss and Jordan; `None` when it is not.
-fn invert<const N: usize>(mut a: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
-    let mut inverse = [[0.0; N]; N];
-    for (i, line) in inverse.iter_mut().enumerate() {
-        line[i] = 1.0;
-    }
-    for i in 0..N {
-        let pivot = a[i][i];
-        if pivot.is_nan() || pivot <= 0.0 {
-            return None;
-        }
-        for k in 0..N {
-            a[i][k] /= pivot;
-            inverse[i][k] /= pivot;
-        }
-        for j in (0..N).filter(|j| *j != i) {
-            let factor = a[j][i];
-            for k in 0..N {
-                a[j][k] -= factor * a[i][k];
-                inverse[j][k] -= factor * inverse[i][k];
-            }
-        }
-    }
-    Some(inverse)
 }
 
 impl Solution {
@@ -238,126 +219,16 @@ impl Solution {
         self.covariance[row(one.max(other)) + one.min(other)]
     }
 
+    /// The covariance of an unknown and the sum of some.
+    #[must_use]
+    pub fn covariance_with_sum(&self, one: usize, of: &[usize]) -> f64 {
+        of.iter().map(|other| self.covariance(one, *other)).sum()
+    }
+
     /// The variance of one unknown.
     #[must_use]
     pub fn variance(&self, unknown: usize) -> f64 {
         self.covariance[row(unknown) + unknown].max(0.0)
-    }
-}
-
-/// Rows of a factor that are worked out together, so that one sum need not wait for another.
-const TOGETHER: usize = 8;
-
-/// The lower factor of a positive definite matrix, or `None` when it is not.
-///
-/// Every sum is taken in the order of the textbook's, term by term: whoever works out one row after the other gets the same bits.
-fn cholesky(a: &[f64], n: usize) -> Option<Vec<f64>> {
-    let mut factor = a.to_vec();
-    // The rows under work, column by column.
-    let mut columns = vec![[0.0; TOGETHER]; n];
-    for first in (0..n).step_by(TOGETHER) {
-        let rows = TOGETHER.min(n - first);
-        let (above, work) = factor.split_at_mut(row(first));
-        let begins = |i: usize| row(i) - row(first);
-        for j in 0..first {
-            let line = &above[row(j)..row(j + 1)];
-            let mut sums = [0.0; TOGETHER];
-            for (place, sum) in sums.iter_mut().enumerate().take(rows) {
-                *sum = work[begins(first + place) + j];
-            }
-            for (column, right) in columns.iter().zip(&line[..j]) {
-                for (sum, left) in sums.iter_mut().zip(column) {
-                    *sum -= left * right;
-                }
-            }
-            for (place, sum) in sums.iter().enumerate() {
-                columns[j][place] = sum / line[j];
-            }
-        }
-        for i in first..first + rows {
-            for j in 0..first {
-                work[begins(i) + j] = columns[j][i - first];
-            }
-            for j in first..=i {
-                let mut sum = work[begins(i) + j];
-                for k in 0..j {
-                    sum -= work[begins(i) + k] * work[begins(j) + k];
-                }
-                if i == j {
-                    if sum.is_nan() || sum <= 0.0 {
-                        return None;
-                    }
-                    work[begins(i) + i] = libm::sqrt(sum);
-                } else {
-                    work[begins(i) + j] = sum / work[begins(j) + j];
-                }
-            }
-        }
-    }
-    Some(factor)
-}
-
-/// Lower triangle of the first `side` rows of the inverse of `factor · factorᵀ`: all of its columns at once, each as
-/// [`forward`] and [`backward`] would make it.
-fn first_of_inverse(factor: &[f64], n: usize, side: usize) -> Vec<f64> {
-    if side == 0 {
-        return Vec::new();
-    }
-    let mut x = vec![0.0; n * side];
-    for j in 0..side {
-        x[j * side + j] = 1.0;
-    }
-    let mut known = vec![0.0; side];
-    for i in 0..n {
-        let (before, rest) = x.split_at_mut(i * side);
-        known.fill(0.0);
-        for (line, weight) in before.chunks_exact(side).zip(&factor[row(i)..row(i) + i]) {
-            add_times(&mut known, *weight, line);
-        }
-        divide(&mut rest[..side], &known, factor[row(i) + i]);
-    }
-    for i in (0..n).rev() {
-        let (rest, behind) = x.split_at_mut((i + 1) * side);
-        known.fill(0.0);
-        for (line, j) in behind.chunks_exact(side).zip(i + 1..) {
-            add_times(&mut known, factor[row(j) + i], line);
-        }
-        divide(&mut rest[i * side..], &known, factor[row(i) + i]);
-    }
-    let mut covariance = vec![0.0; row(side)];
-    for i in 0..side {
-        for j in 0..=i {
-            covariance[row(i) + j] = x[i * side + j];
-        }
-    }
-    covariance
-}
-
-fn add_times(sums: &mut [f64], weight: f64, line: &[f64]) {
-    for (sum, value) in sums.iter_mut().zip(line) {
-        *sum += weight * value;
-    }
-}
-
-fn divide(line: &mut [f64], known: &[f64], pivot: f64) {
-    for (value, known) in line.iter_mut().zip(known) {
-        *value = (*value - known) / pivot;
-    }
-}
-
-/// Solves `factor · y = x` in place.
-fn forward(factor: &[f64], x: &mut [f64]) {
-    for i in 0..x.len() {
-        let known: f64 = (0..i).map(|j| factor[row(i) + j] * x[j]).sum();
-        x[i] = (x[i] - known) / factor[row(i) + i];
-    }
-}
-
-/// Solves `factorᵀ · y = x` in place.
-fn backward(factor: &[f64], x: &mut [f64]) {
-    for i in (0..x.len()).rev() {
-        let known: f64 = (i + 1..x.len()).map(|j| factor[row(j) + i] * x[j]).sum();
-        x[i] = (x[i] - known) / factor[row(i) + i];
     }
 }
 
@@ -381,25 +252,47 @@ mod tests {
     }
 
     #[test]
-    fn a_group_taken_out_leaves_the_same_answer_as_one_kept() {
-        // Given two lines of one slope (shared) with their own intercepts and bends,
-        let rows = [(0.0, 1.0, 1.1), (1.0, 4.0, 2.9), (2.5, 0.5, 8.0), (4.0, 2.0, 12.5)];
-        let mut kept = NormalEquations::new(3);
-        kept.add(&[(1, 1.0)], 0.0, 9.0);
-        kept.add(&[(2, 1.0)], 0.0, 4.0);
-        let mut group = Group::new([9.0, 4.0]);
-        for (x, bend, y) in rows {
-            kept.add(&[(0, x), (1, 1.0), (2, bend)], y, 0.5);
-            group.add(&[(0, x)], [1.0, bend], y, 0.5);
+    fn an_unknown_taken_out_leaves_the_same_answer_and_is_found_again() {
+        // Given a chain of three places of which one is measured, and a scale that all share,
+        let mut all = NormalEquations::new(4);
+        all.add(&[(0, 1.0)], 1.0, 0.04);
+        all.add(&[(1, 1.0)], 0.3, 0.01);
+        all.add(&[(1, -1.0), (2, 1.0), (0, -2.0)], 0.1, 0.02);
+        all.add(&[(2, -1.0), (3, 1.0), (0, -1.5)], -0.2, 0.03);
+        let known = all.solve().unwrap();
+        // when the last two change places and are taken out one after the other,
+        let mut fewer = all.clone();
+        fewer.swap_last_two();
+        let second = fewer.eliminate_last().unwrap();
+        let third = fewer.eliminate_last().unwrap();
+        let left = fewer.solve().unwrap();
+        for i in 0..2 {
+            assert!((left.values[i] - known.values[i]).abs() < 1e-12);
+            assert!((left.variance(i) - known.variance(i)).abs() < 1e-12);
         }
-        let mut taken_out = NormalEquations::new(1);
-        taken_out.add_group(&group);
-        // then slope, its variance and the own unknowns agree with the full system.
-        let (full, reduced) = (kept.solve().unwrap(), taken_out.solve().unwrap());
-        let (own, _) = group.own(&reduced).unwrap();
-        assert!((full.values[0] - reduced.values[0]).abs() < 1e-12);
-        assert!((full.variance(0) - reduced.variance(0)).abs() < 1e-12);
-        assert!((full.values[1] - own[0]).abs() < 1e-12 && (full.values[2] - own[1]).abs() < 1e-12);
+        let mut values = left.values.clone();
+        values.push(third.value(&values));
+        values.push(second.value(&values));
+        assert!((values[2] - known.values[3]).abs() < 1e-12 && (values[3] - known.values[2]).abs() < 1e-12);
+        let moved: Vec<f64> = known.values.iter().map(|value| value + 0.1).collect();
+        let rise = all.cost(&moved) - all.cost(&known.values);
+        let sum: f64 = (0..4)
+            .flat_map(|i| (0..4).map(move |j| (i, j)))
+            .map(|(i, j)| all.a[row(i.max(j)) + i.min(j)])
+            .sum();
+        assert!((rise - 0.01 * sum).abs() < 1e-9, "{rise} {sum}");
+    }
+
+    #[test]
+    fn what_may_have_changed_is_known_less_well() {
+        let mut equations = NormalEquations::new(2);
+        equations.add(&[(0, 1.0)], 3.0, 0.5);
+        equations.add(&[(0, -1.0), (1, 1.0)], 1.0, 0.25);
+        equations.widen(&[0.1, 0.1, 0.4]);
+        let known = equations.solve().unwrap();
+        assert!((known.values[0] - 3.0).abs() < 1e-12 && (known.values[1] - 4.0).abs() < 1e-12);
+        assert!((known.variance(0) - 0.6).abs() < 1e-12 && (known.variance(1) - 1.15).abs() < 1e-12);
+        assert!((known.covariance(0, 1) - 0.6).abs() < 1e-12);
     }
 
     /// Twenty unknowns that all have to do with each other.

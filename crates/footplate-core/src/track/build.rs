@@ -8,11 +8,15 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, TurnoutId};
 use crate::track::hop::Hops;
+use crate::track::survey::surveyed_distances;
 use crate::track::{
     Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind, Place,
-    PlannedZone, Ways,
+    PlannedZone, StretchLength, Survey, Ways,
 };
 use crate::units::Length;
+
+/// A survey whose lengths may all be double or nothing says nothing.
+const LARGEST_SCALE: f64 = 1.0;
 
 /// Nodes and edges are numbered by `u16`, two to a place and two to a stretch.
 const MAX_PAIRS: usize = 1 << (u16::BITS - 1);
@@ -28,10 +32,13 @@ impl Layout {
         if !is_plausible(uncertainty) {
             return Err(LayoutError::IllegalUncertainty { found: uncertainty });
         }
+        if !(0.0..=LARGEST_SCALE).contains(&plan.survey.scale) {
+            return Err(LayoutError::IllegalScale { found: plan.survey.scale });
+        }
         let places = place_nodes(&plan.places)?;
         let (nodes, edges) = join(plan, &places)?;
         let partners = pair_turnouts(&plan.never_both_curved, &places)?;
-        let mut layout = Self {
+        let layout = Self {
             name: plan.name.clone(),
             survey: plan.survey.clone(),
             nodes,
@@ -42,21 +49,29 @@ impl Layout {
             never_both_curved: plan.never_both_curved.clone(),
             partners,
             hops: Hops::default(),
+            distances: BTreeMap::new(),
             zones: Vec::new(),
             restricted: BTreeMap::new(),
         };
-        let place_and_name = |node: NodeId| (node.pair(), layout.node_name(node).to_owned());
-        if let Some((place, node)) = layout.loop_without_length().map(place_and_name) {
-            return Err(LayoutError::LoopWithoutLength { place, node });
-        }
-        layout.hops = match Hops::of(&layout).map_err(place_and_name) {
-            Ok(hops) => hops,
-            Err((place, node)) => return Err(LayoutError::TooManyWays { place, node }),
-        };
+        let layout = layout.with_hops()?;
         let zones = plan.zones.iter();
         zones
             .cloned()
             .try_fold(layout, |layout, PlannedZone { zone, stretches }| layout.with_zone(zone, stretches))
+    }
+
+    /// Makes the tables that follow from the lengths.
+    pub(super) fn with_hops(mut self) -> Result<Self, LayoutError> {
+        let place_and_name = |layout: &Self, node: NodeId| (node.pair(), layout.node_name(node).to_owned());
+        if let Some((place, node)) = self.loop_without_length().map(|node| place_and_name(&self, node)) {
+            return Err(LayoutError::LoopWithoutLength { place, node });
+        }
+        self.hops = Hops::of(&self).map_err(|node| {
+            let (place, node) = place_and_name(&self, node);
+            LayoutError::TooManyWays { place, node }
+        })?;
+        self.distances = surveyed_distances(&self)?;
+        Ok(self)
     }
 
     /// A node from which edges of 0 mm lead back to it.
@@ -93,8 +108,20 @@ impl Layout {
     }
 }
 
+/// The length of a stretch and one standard deviation of it.
+pub(super) fn checked(stretch: usize, known: StretchLength, survey: &Survey) -> Result<Length, LayoutError> {
+    let (length, uncertainty) = known.estimate(survey);
+    if !is_plausible(length) {
+        return Err(LayoutError::IllegalLength { stretch, found: length });
+    }
+    if !is_plausible(uncertainty) {
+        return Err(LayoutError::IllegalLengthUncertainty { stretch, found: uncertainty });
+    }
+    Ok(length)
+}
+
 /// Neither undefined nor negative nor beyond belief.
-fn is_plausible(length: Length) -> bool {
+pub(super) fn is_plausible(length: Length) -> bool {
     length >= Length::ZERO && length <= MAX_EDGE_LENGTH
 }
 
@@ -205,11 +232,10 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
             places.names.get(name).copied().ok_or_else(unknown)
         };
         let (from, to) = (find(&entry.from.node)?, find(&entry.to.node)?);
-        if !is_plausible(entry.length) {
-            return Err(LayoutError::IllegalLength { stretch, found: entry.length });
-        }
-        let there = Edge { from, leg: entry.from.leg, to, length: entry.length };
-        let back = Edge { from: to.reverse(), leg: entry.to.leg, to: from.reverse(), length: entry.length };
+        let known = entry.length;
+        let length = checked(stretch, known, &plan.survey)?;
+        let there = Edge { from, leg: entry.from.leg, to, length, known };
+        let back = Edge { from: to.reverse(), leg: entry.to.leg, to: from.reverse(), length, known };
         let first = EdgeId(NodeId::first_of(stretch).0);
         for (id, edge, named) in [(first, there, &entry.from), (first.twin(), back, &entry.to)] {
             let node = usize::from(edge.from.0);
@@ -309,7 +335,7 @@ mod tests {
         for (length, text) in [(f64::NAN, "NaN"), (-1.0, "-1"), (185_000.0, "185000"), (f64::INFINITY, "inf")]
         {
             assert_eq!(
-                refusal(|plan| plan.stretches[3].length = Length::from_mm(length)),
+                refusal(|plan| plan.stretches[3].length = Length::from_mm(length).into()),
                 (
                     PlanEntry::Stretch(3),
                     format!("a length of {text} mm is not between 0 and 100000 mm (is it in millimetres?)")
@@ -404,10 +430,10 @@ mod tests {
     #[test]
     fn a_loop_of_no_length_is_refused_and_a_stretch_of_no_length_is_not() {
         let mut plan = oval_plan();
-        plan.stretches[0].length = Length::ZERO;
+        plan.stretches[0].length = Length::ZERO.into();
         assert!(Layout::build(&plan).is_ok());
         for stretch in &mut plan.stretches {
-            stretch.length = Length::ZERO;
+            stretch.length = Length::ZERO.into();
         }
         let error = Layout::build(&plan).unwrap_err();
         assert!(matches!(error, LayoutError::LoopWithoutLength { .. }), "{error}");
@@ -424,7 +450,7 @@ mod tests {
             let any = Stretch {
                 from: RailEnd { node: "A1".into(), leg: None },
                 to: RailEnd { node: "A1".into(), leg: None },
-                length: Length::ZERO,
+                length: Length::ZERO.into(),
             };
             plan.stretches = vec![any; MAX_PAIRS + 1];
         });

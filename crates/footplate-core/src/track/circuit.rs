@@ -49,7 +49,19 @@ impl Layout {
         held: &BTreeMap<TurnoutId, Option<Leg>>,
         avoid: &[StretchId],
     ) -> Option<Circuit> {
-        let mut search = Search { layout: self, held, avoid, tried: 0, best: None };
+        self.circuit_over(start, held, avoid, &|_| 1)
+    }
+
+    /// The same where contacts count by the hop that leads to them: the circuit over which the most is gained.
+    #[must_use]
+    pub fn circuit_over(
+        &self,
+        start: NodeId,
+        held: &BTreeMap<TurnoutId, Option<Leg>>,
+        avoid: &[StretchId],
+        worth: &dyn Fn(HopId) -> usize,
+    ) -> Option<Circuit> {
+        let mut search = Search { layout: self, held, avoid, worth, tried: 0, best: None };
         for lead in search.leads_from(start) {
             search.laps_after(start, &lead);
         }
@@ -61,12 +73,15 @@ struct Search<'l> {
     layout: &'l Layout,
     held: &'l BTreeMap<TurnoutId, Option<Leg>>,
     avoid: &'l [StretchId],
+    worth: &'l dyn Fn(HopId) -> usize,
     tried: usize,
     best: Option<Best>,
 }
 
 struct Best {
     circuit: Circuit,
+    /// Twice what the lap is worth, less its lead: a lead costs a contact's worth of time for each of its hops, once.
+    worth: usize,
     curved: usize,
 }
 
@@ -171,12 +186,11 @@ impl<'l> Search<'l> {
     fn offer(&mut self, lead: &[HopId], lap: &[HopId], legs: &BTreeMap<TurnoutId, Leg>) {
         let curved = legs.values().filter(|leg| leg.is_curved()).count();
         let length: Length = lap.iter().filter_map(|id| self.layout.hop(*id)).map(|hop| hop.length).sum();
+        let gained: usize = lap.iter().map(|hop| (self.worth)(*hop)).sum();
+        let worth = (2 * gained).saturating_sub(lead.len());
         let is_better = self.best.as_ref().is_none_or(|best| {
-            // A lead costs a contact's worth of time for each of its hops, once.
-            let worth = |lap: usize, lead: usize| (2 * lap).saturating_sub(lead);
-            let (ours, theirs) =
-                (worth(lap.len(), lead.len()), worth(best.circuit.lap.len(), best.circuit.lead.len()));
-            ours.cmp(&theirs)
+            worth
+                .cmp(&best.worth)
                 .then(best.curved.cmp(&curved))
                 .then(length.as_m().total_cmp(&best.circuit.length.as_m()))
                 .is_gt()
@@ -184,7 +198,7 @@ impl<'l> Search<'l> {
         if is_better && length > Length::ZERO {
             let legs = legs.iter().map(|(turnout, leg)| (*turnout, *leg)).collect();
             let circuit = Circuit { lead: lead.to_vec(), lap: lap.to_vec(), length, legs };
-            self.best = Some(Best { circuit, curved });
+            self.best = Some(Best { circuit, worth, curved });
         }
     }
 }

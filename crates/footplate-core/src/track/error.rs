@@ -98,6 +98,43 @@ pub enum LayoutError {
         /// What was given.
         found: Length,
     },
+    /// The uncertainty of a length of its own is not a length.
+    IllegalLengthUncertainty {
+        /// The stretch.
+        stretch: usize,
+        /// What was given.
+        found: Length,
+    },
+    /// The factor that all lengths have in common is known to no such part.
+    IllegalScale {
+        /// What was given, as a part.
+        found: f64,
+    },
+    /// A surveyed distance that is not from a sensor to the next by a single way.
+    NoDistance {
+        /// The distance.
+        distance: usize,
+        /// The node it begins at.
+        from: String,
+        /// The node it ends at.
+        to: String,
+    },
+    /// A surveyed distance that is not the sum of its edges.
+    UnequalDistance {
+        /// The distance.
+        distance: usize,
+        /// What was given.
+        found: Length,
+        /// The sum of the edges.
+        edges: Length,
+    },
+    /// The uncertainty of a surveyed distance is not a length.
+    IllegalDistanceUncertainty {
+        /// The distance.
+        distance: usize,
+        /// What was given.
+        found: Length,
+    },
     /// Two stretches, or both ends of one, at one rail end.
     RailEndTaken {
         /// The later stretch.
@@ -189,6 +226,8 @@ pub enum PlanEntry {
     Place(usize),
     /// A stretch.
     Stretch(usize),
+    /// A surveyed distance.
+    Distance(usize),
     /// A pair of turnouts that are never both curved.
     Pair(usize),
     /// A speed restriction.
@@ -201,7 +240,10 @@ impl LayoutError {
     pub const fn entry(&self) -> PlanEntry {
         match *self {
             Self::TooMany { .. } => PlanEntry::Plan,
-            Self::IllegalUncertainty { .. } => PlanEntry::Survey,
+            Self::IllegalUncertainty { .. } | Self::IllegalScale { .. } => PlanEntry::Survey,
+            Self::NoDistance { distance, .. }
+            | Self::UnequalDistance { distance, .. }
+            | Self::IllegalDistanceUncertainty { distance, .. } => PlanEntry::Distance(distance),
             Self::IllegalName { place, .. }
             | Self::DuplicateName { place, .. }
             | Self::SensorPlacedTwice { place, .. }
@@ -214,6 +256,7 @@ impl LayoutError {
             | Self::LegWithoutTurnout { stretch, .. }
             | Self::BeyondTrackEnd { stretch, .. }
             | Self::IllegalLength { stretch, .. }
+            | Self::IllegalLengthUncertainty { stretch, .. }
             | Self::RailEndTaken { stretch, .. } => PlanEntry::Stretch(stretch),
             Self::IllegalPair { pair, .. } => PlanEntry::Pair(pair),
             Self::IllegalZoneName { zone, .. }
@@ -243,11 +286,27 @@ impl fmt::Display for LayoutError {
             Self::TooMany { what, found, limit } => {
                 write!(f, "{found} {what} are more than the {limit} that a layout can number")
             }
-            Self::IllegalUncertainty { found } => write!(
+            Self::IllegalUncertainty { found }
+            | Self::IllegalLengthUncertainty { found, .. }
+            | Self::IllegalDistanceUncertainty { found, .. } => write!(
                 f,
                 "an uncertainty of {} mm is not between 0 and {} mm",
                 found.as_mm(),
                 MAX_EDGE_LENGTH.as_mm()
+            ),
+            Self::IllegalScale { found } => {
+                write!(f, "an uncertainty of the scale of {} % is not between 0 and 100 %", 100.0 * found)
+            }
+            Self::NoDistance { from, to, .. } => write!(
+                f,
+                "no single way leads from sensor `{from}` to `{to}` without another sensor between: give a distance \
+                 between neighbouring sensors"
+            ),
+            Self::UnequalDistance { found, edges, .. } => write!(
+                f,
+                "a distance of {:.0} mm is not the sum of the edges between, {:.0} mm: correct one or the other",
+                found.as_mm(),
+                edges.as_mm()
             ),
             Self::IllegalName { name, .. } => write!(
                 f,

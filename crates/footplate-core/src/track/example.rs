@@ -25,7 +25,7 @@ pub(crate) fn oval_plan() -> LayoutPlan {
     };
     LayoutPlan {
         name: "oval".into(),
-        survey: Survey { uncertainty: Length::from_mm(2.0), origin: "made up".into() },
+        survey: Survey::taped(Length::from_mm(2.0), "made up".into()),
         places: vec![
             sensor("A", 0),
             sensor("B", 2),
@@ -62,7 +62,7 @@ pub(crate) fn end(number: u16) -> Place {
 }
 
 pub(crate) fn stretch(from: &str, to: &str, mm: f64) -> Stretch {
-    Stretch { from: rail_end(from), to: rail_end(to), length: Length::from_mm(mm) }
+    Stretch { from: rail_end(from), to: rail_end(to), length: Length::from_mm(mm).into() }
 }
 
 fn rail_end(text: &str) -> RailEnd {

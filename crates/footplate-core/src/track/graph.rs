@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
 use crate::track::hop::Hops;
-use crate::track::{Leg, Survey, TurnoutStates, Zone};
+use crate::track::{HopId, Leg, StretchLength, Survey, TurnoutStates, Zone};
 use crate::units::Length;
 
 impl NodeId {
@@ -109,8 +109,10 @@ pub struct Edge {
     pub leg: Option<Leg>,
     /// Where it ends.
     pub to: NodeId,
-    /// Its length, which may be zero.
+    /// Its most likely length, which may be zero.
     pub length: Length,
+    /// What is known of that.
+    pub known: StretchLength,
 }
 
 /// A checked layout. Ids of another layout, or beyond this one's, name nothing: they give `None` or no ways.
@@ -129,6 +131,8 @@ pub struct Layout {
     /// The other turnout of each pair, both ways.
     pub(crate) partners: BTreeMap<TurnoutId, TurnoutId>,
     pub(crate) hops: Hops,
+    /// Hops of which the whole is known better than its edges, in both directions: one standard deviation.
+    pub(crate) distances: BTreeMap<HopId, Length>,
     pub(crate) zones: Vec<Zone>,
     /// The zone of each restricted stretch, by its place in the list.
     pub(crate) restricted: BTreeMap<StretchId, usize>,
@@ -145,6 +149,18 @@ impl Layout {
     #[must_use]
     pub const fn survey(&self) -> &Survey {
         &self.survey
+    }
+
+    /// One standard deviation of the length of a hop, where the survey knows it better than its edges.
+    #[must_use]
+    pub fn surveyed_distance(&self, hop: HopId) -> Option<Length> {
+        self.distances.get(&hop).copied()
+    }
+
+    /// Whether the length of every stretch is known in some way.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.edges.iter().all(|edge| edge.known != StretchLength::Unknown)
     }
 
     /// A node.

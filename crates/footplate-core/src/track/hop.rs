@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use crate::ids::{EdgeId, NodeId, SensorId};
-use crate::track::{Layout, Leg, NodeKind, TurnoutNeed, TurnoutStates};
+use crate::track::{Layout, Leg, NodeKind, StretchLength, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 /// Work that making the table may cost, counted in edges looked at and edges stored. The built-in layouts take
@@ -78,6 +78,20 @@ impl Layout {
     #[must_use]
     pub fn hop(&self, id: HopId) -> Option<Hop<'_>> {
         self.hops.get(id)
+    }
+
+    /// A length that a hop hardly falls short of. The end of a track that nobody measured may be right behind the last
+    /// sensor before it.
+    #[must_use]
+    pub fn least_length(&self, hop: &Hop<'_>) -> Length {
+        if let Some(uncertainty) = self.surveyed_distance(hop.id) {
+            return (hop.length + -2.0 * uncertainty).max(Length::ZERO);
+        }
+        let edges = || hop.edges.iter().filter_map(|edge| self.edge(*edge)).map(|edge| edge.known);
+        if hop.sensor.is_none() && edges().any(|known| known == StretchLength::Unknown) {
+            return Length::ZERO;
+        }
+        edges().map(StretchLength::shortest).sum()
     }
 
     /// All hops of the table, by the node they begin at.

@@ -21,6 +21,8 @@ mod plan;
 mod position;
 mod reach;
 mod route;
+mod sequence_test;
+mod survey;
 mod turnout;
 mod zone;
 
@@ -29,11 +31,11 @@ pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, Ways};
 pub use hop::{Hop, HopId};
 pub use landmark::{Landmark, LandmarkError};
-pub use plan::{
-    LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch, Survey,
-};
+pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch};
 pub use position::{Position, WayError};
 pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use route::{Route, RouteError};
+pub use sequence_test::{SequenceTest, SequenceVerdict, StrayReport};
+pub use survey::{StretchLength, Survey, SurveyedDistance};
 pub use turnout::{Leg, TurnoutNeed, TurnoutStates};
 pub use zone::{MAX_ZONE_LIMIT, MIN_ZONE_LIMIT, Zone};

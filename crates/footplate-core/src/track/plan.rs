@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::ids::{SensorId, StretchId, TurnoutId};
-use crate::track::{Leg, Zone};
+use crate::track::{Leg, StretchLength, Survey, Zone};
 use crate::units::Length;
 
 /// Longest stretch that is believed. The one published slip of the unit (micrometres read as millimetres)
@@ -41,15 +41,6 @@ pub struct PlannedZone {
     pub zone: Zone,
     /// The stretches, counted from 0 in the order of the plan.
     pub stretches: Vec<StretchId>,
-}
-
-/// How well the lengths of a layout are known, and how that is known.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Survey {
-    /// One standard deviation of the length of an edge.
-    pub uncertainty: Length,
-    /// Where that figure comes from.
-    pub origin: String,
 }
 
 /// A place on the rails: a node for each direction of travel.
@@ -93,8 +84,8 @@ pub struct Stretch {
     pub from: RailEnd,
     /// The node it reaches; at a merge, by which leg.
     pub to: RailEnd,
-    /// Its length; zero is legal between turnouts in one place.
-    pub length: Length,
+    /// What is known of its length.
+    pub length: StretchLength,
 }
 
 /// One end of a stretch: a node, and the leg where the node is a turnout met or left on the side of its legs.

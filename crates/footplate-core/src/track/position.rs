@@ -293,8 +293,8 @@ mod tests {
     #[test]
     fn edges_of_no_length_are_passed() {
         let mut plan = oval_plan();
-        plan.stretches[1].length = Length::ZERO;
-        plan.stretches[3].length = Length::ZERO;
+        plan.stretches[1].length = Length::ZERO.into();
+        plan.stretches[3].length = Length::ZERO.into();
         let layout = Layout::build(&plan).unwrap();
         let start = at(&layout, "A1", "BR1", 100.0);
         let moved = layout.advance(start, Length::ZERO, &straight()).unwrap();

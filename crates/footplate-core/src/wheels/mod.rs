@@ -5,10 +5,9 @@
 //! [`estimation::odometry`](crate::estimation::odometry).
 
 mod count_windows;
+mod loss;
 mod period;
 mod range;
-mod sensor_watch;
-mod slip_slide;
 mod steady_gains;
 mod tachometer;
 mod thresholds;
@@ -18,13 +17,12 @@ mod wheel_tracker;
 mod wheelset;
 
 pub use count_windows::CountWindows;
+pub use loss::Loss;
 pub use period::{Count, Direction, Period, WheelReading};
 pub use range::{Range, larger, smaller};
-pub use sensor_watch::{SensorWatch, Shown};
-pub use slip_slide::{BothAxles, Loss, Signs, SlipSlide, TrainSigns};
 pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn};
 pub use thresholds::Thresholds;
 pub use told_way::ToldWay;
-pub use vehicle::{BrakeCommand, Vehicle, VehicleError};
+pub use vehicle::{BrakeCommand, SlideProtection, Vehicle, VehicleError};
 pub use wheel_tracker::WheelTracker;
 pub use wheelset::{Axle, Wheelset};

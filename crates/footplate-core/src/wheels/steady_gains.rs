@@ -13,6 +13,8 @@ pub(super) struct SteadyGains {
     pub(super) acceleration: f64,
     /// Standard deviation of the acceleration after an innovation (m/s²).
     pub(super) acceleration_deviation: f64,
+    /// The same of the speed (m/s).
+    pub(super) speed_deviation: f64,
 }
 
 /// More rounds than any period and pitch in use need to settle.
@@ -47,5 +49,11 @@ pub(super) fn steady_gains(period: f64, q: f64, r: f64) -> SteadyGains {
         p = core::array::from_fn(|i| core::array::from_fn(|j| p[i][j] - gain[i] * row[j]));
     }
     let [place, speed, acceleration] = gain;
-    SteadyGains { place, speed, acceleration, acceleration_deviation: libm::sqrt(p[2][2]) }
+    SteadyGains {
+        place,
+        speed,
+        acceleration,
+        acceleration_deviation: libm::sqrt(p[2][2]),
+        speed_deviation: libm::sqrt(p[1][1]),
+    }
 }

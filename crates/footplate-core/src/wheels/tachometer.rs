@@ -1,9 +1,8 @@
 //! From what a tachometer reports to how far its wheel turned, with the quality of every sample.
 //!
 //! Nothing is overwritten silently: a count that no wheel can have made is replaced by what its wheel was expected to
-//! turn, and said to be [`Quality::Substituted`]. One such count is a spike; a second in a row is believed, and the
-//! first with it, because a real slide does not come alone. But a wheel has inertia: what would change its speed
-//! faster than any wheelset on rails is not believed however often it is said ([`Quality::Excluded`]).
+//! turn, and said to be [`Quality::Substituted`]. One such count is a spike; a second in a row is passed on, and the
+//! first with it, because a real slide does not come alone. Whether a wheel or a fault made them, hypotheses decide.
 
 use super::period::{Count, Direction, WheelReading};
 use super::range::larger;
@@ -24,8 +23,6 @@ pub enum Quality {
     Substituted,
     /// Nothing was read, or nothing that can be a count; what was expected stands for it.
     Missing,
-    /// Read, but the tachometer is not believed for now.
-    Excluded,
 }
 
 /// How far a wheel turned in one period.
@@ -50,8 +47,6 @@ pub struct Expected {
     pub fewer: f64,
     /// By how much it can differ without surprise if the wheel rolls.
     pub rolling: f64,
-    /// By how much it can differ from what it was at the last believed reading, whatever the wheel does.
-    pub ever: f64,
     /// The most pulses that the fastest wheel gives.
     pub most: f64,
 }
@@ -142,9 +137,6 @@ impl Tachometer {
             return Turn { pulses, quality, doubt };
         }
         if self.withheld * surprise > 0.0 {
-            if surprise.abs() > expected.ever {
-                return Turn { pulses: expected.pulses, quality: Quality::Excluded, doubt: f64::INFINITY };
-            }
             let believed = pulses + self.withheld;
             self.withheld = 0.0;
             return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
@@ -278,8 +270,7 @@ mod tests {
     use super::*;
 
     const FORWARD: Heading = Heading { way: 1.0, certain: true, disputed: false };
-    const CALM: Expected =
-        Expected { pulses: 20.0, more: 3.0, fewer: 3.0, rolling: 1.5, ever: 15.0, most: 60.0 };
+    const CALM: Expected = Expected { pulses: 20.0, more: 3.0, fewer: 3.0, rolling: 1.5, most: 60.0 };
 
     fn turns(counts: &[Count]) -> Vec<Turn> {
         let mut tachometer = Tachometer::new();
@@ -304,13 +295,6 @@ mod tests {
         let turns = turns(&[Count::Pulses(20), Count::Pulses(12), Count::Pulses(8)]);
         assert_eq!(turns[2].quality, Quality::Ok);
         assert_eq!(total(&turns), 40.0, "no pulse is lost");
-    }
-
-    #[test]
-    fn a_sensor_that_dies_at_speed_is_not_taken_for_a_wheel_that_locks() {
-        let turns = turns(&[Count::Pulses(20), Count::Pulses(0), Count::Pulses(0), Count::Pulses(0)]);
-        assert_eq!(turns[2].quality, Quality::Excluded);
-        assert_eq!(total(&turns), 80.0, "it is expected to have gone on");
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub struct Vehicle {
     /// The two wheelsets are braked independently (in different bogies, each with its own cylinder and anti-slide
     /// valve), so that both sliding alike for seconds can be ruled out. Not so if one converter feeds both.
     pub independent: bool,
+    /// What the slide protection is claimed to do; nothing if absent.
+    pub slide_protection: Option<SlideProtection>,
     /// What the brake command is known to do.
     pub brake_command: BrakeCommand,
     /// Where detection and correction draw their lines.
@@ -54,20 +56,33 @@ pub struct BrakeCommand {
     pub resistance: Acceleration,
     /// How long the brake takes from nothing to its full force.
     pub build_up: TimeSpan,
+    /// How long after its command ends, brake or traction may still act on a wheel, and a wheel that slipped may take
+    /// to turn with the train again.
+    pub release: TimeSpan,
+}
+
+/// What the slide and slip protection of a train is claimed to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlideProtection {
+    /// At least one of the two measured wheelsets has no more creepage than this, whichever way ...
+    pub creepage: f64,
+    /// ... but for times no longer than this.
+    pub longest: TimeSpan,
 }
 
 impl BrakeCommand {
     /// What can be claimed of every brake that an emergency stop makes decelerate by `max_brake`: full service braking is
-    /// three quarters of it, give or take 40 % for load and friction, on lines with gradients up to 25 mm/m, running
-    /// resistance among them.
+    /// three quarters of it, give or take 40 % for load and friction, on lines with gradients up to 40 mm/m, running
+    /// resistance among them. Brakes of passenger trains release within 10 s.
     #[must_use]
     pub fn cautious(max_brake: Acceleration) -> Self {
         Self {
             full: max_brake * 0.75,
             tolerance: 0.4,
-            gradient: Acceleration::from_m_per_s2(0.25),
+            gradient: Acceleration::from_m_per_s2(0.4),
             resistance: Acceleration::ZERO,
             build_up: TimeSpan::from_s(4.0),
+            release: TimeSpan::from_s(10.0),
         }
     }
 }
@@ -92,6 +107,7 @@ impl Vehicle {
             max_brake,
             wheelsets,
             independent: false,
+            slide_protection: None,
             brake_command,
             thresholds,
         };
@@ -124,6 +140,11 @@ impl Vehicle {
         within("gradient_m_s2", command.gradient.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
         within("resistance_m_s2", command.resistance.as_m_per_s2(), (0.0, STRONGEST_M_PER_S2))?;
         within("build_up_s", command.build_up.as_s(), (0.0, 60.0))?;
+        within("release_s", command.release.as_s(), (0.0, 120.0))?;
+        if let Some(protection) = &self.slide_protection {
+            within("longest_s", protection.longest.as_s(), (0.0, 120.0))?;
+            within("creepage", protection.creepage, (0.0, 0.9))?;
+        }
         self.thresholds.check()
     }
 }

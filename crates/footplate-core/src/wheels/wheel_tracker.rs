@@ -88,6 +88,13 @@ impl WheelTracker {
         self.gains.acceleration_deviation
     }
 
+    /// Standard deviation of the speed, likewise (m/s).
+    #[inline]
+    #[must_use]
+    pub fn speed_deviation(&self) -> f64 {
+        self.gains.speed_deviation
+    }
+
     /// Turns the other way from now on.
     pub fn reverse(&mut self) {
         self.speed = -self.speed;

@@ -48,18 +48,28 @@ fn assert_sound(estimate: &MotionEstimate) {
     let numbers = [
         estimate.speed.as_m_per_s(),
         estimate.speed_deviation.as_m_per_s(),
-        estimate.speed_low.as_m_per_s(),
-        estimate.speed_high.as_m_per_s(),
+        estimate.guaranteed.speed_low.as_m_per_s(),
+        estimate.guaranteed.speed_high.as_m_per_s(),
+        estimate.confidence.speed_low.as_m_per_s(),
+        estimate.confidence.speed_high.as_m_per_s(),
         estimate.acceleration.as_m_per_s2(),
         estimate.distance.as_m(),
-        estimate.distance_low.as_m(),
-        estimate.distance_high.as_m(),
+        estimate.guaranteed.distance_low.as_m(),
+        estimate.guaranteed.distance_high.as_m(),
+        estimate.confidence.distance_low.as_m(),
+        estimate.confidence.distance_high.as_m(),
         estimate.over.as_m(),
         estimate.under.as_m(),
     ];
     assert!(numbers.iter().all(|number| number.is_finite()), "{estimate:?}");
-    assert!(estimate.speed_low <= estimate.speed_high, "{estimate:?}");
-    assert!(estimate.distance_low <= estimate.distance_high, "{estimate:?}");
+    let (inner, outer) = (estimate.confidence, estimate.guaranteed);
+    assert!(outer.speed_low <= inner.speed_low && inner.speed_high <= outer.speed_high, "{estimate:?}");
+    assert!(inner.speed_low <= inner.speed_high, "{estimate:?}");
+    assert!(
+        outer.distance_low <= inner.distance_low && inner.distance_high <= outer.distance_high,
+        "{estimate:?}"
+    );
+    assert!(inner.distance_low <= inner.distance_high, "{estimate:?}");
     assert!(estimate.speed_deviation > Speed::ZERO, "{estimate:?}");
     assert!((estimate.shares.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{estimate:?}");
 }
@@ -180,6 +190,80 @@ fn a_dead_second_sensor_costs_no_accuracy_and_is_said() {
     assert!(worst < 0.15, "one sensor is enough: {worst}");
 }
 
+/// Both wheels roll for ten seconds, brake, and slide from the 15th second to the 20th by `creepage`; the train slows down by
+/// 0.5 m/s². Returns the errors of the estimate while it slides and from three seconds after it on, and the widest
+/// confidence interval then.
+fn slide_of_both(creepage: f64, back_within: f64) -> [f64; 3] {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
+    let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    let (mut speed, mut slower) = (25.0, 0.0_f64);
+    let mut worst = [0.0_f64; 3];
+    for period in 0..600 {
+        let time = f64::from(period) * PERIOD_S;
+        let braked = time >= 10.0;
+        speed -= if braked { 0.5 * PERIOD_S } else { 0.0 };
+        let sliding = (15.0..20.0).contains(&time);
+        let aim = if sliding { creepage } else { 0.0 };
+        let step = if sliding { 0.3 * PERIOD_S } else { creepage / back_within * PERIOD_S };
+        slower += (aim - slower).clamp(-step, step);
+        let estimate = odometer.step(&train.next(speed * (1.0 - slower), if braked { -0.5 } else { 0.0 }));
+        let error = (estimate.speed.as_m_per_s() - speed).abs();
+        let inside = estimate.guaranteed.speed_low.as_m_per_s() <= speed
+            && speed <= estimate.guaranteed.speed_high.as_m_per_s();
+        assert!(inside || period == 0, "{time} s: {estimate:?}");
+        let [while_sliding, after, width] = &mut worst;
+        if (15.2..20.0).contains(&time) {
+            *while_sliding = while_sliding.max(error);
+        }
+        if time > 20.0 + back_within + 3.0 {
+            *after = after.max(error);
+            let bounds = estimate.confidence;
+            *width = width.max((bounds.speed_high - bounds.speed_low).as_m_per_s());
+        }
+    }
+    worst
+}
+
+#[test]
+fn a_slide_of_both_is_seen_and_left_without_a_wheel_that_turns_up_hard() {
+    // 15 % creepage is 3.4 m/s; adhesion returns within half a second.
+    let [sliding, after, _] = slide_of_both(0.15, 0.5);
+    assert!(sliding < 0.6, "{sliding} m/s off in the slide");
+    assert!(after < 0.2, "{after} m/s off after it");
+}
+
+#[test]
+fn a_spike_in_the_first_row_is_not_believed() {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
+    let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    for period in 0..40 {
+        let mut readings = train.next(10.0, 0.0);
+        if period == 0 {
+            readings.wheels = [WheelReading::pulses(100); 2];
+        }
+        let estimate = odometer.step(&readings);
+        assert!(estimate.guaranteed.speed_low.as_m_per_s() <= 10.0, "{estimate:?}");
+        assert!(estimate.confidence.speed_low.as_m_per_s() <= 10.0, "{estimate:?}");
+        if period > 10 {
+            assert!((estimate.speed.as_m_per_s() - 10.0).abs() < 0.2, "{period}: {estimate:?}");
+        }
+    }
+}
+
+#[test]
+fn the_upper_bound_never_exceeds_the_top_speed_of_the_train() {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
+    let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    for period in 0..6000 {
+        // A brake that is applied and released while the train stands.
+        let effort = if period / 20 % 2 == 0 { -0.5 } else { 0.0 };
+        let estimate = odometer.step(&train.next(0.0, effort));
+        assert!(
+            estimate.guaranteed.speed_high.as_m_per_s() <= 70.0 && estimate.speed.as_m_per_s().abs() < 0.05
+        );
+    }
+}
+
 #[test]
 fn a_gap_of_an_hour_is_degraded_and_the_bounds_span_it() {
     let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
@@ -190,7 +274,10 @@ fn a_gap_of_an_hour_is_degraded_and_the_bounds_span_it() {
     train.time += 3600.0;
     let after = odometer.step(&train.next(20.0, 0.0));
     assert_eq!(after.mode, Mode::Degraded);
-    assert!(after.distance_high.as_m() > 70.0 * 3600.0, "it may have run at full speed: {after:?}");
+    assert!(
+        after.guaranteed.distance_high.as_m() > 70.0 * 3600.0,
+        "it may have run at full speed: {after:?}"
+    );
     let mut last = after;
     for _ in 0..200 {
         last = odometer.step(&train.next(20.0, 0.0));

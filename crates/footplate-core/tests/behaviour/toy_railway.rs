@@ -54,11 +54,11 @@ pub(crate) fn layout() -> Layout {
     let stretch = |from: &str, to: &str, mm: f64| Stretch {
         from: rail_end(from),
         to: rail_end(to),
-        length: Length::from_mm(mm),
+        length: Length::from_mm(mm).into(),
     };
     let plan = LayoutPlan {
         name: "toy".into(),
-        survey: Survey { uncertainty: Length::from_mm(2.0), origin: "made up".into() },
+        survey: Survey::taped(Length::from_mm(2.0), "made up".into()),
         places: vec![
             sensor("A", 0),
             sensor("B", 2),

@@ -111,3 +111,55 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     assert!(doubt < 25.0);
     assert!(locator.locate(ground, model(), world.now).unwrap().at_rest);
 }
+
+#[test]
+fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
+    // Given a train at step 8 that is known to 3 mm at every sensor,
+    let (mut close, mut blind) = (Vec::new(), Vec::new());
+    for seed in 0..12 {
+        let mut world = ToyRailway::new(24, "D1", 300.0);
+        let (sections, turnouts) = (SectionIndex::of(&world.layout), straight());
+        let layout = world.layout.clone();
+        let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let mut locators = [Locator::new(TRAIN), Locator::new(TRAIN)];
+        let at = WayPoint { node: layout.node_named("D1").unwrap(), way: Length::from_mm(300.0) };
+        for locator in &mut locators {
+            locator.place(world.now, at, Length::from_mm(3.0));
+        }
+        world.command(Command::Speed { train: TRAIN, step: step(8) });
+        let mut reports = 0;
+        let last = 5 + seed % 3;
+        while reports < last {
+            for event in world.tick() {
+                let EventKind::Sensor(report) = event.kind else {
+                    locators.iter_mut().for_each(|locator| locator.handle_command(ground, model(), &event));
+                    continue;
+                };
+                reports += 1;
+                let usual =
+                    ContactWindow { after: event.time - report.poll_interval.unwrap(), until: event.time };
+                // when the last one comes behind lost replies, late in its window and a usual one beside it,
+                let wide = ContactWindow { after: event.time - TimeSpan::from_ms(730), until: event.time };
+                let windows = if reports == last { [usual, wide] } else { [usual, usual] };
+                for (locator, window) in locators.iter_mut().zip(windows) {
+                    locator.pass(ground, model(), report.sensor, window);
+                }
+            }
+        }
+        let error = |locator: &Locator| {
+            let located = locator.locate(ground, model(), world.now).unwrap();
+            let here = footplate_core::estimation::place_of(ground, model(), located.at).unwrap();
+            let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
+            let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
+            let inside = ahead.min(behind) < 1.96 * located.uncertainty;
+            (ahead.min(behind).as_mm(), located.uncertainty.as_mm(), inside)
+        };
+        close.push(error(&locators[0]));
+        blind.push(error(&locators[1]));
+    }
+    // then the train is where the forecast had it, 187 mm of window or not, and the interval is no longer than
+    // the forecast was good for.
+    let mean = |errors: &[(f64, f64, bool)]| errors.iter().map(|(error, ..)| error).sum::<f64>() / 12.0;
+    assert!(mean(&blind) < mean(&close) + 4.0, "{:.1} against {:.1} mm", mean(&blind), mean(&close));
+    assert!(blind.iter().all(|(_, uncertainty, inside)| *inside && *uncertainty < 12.0), "{blind:?}");
+}

@@ -29,11 +29,11 @@ fn any_plan() -> impl Strategy<Value = LayoutPlan> {
             let join = |(pair, mm): (&[RailEnd], &f64)| Stretch {
                 from: pair[0].clone(),
                 to: RailEnd { node: reverse_name(&pair[1].node), leg: pair[1].leg },
-                length: Length::from_mm(*mm),
+                length: Length::from_mm(*mm).into(),
             };
             LayoutPlan {
                 name: "any".into(),
-                survey: Survey { uncertainty: Length::ZERO, origin: "made up".into() },
+                survey: Survey::taped(Length::ZERO, "made up".into()),
                 stretches: rail_ends.chunks(2).zip(&lengths).map(join).collect(),
                 places,
                 never_both_curved: vec![],
@@ -87,7 +87,11 @@ fn leads(plan: &LayoutPlan) -> Leads {
     let mut leads = Leads::new();
     for Stretch { from, to, length } in &plan.stretches {
         let mut lead = |from: &str, leg, to: &str| {
-            leads.entry(from.to_owned()).or_default().push((leg, to.to_owned(), length.as_mm().round()));
+            leads.entry(from.to_owned()).or_default().push((
+                leg,
+                to.to_owned(),
+                length.estimate(&plan.survey).0.as_mm().round(),
+            ));
         };
         lead(&from.node, from.leg, &to.node);
         lead(&reverse_name(&to.node), to.leg, &reverse_name(&from.node));

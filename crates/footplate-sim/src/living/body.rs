@@ -10,7 +10,8 @@ use footplate_core::track::Leg;
 use footplate_core::{EdgeId, SensorId, TurnoutId};
 
 use crate::circuit::FOULING_MM;
-use crate::living::rails::{Ahead, Rails};
+use crate::draws::Draws;
+use crate::living::rails::{Ahead, Rail, Rails};
 use crate::load::DIRTY_MM;
 use crate::path::Point;
 
@@ -26,13 +27,30 @@ struct Under {
     begins: f64,
     ends: f64,
     factor: f64,
+    grade: f64,
+}
+
+/// A contact ahead of the shoe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Coming {
+    /// Where it closes this time.
+    pub(crate) contact: Point<SensorId>,
+    /// Where it closes on average.
+    pub(crate) usual_mm: f64,
+}
+
+/// How this train closes contacts a little before or behind where they usually close.
+#[derive(Debug, Clone)]
+struct Scatter {
+    draws: Draws,
+    shoe_mm: f64,
 }
 
 /// What the train comes to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Met {
     /// The shoe touches a contact.
-    Touches(Point<SensorId>),
+    Touches(Coming),
     /// The shoe leaves a contact that it holds.
     Leaves(Point<SensorId>),
     /// The shoe is on dirt.
@@ -56,14 +74,16 @@ pub(crate) struct Body {
     shoe: f64,
     behind: f64,
     /// Contacts and dirty spots that the shoe has not come to, in order.
-    contacts: VecDeque<Point<SensorId>>,
+    contacts: VecDeque<Coming>,
     dirt: VecDeque<f64>,
     /// Contacts that the shoe holds closed.
     held: VecDeque<Point<SensorId>>,
     /// Which of the way's edges the lead is on.
     under: usize,
-    /// What the rails there make of a speed.
+    /// What the rails there make of a speed, and their gradient.
     pub(crate) factor: f64,
+    pub(crate) grade: f64,
+    scatter: Option<Scatter>,
     /// Where the last dirty spot ends.
     pub(crate) dirty_until: f64,
     /// Nothing happens before the lead is here.
@@ -92,10 +112,12 @@ impl Body {
             held: VecDeque::new(),
             under: 0,
             factor: 1.0,
+            grade: 0.0,
+            scatter: None,
             dirty_until: f64::NEG_INFINITY,
             next: f64::INFINITY,
         };
-        body.way.push_back(Under { edge, begins: 0.0, ends: length, factor: 1.0 });
+        body.way.push_back(Under { edge, begins: 0.0, ends: length, factor: 1.0, grade: 0.0 });
         // Backwards is forwards seen the other way.
         for _ in 0..MOST_EDGES_AT_ONCE {
             let first = *body.way.front()?;
@@ -104,10 +126,11 @@ impl Body {
             }
             let before = after(rails, lies, first.edge.twin())?.twin();
             let begins = first.begins - rails.rail(before)?.length_mm;
-            body.way.push_front(Under { edge: before, begins, ends: first.begins, factor: 1.0 });
+            body.way.push_front(Under { edge: before, begins, ends: first.begins, factor: 1.0, grade: 0.0 });
         }
         for under in &mut body.way {
-            under.factor = rails.rail(under.edge)?.factor;
+            let rail = rails.rail(under.edge)?;
+            (under.factor, under.grade) = (rail.factor, rail.grade);
         }
         while body.way.back()?.ends < body.front() {
             let next = after(rails, lies, body.way.back()?.edge)?;
@@ -157,7 +180,7 @@ impl Body {
         if let Some(held) = self.held.pop_front_if(|held| held.at_mm + self.shoe <= lead) {
             return Some(Met::Leaves(held));
         }
-        if let Some(contact) = self.contacts.pop_front_if(|contact| contact.at_mm <= lead) {
+        if let Some(contact) = self.contacts.pop_front_if(|coming| coming.contact.at_mm <= lead) {
             return Some(Met::Touches(contact));
         }
         if let Some(spot) = self.dirt.pop_front_if(|spot| *spot <= lead) {
@@ -168,7 +191,7 @@ impl Body {
             && self.under + 1 < self.way.len()
         {
             self.under += 1;
-            self.factor = self.way.get(self.under).map_or(1.0, |under| under.factor);
+            self.feel_rail();
         }
         let last = *self.way.back()?;
         if last.ends <= self.front() {
@@ -201,7 +224,8 @@ impl Body {
     pub(crate) fn turn(&mut self, rails: &Rails<'_>) {
         let turned = self.way.iter().rev().filter_map(|under| {
             let edge = under.edge.twin();
-            Some(Under { edge, begins: -under.ends, ends: -under.begins, factor: rails.rail(edge)?.factor })
+            let Rail { factor, grade, .. } = *rails.rail(edge)?;
+            Some(Under { edge, begins: -under.ends, ends: -under.begins, factor, grade })
         });
         self.way = turned.collect();
         self.lead = self.shoe - self.lead;
@@ -285,9 +309,10 @@ impl Body {
         let Some((begins, rail)) = self.way.back().map(|last| last.ends).zip(rails.rail(edge)) else {
             return;
         };
-        self.way.push_back(Under { edge, begins, ends: begins + rail.length_mm, factor: rail.factor });
-        self.contacts
-            .extend(rail.contacts.iter().map(|(at, what)| Point { at_mm: begins + at, what: *what }));
+        let Rail { length_mm, factor, grade, .. } = *rail;
+        self.way.push_back(Under { edge, begins, ends: begins + length_mm, factor, grade });
+        let coming = coming(&mut self.scatter, rails, rail, begins);
+        self.contacts.extend(coming);
         self.dirt.extend(rail.dirty.iter().map(|at| begins + at));
     }
 
@@ -297,18 +322,28 @@ impl Body {
         self.dirt.clear();
         for under in &self.way {
             let Some(rail) = rails.rail(under.edge) else { continue };
-            let contacts =
-                rail.contacts.iter().map(|(at, what)| Point { at_mm: under.begins + at, what: *what });
-            self.contacts.extend(contacts.filter(|contact| contact.at_mm > self.lead));
+            let coming = coming(&mut self.scatter, rails, rail, under.begins);
+            self.contacts.extend(coming.into_iter().filter(|coming| coming.contact.at_mm > self.lead));
             self.dirt.extend(rail.dirty.iter().map(|at| under.begins + at).filter(|at| *at > self.lead));
         }
         self.under = self.way.iter().position(|under| self.lead < under.ends).unwrap_or(0);
-        self.factor = self.way.get(self.under).map_or(1.0, |under| under.factor);
+        self.feel_rail();
         self.find_next();
     }
 
+    /// Closes contacts a little before or behind where they usually close.
+    pub(crate) fn scatter(&mut self, rails: &Rails<'_>, draws: Draws, shoe_mm: f64) {
+        self.scatter = Some(Scatter { draws, shoe_mm });
+        self.look_ahead(rails);
+    }
+
+    fn feel_rail(&mut self) {
+        let under = self.way.get(self.under);
+        (self.factor, self.grade) = under.map_or((1.0, 0.0), |under| (under.factor, under.grade));
+    }
+
     fn find_next(&mut self) {
-        let contact = self.contacts.front().map_or(f64::INFINITY, |contact| contact.at_mm);
+        let contact = self.contacts.front().map_or(f64::INFINITY, |coming| coming.contact.at_mm);
         let left = self.held.front().map_or(f64::INFINITY, |held| held.at_mm + self.shoe);
         let dirt = self.dirt.front().copied().unwrap_or(f64::INFINITY);
         let edge = self.way.get(self.under).map_or(f64::INFINITY, |under| under.ends);
@@ -316,6 +351,19 @@ impl Body {
         let rear = self.way.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
         self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear);
     }
+}
+
+/// The contacts of an edge that begins at a place, where they close this time.
+fn coming(scatter: &mut Option<Scatter>, rails: &Rails<'_>, rail: &Rail, begins: f64) -> Vec<Coming> {
+    let contacts = rail.contacts.iter().map(|(at, what)| {
+        let usual_mm = begins + at;
+        let by = scatter.as_mut().map_or(0.0, |scatter| {
+            let sd = libm::hypot(rails.scatter_mm(*what), scatter.shoe_mm);
+            scatter.draws.normal_within(0.0, sd, 2.5)
+        });
+        Coming { contact: Point { at_mm: usual_mm + by, what: *what }, usual_mm }
+    });
+    contacts.collect()
 }
 
 /// The edge after an edge while turnouts lie as they do.

@@ -3,7 +3,7 @@
 use footplate_core::track::{Leg, Position};
 use footplate_core::{Length, TrainId, TurnoutId};
 
-use crate::living::body::{Body, Met};
+use crate::living::body::{Body, Coming, Met};
 use crate::living::live_train::{End, LiveTrain};
 use crate::living::world::LivingLayout;
 use crate::train::Train;
@@ -50,6 +50,11 @@ impl LivingLayout<'_> {
         self.take_up(place);
         self.trains[place].is_wrecked = false;
         self.trains[place].body = body;
+        if let Some((draws, shoe_mm)) = self.trains[place].shoe_scatter(self.scatters)
+            && let Some(body) = &mut self.trains[place].body
+        {
+            body.scatter(&self.rails, draws, shoe_mm);
+        }
         self.trains[place].put_down_at = self.trains[place].odometer;
         self.find_near();
         self.remind(place, self.now());
@@ -75,7 +80,7 @@ impl LivingLayout<'_> {
         body.lead += by.as_mm().clamp(0.0, 10_000.0);
         while let Some(met) = body.meet(&self.rails, &lies) {
             match met {
-                Met::Touches(contact) => {
+                Met::Touches(Coming { contact, .. }) => {
                     if self.s88.close(contact.what, now, train, pushed.odometer) {
                         body.hold(contact);
                     }

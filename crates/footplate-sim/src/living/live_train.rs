@@ -7,14 +7,17 @@ use footplate_core::track::Leg;
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use crate::draws::Draws;
-use crate::living::body::{Body, Met};
+use crate::electric::Surroundings;
+use crate::living::body::{Body, Coming, Met};
+use crate::living::drive::Drive;
 use crate::living::mishap::MishapKind;
 use crate::living::rails::Rails;
 use crate::living::s88::S88;
 use crate::living::truth::RestTruth;
 use crate::load::Load;
-use crate::motor::{Motor, STEP_S};
+use crate::motor::STEP_S;
 use crate::train::Train;
+use crate::traits::Session;
 
 /// The step of the integration as a span of time.
 pub(crate) const STEP: TimeSpan = TimeSpan::from_ms(1);
@@ -55,7 +58,7 @@ pub(crate) enum Order {
 pub(crate) struct LiveTrain {
     pub(crate) id: TrainId,
     pub(crate) train: Arc<Train>,
-    motor: Motor<Arc<Train>>,
+    motor: Drive,
     pub(crate) load: Load<Arc<Train>>,
     draws: Draws,
     /// Nothing while it is lifted.
@@ -101,7 +104,7 @@ impl LiveTrain {
         let train = Arc::new(train);
         Self {
             id,
-            motor: Motor::at_rest(Arc::clone(&train)),
+            motor: Drive::at_rest(&train),
             load: Load::new(Arc::clone(&train), warmth, 1.0, draws.split()),
             train,
             draws,
@@ -153,7 +156,7 @@ impl LiveTrain {
         self.halting = None;
         self.orders.clear();
         self.heard = SpeedStep::STAND;
-        self.motor = Motor::at_rest(Arc::clone(&self.train));
+        self.motor.reset();
         self.come_to_rest(now, rests);
     }
 
@@ -168,10 +171,10 @@ impl LiveTrain {
 
     fn halt(&mut self, mm_per_s2: f64) {
         if !self.motor.is_at_rest() && self.halting.is_none() {
-            self.halting = Some((mm_per_s2, self.motor.wheel_speed()));
+            self.halting = Some((mm_per_s2, self.motor.speed()));
         }
         if self.halting.is_none() {
-            self.motor = Motor::at_rest(Arc::clone(&self.train));
+            self.motor.reset();
         }
         self.sleeps = false;
     }
@@ -208,8 +211,14 @@ impl LiveTrain {
             return stepped;
         }
         let here = body.lead;
-        let speed =
-            wheel * self.load.advance(body.factor, here < body.dirty_until, wheel > 0.0) * self.wheels;
+        let grade = 1.0 - self.train.traits.grade_feel * body.grade;
+        let load = self.load.advance(body.factor, here < body.dirty_until, wheel > 0.0);
+        let speed = self.wheels
+            * if self.motor.feels_the_rail() {
+                wheel
+            } else {
+                wheel * load * grade * self.load.of_session(wheel)
+            };
         let gone = 0.5 * (self.speed + speed) * STEP_S;
         let there = here + gone;
         self.speed = speed;
@@ -222,9 +231,9 @@ impl LiveTrain {
             let counted = self.odometer - there;
             while let Some(met) = body.meet(around.rails, around.lies) {
                 match met {
-                    Met::Touches(contact) => {
+                    Met::Touches(Coming { contact, usual_mm }) => {
                         let (sensor, at_mm) = (contact.what, contact.at_mm);
-                        if around.s88.close(sensor, when(at_mm), self.id, counted + at_mm) {
+                        if around.s88.close(sensor, when(at_mm), self.id, counted + usual_mm) {
                             body.hold(contact);
                         }
                     }
@@ -233,7 +242,7 @@ impl LiveTrain {
                     }
                     Met::Dirt => {
                         if self.load.stalls(wheel) {
-                            self.motor.stall();
+                            self.motor.cut_off();
                         }
                     }
                     Met::OtherEdges => stepped.other_edges = true,
@@ -256,12 +265,17 @@ impl LiveTrain {
 
     /// How fast the wheels would turn on level straight track, one step later.
     fn turn_wheels(&mut self) -> f64 {
-        let Some((rate, wheel)) = &mut self.halting else { return self.motor.advance() };
+        let Some((rate, wheel)) = &mut self.halting else {
+            let body = self.body.as_ref();
+            let (rail, grade) = body.map_or((1.0, 0.0), |body| (body.factor, body.grade));
+            let around = Surroundings { rail, grade, warmth: self.load.warmth() };
+            return self.motor.advance(around, &mut self.draws);
+        };
         *wheel = (*wheel - *rate * STEP_S).max(0.0);
         let wheel = *wheel;
         if wheel == 0.0 {
             self.halting = None;
-            self.motor = Motor::at_rest(Arc::clone(&self.train));
+            self.motor.reset();
             if self.heard != SpeedStep::STAND {
                 self.motor.command(self.heard, &mut self.draws);
             }
@@ -296,6 +310,26 @@ impl LiveTrain {
                 true
             }
         }
+    }
+
+    /// What scatters where it closes contacts, if anything does.
+    pub(crate) fn shoe_scatter(&mut self, scatters: bool) -> Option<(Draws, f64)> {
+        scatters.then(|| (self.draws.split(), self.train.traits.shoe_scatter_mm))
+    }
+
+    /// Another session begins after a pause.
+    pub(crate) fn begin_session(&mut self, pause: TimeSpan) {
+        if self.stands_since.is_some() {
+            self.load.stand(pause.as_s().max(0.0));
+        }
+        let session = Session::draw(&self.train.traits.session, &mut self.draws);
+        self.load.begin_session(session);
+        self.motor.begin_session(session);
+    }
+
+    /// The next start from rest comes earlier by a time.
+    pub(crate) fn hasten_next_start(&mut self, by: TimeSpan) {
+        self.motor.hasten_next_start(by.as_s());
     }
 
     fn fall_asleep(&mut self) {

@@ -3,13 +3,14 @@
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
-//! live_train  mishap       one of them; what can become of it
+//! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
 //! rails  switches  truth   the rails underneath; how bad the world is; what really happened, for scorers only
 //! ```
 
 mod body;
 mod cts;
+mod drive;
 mod hands;
 mod live_train;
 mod mishap;

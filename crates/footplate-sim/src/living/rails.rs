@@ -3,6 +3,7 @@
 use footplate_core::track::{Layout, Leg, NodeKind, Ways};
 use footplate_core::{EdgeId, NodeId, SensorId, TurnoutId};
 
+use crate::physics_range::PhysicsRange;
 use crate::track::TrueTrack;
 
 /// One direction of travel over a stretch of rail.
@@ -11,6 +12,8 @@ pub(crate) struct Rail {
     pub(crate) length_mm: f64,
     /// Speed on it over speed on a level straight one.
     pub(crate) factor: f64,
+    /// Gradient, upwards positive.
+    pub(crate) grade: f64,
     /// Contacts for this direction, in order, by how far along the edge they close.
     pub(crate) contacts: Vec<(f64, SensorId)>,
     /// Where dirty spots begin.
@@ -37,15 +40,27 @@ pub(crate) struct Rails<'l> {
     pub(crate) layout: &'l Layout,
     pub(crate) track: TrueTrack,
     rails: Vec<Rail>,
+    /// By the contact's number: how much it scatters from pass to pass (standard deviation in mm).
+    scatter_mm: Vec<f64>,
 }
 
 impl<'l> Rails<'l> {
-    pub(crate) fn new(layout: &'l Layout, track: TrueTrack) -> Self {
+    pub(crate) fn new(layout: &'l Layout, mut track: TrueTrack, range: PhysicsRange, seed: u64) -> Self {
+        let mut draws = PhysicsRange::draws(seed).split();
+        let mut scatter_mm = Vec::new();
+        for (sensor, _) in layout.sensors() {
+            let (further_mm, scatter) = range.contact(&mut draws);
+            track.move_contact(sensor, further_mm);
+            let slot = usize::from(sensor.0);
+            scatter_mm.resize(scatter_mm.len().max(slot + 1), 0.0);
+            scatter_mm[slot] = scatter;
+        }
         let mut rails: Vec<Rail> = layout
             .edges()
             .map(|(id, edge)| Rail {
                 length_mm: track.length(id).as_mm(),
                 factor: track.speed_factor(id).as_parts(),
+                grade: 0.0,
                 contacts: Vec::new(),
                 dirty: track.dirty_mm(id),
                 ahead: ahead(layout, edge.to),
@@ -69,10 +84,21 @@ impl<'l> Rails<'l> {
                 }
             }
         }
+        for pair in rails.chunks_mut(2) {
+            let grade = range.grade(&mut draws);
+            for (rail, sign) in pair.iter_mut().zip([1.0, -1.0]) {
+                rail.grade = sign * grade;
+            }
+        }
         for rail in &mut rails {
             rail.contacts.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         }
-        Self { layout, track, rails }
+        Self { layout, track, rails, scatter_mm }
+    }
+
+    /// How much a contact scatters from pass to pass (standard deviation in mm).
+    pub(crate) fn scatter_mm(&self, sensor: SensorId) -> f64 {
+        self.scatter_mm.get(usize::from(sensor.0)).copied().unwrap_or(0.0)
     }
 
     pub(crate) fn rail(&self, edge: EdgeId) -> Option<&Rail> {

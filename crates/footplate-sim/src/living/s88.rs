@@ -86,14 +86,15 @@ impl S88 {
     }
 
     /// What the modules show at a time, none earlier than before; `forget` clears what is only remembered.
-    pub(crate) fn read(&mut self, module: u8, at: Timestamp, forget: bool) -> ModuleState {
+    /// Without a latch nothing is remembered.
+    pub(crate) fn read(&mut self, module: u8, at: Timestamp, forget: bool, latches: bool) -> ModuleState {
         self.settle(at);
         let first = u16::from(module.saturating_sub(1)) * CONTACTS_PER_MODULE;
         let numbers = first..first + CONTACTS_PER_MODULE;
         let contacts = &mut self.contacts;
         let closed = numbers.filter_map(|number| {
             let (held, remembered) = contacts.get_mut(usize::from(number))?;
-            let is_closed = *held > 0 || *remembered;
+            let is_closed = *held > 0 || *remembered && latches;
             if forget {
                 *remembered = false;
             }

@@ -9,6 +9,7 @@ use crate::law::LawFamily;
 use crate::living::live_train::End;
 use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
+use crate::physics_range::PhysicsRange;
 use crate::train::Train;
 
 /// What is left free before and behind a train that is put down (chosen: a finger's breadth).
@@ -48,7 +49,10 @@ impl<'l> LivingLayout<'l> {
             let own = seed.wrapping_mul(1000).wrapping_add(nth as u64 + 1);
             let laws = LawFamily::ALL;
             let law = switches.law.unwrap_or(laws[(own % laws.len() as u64) as usize]);
-            world.add(*id, Train::draw(own, law), switches.warmth);
+            let mut train = Train::draw(own, law);
+            switches.physics.shape(own, &mut train);
+            let warmth = if switches.physics.includes(PhysicsRange::WarmUp) { 0.0 } else { switches.warmth };
+            world.add(*id, train, warmth);
             let sidings = Circuit::sidings(layout, &every, nth);
             world.put_down(*id, if sidings.is_empty() { &anywhere } else { &sidings }, &mut draws);
         }

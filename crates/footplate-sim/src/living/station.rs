@@ -15,6 +15,7 @@ use crate::draws::{Draws, Purpose};
 use crate::living::cts::{Cts, CtsSwitch};
 use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
+use crate::physics_range::PhysicsRange;
 
 /// From the last bit of a request until the contacts are read (chosen: the modules are clocked out within it).
 const READING: TimeSpan = TimeSpan::from_us(300);
@@ -36,6 +37,31 @@ pub struct StationSwitches {
     pub strict: bool,
     /// How often a byte is lost on the line, either way.
     pub lost: Ratio,
+    /// How often a whole answer is lost.
+    pub lost_replies: Ratio,
+    /// Whether modules remember contacts that closed since they were last read.
+    pub latches: bool,
+    /// Whether it knows the question for a single module; otherwise it is silent to it, as to any unknown byte.
+    pub reads_single_modules: bool,
+}
+
+impl StationSwitches {
+    /// Interfaces as they are met in the field: latching or not, answers within 10 to 100 ms, 2 % of answers lost, and one in
+    /// three that knows no question for a single module.
+    #[must_use]
+    pub fn draw(seed: u64, physics: PhysicsRange) -> Self {
+        if !physics.includes(PhysicsRange::Interface) {
+            return Self::default();
+        }
+        let mut draws = PhysicsRange::draws(seed).split();
+        Self {
+            turnaround: TimeSpan::from_s(draws.uniform(0.01..0.1)),
+            lost_replies: Ratio::from_percent(2.0),
+            latches: draws.chance(0.5),
+            reads_single_modules: !draws.chance(1.0 / 3.0),
+            ..Self::default()
+        }
+    }
 }
 
 impl Default for StationSwitches {
@@ -46,6 +72,9 @@ impl Default for StationSwitches {
             turnaround_spread: TimeSpan::from_ms(5),
             strict: true,
             lost: Ratio::ZERO,
+            lost_replies: Ratio::ZERO,
+            latches: true,
+            reads_single_modules: true,
         }
     }
 }
@@ -146,7 +175,8 @@ impl<'l> VirtualStation<'l> {
         trains: &[TrainId],
         switches: &LivingSwitches,
     ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, StationSwitches::default()))
+        let box_switches = StationSwitches::draw(seed, switches.physics);
+        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, box_switches))
     }
 
     /// The time.
@@ -310,6 +340,7 @@ impl<'l> VirtualStation<'l> {
                 self.world.power(false, at);
             }
             Message::ResetMode { on } => self.forgets = on,
+            Message::ReadModule { .. } if !self.switches.reads_single_modules => {}
             Message::ReadModules { .. } | Message::ReadModule { .. } => return self.ask(at, message),
             Message::Functions { .. } | Message::Unknown { .. } => {}
         }
@@ -329,12 +360,16 @@ impl<'l> VirtualStation<'l> {
     /// Reads the contacts and sends what they show.
     fn answer(&mut self) {
         let Some((at, request)) = self.asked.take() else { return };
+        let lost = self.switches.lost_replies;
+        let is_lost = lost > Ratio::ZERO && self.draws.chance(lost.as_parts());
         let bytes = 2 * request.modules_read().count() as i64;
         let spacing = REPLY_BYTE_SPACING.as_ns();
         let mut goes = self.answers_until - TimeSpan::from_ns((bytes - 1) * spacing);
         for module in request.modules_read() {
-            for byte in self.world.s88.read(module, at, self.forgets).encode() {
-                self.reply.push_back((goes, byte));
+            for byte in self.world.s88.read(module, at, self.forgets, self.switches.latches).encode() {
+                if !is_lost {
+                    self.reply.push_back((goes, byte));
+                }
                 goes += TimeSpan::from_ns(spacing);
             }
         }

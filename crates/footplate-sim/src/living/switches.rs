@@ -4,6 +4,7 @@ use footplate_core::Ratio;
 
 use crate::contacts::Faults;
 use crate::law::LawFamily;
+use crate::physics_range::PhysicsRange;
 
 /// What goes wrong on a living layout, how often, and what its trains are like.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +23,8 @@ pub struct LivingSwitches {
     pub turnouts_set: bool,
     /// Whether the station remembers contacts that were closed before it was first asked.
     pub stale_contacts: bool,
+    /// What is drawn from wider ranges than usual.
+    pub physics: PhysicsRange,
 }
 
 impl LivingSwitches {
@@ -51,6 +54,7 @@ impl LivingSwitches {
             warmth: 0.5,
             turnouts_set: false,
             stale_contacts: true,
+            physics: PhysicsRange::Usual,
         }
     }
 }

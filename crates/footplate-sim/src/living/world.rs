@@ -12,6 +12,7 @@ use crate::living::rails::Rails;
 use crate::living::s88::S88;
 use crate::living::switches::LivingSwitches;
 use crate::living::truth::{RestTruth, Truth};
+use crate::physics_range::PhysicsRange;
 use crate::track::TrueTrack;
 use crate::train::Train;
 
@@ -33,6 +34,8 @@ pub struct LivingLayout<'l> {
     mishaps: Vec<Mishap>,
     pub(crate) rests: Vec<RestTruth>,
     pub(crate) homes: Vec<(TrainId, Circuit)>,
+    /// Whether contacts close where they will from pass to pass.
+    pub(crate) scatters: bool,
 }
 
 impl<'l> LivingLayout<'l> {
@@ -45,7 +48,7 @@ impl<'l> LivingLayout<'l> {
         let points = Points::draw(layout, switches.turnout_failure, draws.split());
         let faults = Draws::new(seed, Purpose::Faults);
         Self {
-            rails: Rails::new(layout, track),
+            rails: Rails::new(layout, track, switches.physics, seed),
             points,
             s88: S88::new(layout, &switches.faults, switches.stale_contacts, faults),
             trains: Vec::new(),
@@ -57,6 +60,7 @@ impl<'l> LivingLayout<'l> {
             mishaps: Vec::new(),
             rests: Vec::new(),
             homes: Vec::new(),
+            scatters: switches.physics.includes(PhysicsRange::AsymmetricSensors),
         }
     }
 
@@ -102,6 +106,20 @@ impl<'l> LivingLayout<'l> {
     #[must_use]
     pub fn lies(&self, turnout: TurnoutId) -> Option<Leg> {
         self.points.lies(turnout)
+    }
+
+    /// Another session begins after a pause: trains that stood have cooled down, and voltage, cleanness and load are
+    /// drawn anew for each train from what its [`Traits`](crate::Traits) say.
+    pub fn begin_session(&mut self, pause: TimeSpan) {
+        self.trains.iter_mut().for_each(|train| train.begin_session(pause));
+    }
+
+    /// The next start from rest of a train comes earlier by a time, or later if negative: for tests of what one surprise
+    /// does to a model.
+    pub fn hasten_next_start(&mut self, train: TrainId, by: TimeSpan) {
+        if let Some(found) = self.trains.iter_mut().find(|found| found.id == train) {
+            found.hasten_next_start(by);
+        }
     }
 
     /// What really happens: for scorers only.

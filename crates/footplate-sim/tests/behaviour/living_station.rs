@@ -217,3 +217,29 @@ fn how_often_the_host_looks_changes_nothing() {
     };
     assert_eq!(run(0.37), run(8000.0));
 }
+
+#[test]
+fn modules_without_a_latch_forget_at_once_and_some_boxes_know_no_single_module() {
+    let layout = two_loops();
+    let plain = StationSwitches { latches: false, reads_single_modules: false, ..StationSwitches::default() };
+    let mut station = empty(&layout, plain);
+    put(&mut station, TRAIN, "S1", "S2", 800.0);
+    say(&mut station, &[192]);
+    // Over S2, number 4, and on: nothing is left of it when the modules are read.
+    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(400.0));
+    wait(&mut station, 0.1);
+    assert_eq!(ask(&mut station, 130, 4), [0; 4]);
+    assert_eq!(ask(&mut station, 193, 2), [0_u8; 0], "it does not know the question");
+}
+
+#[test]
+fn whole_answers_are_lost_as_often_as_asked() {
+    let layout = two_loops();
+    let lossy = StationSwitches { lost_replies: Ratio::from_percent(20.0), ..StationSwitches::default() };
+    let mut station = empty(&layout, lossy);
+    let answers: Vec<usize> = (0..200).map(|_| ask(&mut station, 130, 4).len()).collect();
+    assert!(answers.iter().all(|bytes| *bytes == 0 || *bytes == 4), "{answers:?}");
+    // 40 expected, within four standard deviations.
+    let lost = answers.iter().filter(|bytes| **bytes == 0).count();
+    assert!((18..=62).contains(&lost), "{lost} of 200");
+}

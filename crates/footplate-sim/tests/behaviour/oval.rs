@@ -20,16 +20,16 @@ pub(crate) fn oval() -> Layout {
     let plain = |from: &str, to: &str, mm: f64| Stretch {
         from: end(from, None),
         to: end(to, None),
-        length: Length::from_mm(mm),
+        length: Length::from_mm(mm).into(),
     };
     let (straight, curved) = (Some(Leg::Straight), Some(Leg::Curved));
     let places = (0..6).map(sensor).chain([turnout(1, "B1", "M1"), turnout(2, "B2", "M2")]).collect();
     let stretches = vec![
         plain("S0", "B1", 180.0),
-        Stretch { from: end("B1", straight), to: end("S1", None), length: Length::from_mm(400.0) },
-        Stretch { from: end("S1", None), to: end("M2", straight), length: Length::from_mm(380.0) },
-        Stretch { from: end("B1", curved), to: end("S2", None), length: Length::from_mm(430.0) },
-        Stretch { from: end("S2", None), to: end("M2", curved), length: Length::from_mm(410.0) },
+        Stretch { from: end("B1", straight), to: end("S1", None), length: Length::from_mm(400.0).into() },
+        Stretch { from: end("S1", None), to: end("M2", straight), length: Length::from_mm(380.0).into() },
+        Stretch { from: end("B1", curved), to: end("S2", None), length: Length::from_mm(430.0).into() },
+        Stretch { from: end("S2", None), to: end("M2", curved), length: Length::from_mm(410.0).into() },
         plain("M2", "S3", 210.0),
         plain("S3", "S4", 785.0),
         plain("S4", "S5", 640.0),
@@ -37,7 +37,7 @@ pub(crate) fn oval() -> Layout {
     ];
     Layout::build(&LayoutPlan {
         name: "oval".to_owned(),
-        survey: Survey { uncertainty: Length::from_mm(10.0), origin: "chosen".to_owned() },
+        survey: Survey::taped(Length::from_mm(10.0), "chosen".to_owned()),
         places,
         stretches,
         never_both_curved: Vec::new(),

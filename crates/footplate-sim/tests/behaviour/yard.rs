@@ -25,7 +25,7 @@ pub(crate) fn two_loops() -> Layout {
     let stretch = |from: (&str, Option<Leg>), to: (&str, Option<Leg>), mm: f64| Stretch {
         from: end(from.0, from.1),
         to: end(to.0, to.1),
-        length: Length::from_mm(mm),
+        length: Length::from_mm(mm).into(),
     };
     let (straight, curved) = (Some(Leg::Straight), Some(Leg::Curved));
     let places = (0..9)
@@ -51,7 +51,7 @@ pub(crate) fn two_loops() -> Layout {
     ];
     Layout::build(&LayoutPlan {
         name: "two loops".to_owned(),
-        survey: Survey { uncertainty: Length::from_mm(10.0), origin: "chosen".to_owned() },
+        survey: Survey::taped(Length::from_mm(10.0), "chosen".to_owned()),
         places,
         stretches,
         never_both_curved: Vec::new(),

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use footplate_core::NodeId;
-use footplate_core::track::{Layout, NodeKind};
+use footplate_core::track::{Layout, NodeKind, StretchLength};
 
 use super::drawing::LayoutFile;
 
@@ -48,14 +48,18 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
     for (id, edge) in layout.edges().step_by(2) {
         if let (Some([x1, y1]), Some([x2, y2])) = (drawing.point(edge.from), drawing.point(edge.to)) {
             let (from, to) = (layout.node_name(edge.from), layout.node_name(edge.to));
-            let mm = edge.length.as_mm();
+            let length = if edge.known == StretchLength::Unknown {
+                "length not measured".to_owned()
+            } else {
+                format!("{:.0} mm", edge.length.as_mm())
+            };
             let (colour, zone) = layout.zone(id).map_or_else(Default::default, |zone| {
                 let (name, limit) = (escaped(&zone.name), zone.limit.as_mm_per_s());
                 (format!(" stroke=\"{RESTRICTED}\""), format!(", zone {name}: at most {limit} mm/s"))
             });
             line(format_args!(
-                "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{colour}><title>{from} to {to}: {mm:.0} \
-                 mm{zone}</title></line>"
+                "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{colour}><title>{from} to {to}: \
+                 {length}{zone}</title></line>"
             ));
         }
     }

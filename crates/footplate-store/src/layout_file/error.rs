@@ -110,6 +110,9 @@ pub enum LayoutProblem {
         /// The name.
         name: String,
     },
+    /// The uncertainty of a length that is not written.
+    #[error("an uncertainty is given of a length that is not: add `mm`, or leave out `uncertainty_mm`")]
+    UncertaintyOfNothing,
     /// An edge in a zone that is nowhere described.
     #[error("no zone is called `{found}`: add `{{ name = \"{found}\", max_mm_s = .. }}` to `zones`")]
     UnknownZone {

@@ -55,7 +55,11 @@ pub fn import_layout<R: BufRead>(
         let (file, line) = match error.entry() {
             PlanEntry::Place(place) => (&nodes_file, places.get(place).map(|(line, _)| *line)),
             PlanEntry::Stretch(stretch) => (&edges_file, stretches.get(stretch).map(|(line, _)| *line)),
-            PlanEntry::Plan | PlanEntry::Survey | PlanEntry::Pair(_) | PlanEntry::Zone(_) => {
+            PlanEntry::Plan
+            | PlanEntry::Survey
+            | PlanEntry::Distance(_)
+            | PlanEntry::Pair(_)
+            | PlanEntry::Zone(_) => {
                 return ImportError::Context(error);
             }
         };
@@ -178,7 +182,7 @@ fn pair_edges(edges: &[EdgeRow], reverses: &Reverses<'_>) -> Result<Vec<(u64, St
         let stretch = Stretch {
             from: RailEnd { node: edge.from.clone(), leg: edge.leg },
             to: RailEnd { node: edge.to.clone(), leg: twin.leg },
-            length: Length::from_mm(edge.mm),
+            length: Length::from_mm(edge.mm).into(),
         };
         stretches.push((edge.line, stretch));
     }

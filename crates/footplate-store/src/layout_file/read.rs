@@ -5,7 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use footplate_core::track::{
-    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedZone, RailEnd, Stretch, Survey, Zone,
+    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedZone, RailEnd, Stretch, StretchLength,
+    Survey, SurveyedDistance, Zone,
 };
 use footplate_core::{Length, Speed, StretchId, TurnoutId};
 use serde::Deserialize;
@@ -107,6 +108,7 @@ struct Written {
     about: String,
     length_uncertainty_mm: Spanned<f64>,
     length_origin: String,
+    length_scale_uncertainty_percent: Option<Spanned<f64>>,
     #[serde(default)]
     sensors: Vec<Spanned<WrittenSensor>>,
     #[serde(default)]
@@ -118,6 +120,8 @@ struct Written {
     #[serde(default)]
     zones: Vec<Spanned<WrittenZone>>,
     edges: Vec<Spanned<WrittenEdge>>,
+    #[serde(default)]
+    distances: Vec<Spanned<WrittenDistance>>,
 }
 
 #[derive(Deserialize)]
@@ -148,8 +152,18 @@ struct WrittenEnd {
 struct WrittenEdge {
     from: Spanned<String>,
     to: Spanned<String>,
-    mm: Spanned<f64>,
+    mm: Option<Spanned<f64>>,
+    uncertainty_mm: Option<Spanned<f64>>,
     zone: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenDistance {
+    from: String,
+    to: String,
+    mm: f64,
+    uncertainty_mm: f64,
 }
 
 #[derive(Deserialize)]
@@ -169,15 +183,19 @@ impl Written {
         });
         let ends = self.ends.iter().map(|end| Ok(Place::End { names: end.get_ref().names.clone() }));
         let stretches = self.edges.iter().map(|edge| {
-            let WrittenEdge { from, to, mm, .. } = edge.get_ref();
-            let length = Length::from_mm(*mm.get_ref());
-            Ok(Stretch { from: rail_end(from)?, to: rail_end(to)?, length })
+            let WrittenEdge { from, to, .. } = edge.get_ref();
+            Ok(Stretch { from: rail_end(from)?, to: rail_end(to)?, length: edge.get_ref().length()? })
         });
         Ok(LayoutPlan {
             name: self.name.clone(),
             survey: Survey {
                 uncertainty: Length::from_mm(*self.length_uncertainty_mm.get_ref()),
                 origin: self.length_origin.clone(),
+                scale: self
+                    .length_scale_uncertainty_percent
+                    .as_ref()
+                    .map_or(0.0, |part| part.get_ref() / 100.0),
+                distances: self.distances.iter().map(|distance| distance.get_ref().planned()).collect(),
             },
             places: sensors.chain(turnouts).chain(ends).collect::<Result<_, _>>()?,
             stretches: stretches.collect::<Result<_, _>>()?,
@@ -233,7 +251,13 @@ impl Written {
                 LayoutError::IllegalZoneLimit { .. } => zone.get_ref().max_mm_s.span().start,
                 _ => zone.span().start,
             }),
-            PlanEntry::Survey => Some(self.length_uncertainty_mm.span().start),
+            PlanEntry::Survey => match (error, &self.length_scale_uncertainty_percent) {
+                (LayoutError::IllegalScale { .. }, Some(scale)) => Some(scale.span().start),
+                _ => Some(self.length_uncertainty_mm.span().start),
+            },
+            PlanEntry::Distance(distance) => {
+                self.distances.get(distance).map(|distance| distance.span().start)
+            }
             PlanEntry::Plan => None,
         };
         start.unwrap_or(0)
@@ -255,11 +279,38 @@ impl WrittenSensor {
     }
 }
 
+impl WrittenDistance {
+    fn planned(&self) -> SurveyedDistance {
+        let Self { from, to, mm, uncertainty_mm } = self;
+        SurveyedDistance {
+            from: from.clone(),
+            to: to.clone(),
+            length: Length::from_mm(*mm),
+            uncertainty: Length::from_mm(*uncertainty_mm),
+        }
+    }
+}
+
 impl WrittenEdge {
+    /// What it says of its length.
+    fn length(&self) -> Result<StretchLength, Fault> {
+        let mm = |number: &Spanned<f64>| Length::from_mm(*number.get_ref());
+        match (&self.mm, &self.uncertainty_mm) {
+            (Some(length), None) => Ok(mm(length).into()),
+            (Some(length), Some(own)) => {
+                Ok(StretchLength::Estimated { length: mm(length), uncertainty: mm(own) })
+            }
+            (None, None) => Ok(StretchLength::Unknown),
+            (None, Some(own)) => Err((own.span().start, LayoutProblem::UncertaintyOfNothing)),
+        }
+    }
+
     /// The byte at which stands what the layout complains about in this edge.
     fn place_of(&self, error: &LayoutError) -> usize {
+        let start = |number: &Option<Spanned<f64>>| number.as_ref().map_or(0, |number| number.span().start);
         let at_fault = match error {
-            LayoutError::IllegalLength { .. } => return self.mm.span().start,
+            LayoutError::IllegalLength { .. } => return start(&self.mm),
+            LayoutError::IllegalLengthUncertainty { .. } => return start(&self.uncertainty_mm),
             LayoutError::UnknownNode { node, .. }
             | LayoutError::LegMissing { node, .. }
             | LayoutError::LegWithoutTurnout { node, .. }

@@ -1,6 +1,6 @@
 //! Writes a layout as TOML that a person likes to read, and that reads back as the same layout.
 
-use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind, Zone};
+use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone};
 use footplate_core::{Length, NodeId};
 
 use super::drawing::{Drawing, LayoutFile};
@@ -24,6 +24,13 @@ pub fn write_layout(file: &LayoutFile) -> String {
         millimetres(survey.uncertainty),
         quoted(&survey.origin),
     );
+    if survey.scale > 0.0 {
+        let percent = unscaled((survey.scale * 1e8).round() as i64, 6);
+        text += &format!(
+            "# One standard deviation of the factor that all lengths have in common.\n\
+             length_scale_uncertainty_percent = {percent}\n"
+        );
+    }
     let places = Places { layout, drawing };
     text += "\n# A contact reports under one name or the other, by the direction of the train.\n";
     text += &list("sensors", places.lines(|kind| matches!(kind, NodeKind::Sensor(_))));
@@ -41,7 +48,14 @@ pub fn write_layout(file: &LayoutFile) -> String {
         text += &list("zones", layout.zones().iter().map(zone));
     }
     text += "\n# Each stretch of rail once, in one of its directions; the way back is the same rail.\n";
+    if !layout.is_measured() {
+        text += "# Edges without mm were not measured.\n";
+    }
     text += &list("edges", stretches(layout));
+    if !survey.distances.is_empty() {
+        text += "\n# From sensor to sensor the sum of edges is known better than each of them.\n";
+        text += &list("distances", survey.distances.iter().map(distance));
+    }
     text
 }
 
@@ -96,8 +110,25 @@ fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
         let to = rail_end(layout, there.to, back);
         let zone =
             layout.zone(id).map_or_else(String::new, |zone| format!(", zone = {}", quoted(&zone.name)));
-        format!("from = {from}, to = {to}, mm = {}{zone}", millimetres(there.length))
+        format!("from = {from}, to = {to}{}{zone}", length(there.known))
     })
+}
+
+/// What an entry says of the length of its edge.
+fn length(known: StretchLength) -> String {
+    match known {
+        StretchLength::Measured(length) => format!(", mm = {}", millimetres(length)),
+        StretchLength::Estimated { length, uncertainty } => {
+            format!(", mm = {}, uncertainty_mm = {}", millimetres(length), millimetres(uncertainty))
+        }
+        StretchLength::Unknown => String::new(),
+    }
+}
+
+fn distance(distance: &SurveyedDistance) -> String {
+    let SurveyedDistance { from, to, length, uncertainty } = distance;
+    let (mm, uncertainty) = (millimetres(*length), millimetres(*uncertainty));
+    format!("from = {}, to = {}, mm = {mm}, uncertainty_mm = {uncertainty}", quoted(from), quoted(to))
 }
 
 fn zone(zone: &Zone) -> String {

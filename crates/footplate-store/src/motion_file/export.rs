@@ -6,7 +6,7 @@ use footplate_core::track::{Hop, Layout};
 use footplate_core::{Approach, Length, SpeedStep, Timestamp};
 
 use super::form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
-use crate::calibration_file::Quantity;
+use crate::quantity::Quantity;
 
 impl MotionFile {
     /// What is known of a train on a layout. `newest`: when the last event behind it was, since the Unix epoch.
@@ -41,7 +41,9 @@ impl MotionFile {
         let sections = self.sections.iter().filter_map(|form| {
             let (from, to) = (layout.node_named(&form.from)?, layout.node_named(&form.to)?);
             let hop = layout.hops_from(from).find(|hop| hop.to == to)?;
-            Some((index.section(hop.id)?, 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
+            // The layout may have been surveyed anew since.
+            let longer_mm = form.surveyed_mm + form.add.value - hop.length.as_mm();
+            Some((index.section(hop.id)?, 1e-3 * longer_mm, 1e-6 * form.add.uncertainty.powi(2)))
         });
         let exact = &self.exact;
         MotionModel::from_numbers(&MotionNumbers {
@@ -57,6 +59,8 @@ impl MotionFile {
                 .map(|[c, s, above_c, above_s]| [(*c, *s), (*above_c, *above_s)])
                 .collect(),
             scatter_scale: exact.scatter_scale,
+            start_scale: exact.start_scale,
+            scale: exact.scale.clone(),
             date: exact.measured_at_s.map_or(Timestamp::ZERO, Timestamp::from_s),
         })
     }
@@ -69,18 +73,11 @@ fn both_ways(
 ) -> impl Iterator<Item = MotionStepForm> + '_ {
     [Approach::Below, Approach::Above].into_iter().map(move |approach| {
         let (speed, stop) = (model.speed(step, approach), model.stop(step, approach));
-        let quantity = |unit: &str, value, uncertainty, measurements| Quantity {
-            value,
-            uncertainty,
-            unit: unit.to_owned(),
-            measurements,
-            measured_at_s,
-        };
         MotionStepForm {
             step,
             approach,
-            speed: quantity("mm/s", speed.value.as_mm_per_s(), speed.uncertainty.as_mm_per_s(), speed.count),
-            stop: quantity("mm", stop.distance.as_mm(), stop.doubt.as_mm(), stop.count),
+            speed: Quantity::speed(speed).dated(measured_at_s),
+            stop: Quantity::length(stop.distance, stop.doubt, stop.count).dated(measured_at_s),
             stop_scatter_mm: stop.scatter.as_mm(),
             stop_s: stop.time.as_s(),
         }
@@ -126,6 +123,8 @@ fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
     ExactForm {
         measured_at_s,
         scatter_scale: numbers.scatter_scale,
+        start_scale: numbers.start_scale,
+        scale: numbers.scale.clone(),
         counts: counts.collect(),
         uses: numbers.uses.iter().map(|found| UseForm::of(*found)).collect(),
         values: numbers.values.clone(),

@@ -3,12 +3,12 @@
 use footplate_core::{Approach, SpeedStep, TrainId};
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_file::Quantity;
+use crate::quantity::Quantity;
 
 /// Names the formulas that made the numbers. Raise it when the same events come to other numbers: with every change of what
 /// `calibration::motion` of core makes of them, or of what [`MotionReplay`](crate::MotionReplay) tells it. Models and replays
 /// that stores keep are then made anew from the events; a test knows the numbers of every version.
-pub const MOTION_MODEL_VERSION: &str = "1";
+pub const MOTION_MODEL_VERSION: &str = "3";
 
 /// All that is known of how one train moves on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,6 +42,10 @@ pub struct ExactForm {
     pub measured_at_s: Option<f64>,
     /// How far stops scatter against what trains usually do.
     pub scatter_scale: f64,
+    /// How late or early starts from rest are against what trains usually do.
+    pub start_scale: f64,
+    /// What each of `values` is off by for one standard deviation of the scale of the survey.
+    pub scale: Vec<f64>,
     /// By step from 0 on: contacts passed and stops made from below, and the same from above.
     pub counts: Vec<[u32; 4]>,
     /// By step from 0 on: `untried`, `moves` or `unreliable`.
@@ -79,6 +83,14 @@ pub struct MotionStepForm {
     pub stop_scatter_mm: f64,
     /// How long a stop takes (s).
     pub stop_s: f64,
+}
+
+impl MotionStepForm {
+    /// Whether its speed was measured: a single contact tells where a train was, not how fast it ran.
+    #[must_use]
+    pub const fn is_measured(&self) -> bool {
+        self.speed.measurements > 1
+    }
 }
 
 /// The way between two contacts.

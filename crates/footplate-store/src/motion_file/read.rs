@@ -6,7 +6,7 @@ use std::path::Path;
 use footplate_core::{Timestamp, TrainId};
 
 use super::form::{MOTION_MODEL_VERSION, MotionFile};
-use crate::store::{CalibrationKind, NewCalibration, Store, StoreError};
+use crate::store::{NewCalibration, Store, StoreError};
 use crate::whole_file::write_whole;
 
 /// Larger files are no motion model: one of a decoder with 126 steps has about 1 MB.
@@ -46,6 +46,15 @@ pub enum MotionFileError {
         /// What is wrong, with line and column.
         problem: String,
     },
+    /// It is a calibration of the form that Footplate wrote before there was one model of a train.
+    #[error(
+        "{file}: a calibration of the old form, whose numbers come from other formulas; make it anew: footplate calibrate \
+         --from LOGS --layout LAYOUT --out FILE, or from a store with --store"
+    )]
+    OldForm {
+        /// The file.
+        file: String,
+    },
     /// It was made by formulas that give other numbers.
     #[error(
         "{file}: made by version {found} of the model, this program has version {MOTION_MODEL_VERSION}; learn it anew \
@@ -71,6 +80,12 @@ fn is_toml(path: &Path) -> Option<bool> {
     }
 }
 
+/// Whether a text has what only calibrations of the old form had: lists of trains and of polling.
+fn is_old_form(text: &str) -> bool {
+    let has = |toml: &str, json: &str| text.contains(toml) || text.contains(json);
+    has("[[trains]]", "\"trains\"") && has("[[polling]]", "\"polling\"")
+}
+
 impl MotionFile {
     /// Reads a file that [`write`](Self::write) wrote, TOML or JSON by its ending.
     ///
@@ -84,6 +99,9 @@ impl MotionFile {
             return Err(MotionFileError::TooLarge { file, bytes });
         }
         let text = fs::read_to_string(path).map_err(system)?;
+        if is_old_form(&text) {
+            return Err(MotionFileError::OldForm { file });
+        }
         let parsed = match is_toml(path) {
             Some(true) => toml::from_str(&text).map_err(|error: toml::de::Error| error.to_string()),
             Some(false) => serde_json::from_str(&text).map_err(|error| error.to_string()),
@@ -115,13 +133,8 @@ impl MotionFile {
         let file = || format!("the motion model of train {}", self.train);
         let body = serde_json::to_string(self)
             .map_err(|error| MotionFileError::Form { file: file(), problem: error.to_string() })?;
-        let new = NewCalibration {
-            kind: CalibrationKind::Motion,
-            train: self.train,
-            as_of,
-            model_version: &self.model_version,
-            body: &body,
-        };
+        let new =
+            NewCalibration { train: self.train, as_of, model_version: &self.model_version, body: &body };
         Ok(store.keep_calibration(new, now)?)
     }
 
@@ -130,7 +143,7 @@ impl MotionFile {
     /// # Errors
     /// The store cannot be read, or holds one that another version of the model made.
     pub fn of_store(store: &Store, train: TrainId, at: Timestamp) -> Result<Option<Self>, MotionFileError> {
-        let Some(kept) = store.calibration(CalibrationKind::Motion, train, at)? else { return Ok(None) };
+        let Some(kept) = store.calibration(train, at)? else { return Ok(None) };
         let place = format!("{}, motion model of train {train}", store.path().display());
         if kept.model_version != MOTION_MODEL_VERSION {
             return Err(MotionFileError::OtherModel { file: place, found: kept.model_version });
@@ -176,8 +189,6 @@ mod tests {
         assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), None);
         file().keep(&mut store, at(1.0), at(2.0)).unwrap();
         assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), Some(file()));
-        // It is no calibration of recordings.
-        assert_eq!(store.calibration(CalibrationKind::Recordings, TrainId(24), at(9.0)).unwrap(), None);
     }
 
     #[test]
@@ -187,9 +198,16 @@ mod tests {
         let other = MotionFile { model_version: "0".to_owned(), ..file() };
         other.write(&path("old.toml")).unwrap();
         let refused = MotionFile::read(&path("old.toml")).unwrap_err().to_string();
-        assert!(refused.contains("made by version 0 of the model, this program has version 1"), "{refused}");
+        let says = format!("made by version 0 of the model, this program has version {MOTION_MODEL_VERSION}");
+        assert!(refused.contains(&says), "{refused}");
         fs::write(path("letter.toml"), "Dear train,\n").unwrap();
         assert!(matches!(MotionFile::read(&path("letter.toml")), Err(MotionFileError::Form { .. })));
+        fs::write(path("old.json"), "{\"model_version\":\"1\",\"polling\":[],\"trains\":[]}").unwrap();
+        let refused = MotionFile::read(&path("old.json")).unwrap_err().to_string();
+        assert!(
+            refused.contains("old form") && refused.contains("footplate calibrate --from LOGS"),
+            "{refused}"
+        );
         assert!(matches!(file().write(&path("model.xml")), Err(MotionFileError::UnknownEnding { .. })));
         assert!(matches!(MotionFile::read(&path("none.toml")), Err(MotionFileError::System { .. })));
     }

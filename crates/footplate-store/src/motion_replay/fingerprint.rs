@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use footplate_core::latency::PollTiming;
 use footplate_core::track::Layout;
 use footplate_core::{SpeedStep, TrainId};
 
@@ -23,9 +24,9 @@ impl Fingerprint {
         Self(ContentHash::of(all.as_bytes()))
     }
 
-    /// Behind one more run.
-    pub(super) fn with(self, recording: &str, run: &Run) -> Self {
-        Self(ContentHash::of(format!("{self} {recording:?} {run:?}").as_bytes()))
+    /// Behind one more run, whose link was polled in this rhythm.
+    pub(super) fn with(self, recording: &str, run: &Run, timing: PollTiming) -> Self {
+        Self(ContentHash::of(format!("{self} {recording:?} {run:?} {timing:?}").as_bytes()))
     }
 }
 

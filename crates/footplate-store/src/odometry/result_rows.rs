@@ -7,15 +7,19 @@ use footplate_core::estimation::odometry::{Mode, MotionEstimate, WheelState};
 use crate::written_table::{Cell, CsvTable, Kind, TableForm, TableWriter};
 
 /// The columns of a result, in order; `run_id` follows where there are many runs.
-const COLUMNS: [(&str, Kind); 16] = [
+const COLUMNS: [(&str, Kind); 20] = [
     ("t_s", Kind::Time),
     ("speed_m_s", Kind::Number),
-    ("speed_low_m_s", Kind::Number),
-    ("speed_high_m_s", Kind::Number),
+    ("confidence_speed_low_m_s", Kind::Number),
+    ("confidence_speed_high_m_s", Kind::Number),
+    ("guaranteed_speed_low_m_s", Kind::Number),
+    ("guaranteed_speed_high_m_s", Kind::Number),
     ("accel_m_s2", Kind::Number),
     ("distance_m", Kind::Number),
-    ("distance_low_m", Kind::Number),
-    ("distance_high_m", Kind::Number),
+    ("confidence_distance_low_m", Kind::Number),
+    ("confidence_distance_high_m", Kind::Number),
+    ("guaranteed_distance_low_m", Kind::Number),
+    ("guaranteed_distance_high_m", Kind::Number),
     ("over_m", Kind::Number),
     ("under_m", Kind::Number),
     ("wheel_1", Kind::Text),
@@ -96,14 +100,19 @@ impl<W: Write + Send> ResultWriter<W> {
 
 /// The cells of an estimate, in the order of [`COLUMNS`].
 fn row<'r>(run: &'r str, estimate: &MotionEstimate, with_runs: bool) -> impl Iterator<Item = Cell<'r>> {
+    let (confidence, guaranteed) = (&estimate.confidence, &estimate.guaranteed);
     let numbers = [
         estimate.speed.as_m_per_s(),
-        estimate.speed_low.as_m_per_s(),
-        estimate.speed_high.as_m_per_s(),
+        confidence.speed_low.as_m_per_s(),
+        confidence.speed_high.as_m_per_s(),
+        guaranteed.speed_low.as_m_per_s(),
+        guaranteed.speed_high.as_m_per_s(),
         estimate.acceleration.as_m_per_s2(),
         estimate.distance.as_m(),
-        estimate.distance_low.as_m(),
-        estimate.distance_high.as_m(),
+        confidence.distance_low.as_m(),
+        confidence.distance_high.as_m(),
+        guaranteed.distance_low.as_m(),
+        guaranteed.distance_high.as_m(),
         estimate.over.as_m(),
         estimate.under.as_m(),
     ];
@@ -138,21 +147,29 @@ const fn mode_word(mode: Mode) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use footplate_core::estimation::odometry::MotionBounds;
     use footplate_core::{Acceleration, Length, Speed, Timestamp};
 
     use super::*;
+
+    fn bounds([speed_low, speed_high]: [f64; 2], [distance_low, distance_high]: [f64; 2]) -> MotionBounds {
+        MotionBounds {
+            speed_low: Speed::from_m_per_s(speed_low),
+            speed_high: Speed::from_m_per_s(speed_high),
+            distance_low: Length::from_m(distance_low),
+            distance_high: Length::from_m(distance_high),
+        }
+    }
 
     fn estimate() -> MotionEstimate {
         MotionEstimate {
             time: Timestamp::from_ns(1_250_000_000),
             speed: Speed::from_m_per_s(10.0),
             speed_deviation: Speed::ZERO,
-            speed_low: Speed::from_m_per_s(9.75),
-            speed_high: Speed::from_m_per_s(10.25),
+            confidence: bounds([9.75, 10.25], [33.0, 34.0]),
+            guaranteed: bounds([9.5, 10.5], [32.0, 35.0]),
             acceleration: Acceleration::from_m_per_s2(-0.1),
             distance: Length::from_m(100.0 / 3.0),
-            distance_low: Length::from_m(33.0),
-            distance_high: Length::from_m(34.0),
             over: Length::from_m(0.5),
             under: Length::from_m(1e-9),
             wheels: [WheelState::Rolling, WheelState::Slide],
@@ -168,10 +185,12 @@ mod tests {
         let text = String::from_utf8(result.finish().unwrap()).unwrap();
         assert_eq!(
             text,
-            "t_s,speed_m_s,speed_low_m_s,speed_high_m_s,accel_m_s2,distance_m,distance_low_m,distance_high_m,\
-             over_m,under_m,wheel_1,wheel_2,mode,share_1,share_2,share_3,run_id\n\
-             1.25,10.0,9.75,10.25,-0.1,33.333333333333336,33.0,34.0,0.5,1e-9,rolling,slide,one_slip,1.0,0.0,0.0,\
-             \"a, b\"\n"
+            "t_s,speed_m_s,confidence_speed_low_m_s,confidence_speed_high_m_s,guaranteed_speed_low_m_s,\
+             guaranteed_speed_high_m_s,accel_m_s2,distance_m,confidence_distance_low_m,confidence_distance_high_m,\
+             guaranteed_distance_low_m,guaranteed_distance_high_m,over_m,under_m,wheel_1,wheel_2,mode,share_1,share_2,\
+             share_3,run_id\n\
+             1.25,10.0,9.75,10.25,9.5,10.5,-0.1,33.333333333333336,33.0,34.0,32.0,35.0,0.5,1e-9,rolling,slide,one_slip,\
+             1.0,0.0,0.0,\"a, b\"\n"
         );
         let mut live = Vec::new();
         let mut result = LiveResult::new(&mut live, true);

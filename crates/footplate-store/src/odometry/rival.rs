@@ -87,7 +87,7 @@ impl RivalOdometer {
         if counted.span.is_some() {
             self.distance += way.unwrap_or(self.speed * span);
         }
-        Claim { speed: self.speed, distance: self.distance, speed_bounds: None, distance_bounds: None }
+        Claim::plain(self.speed, self.distance)
     }
 }
 

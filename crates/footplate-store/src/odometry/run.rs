@@ -1,6 +1,6 @@
 //! One run of a train through the odometer.
 
-use footplate_core::estimation::odometry::{MotionEstimate, Odometer, OdometrySettings};
+use footplate_core::estimation::odometry::{DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings};
 use footplate_core::wheels::{Period, Vehicle, VehicleError};
 
 use super::counted_way::WayCounter;
@@ -13,21 +13,33 @@ use crate::tachometer::Truth;
 /// Which of the ways to estimate is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
-    /// The published algorithm.
+    /// The published algorithm, read so that its printed figures come out.
     Paper,
+    /// The published algorithm to the letter.
+    Literal,
     /// What is best on every scenario.
     Recommended,
 }
 
 impl Preset {
-    /// Both, in the order of tables.
+    /// Those that tables compare, in their order.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Recommended];
+
+    /// Those that a run of this preset scores: a published one and the recommended one.
+    #[must_use]
+    pub const fn scored(self) -> [Self; 2] {
+        match self {
+            Self::Literal => [Self::Literal, Self::Recommended],
+            Self::Paper | Self::Recommended => Self::ALL,
+        }
+    }
 
     /// What it is called on the command line and in files.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
             Self::Paper => "paper",
+            Self::Literal => "literal",
             Self::Recommended => "recommended",
         }
     }
@@ -37,6 +49,7 @@ impl Preset {
     pub fn settings(self) -> OdometrySettings {
         match self {
             Self::Paper => OdometrySettings::paper(),
+            Self::Literal => OdometrySettings::literal(),
             Self::Recommended => OdometrySettings::recommended(),
         }
     }
@@ -51,6 +64,20 @@ pub struct RunContext {
     pub preset: Preset,
     /// Whether estimates are compared with the truth, and with what others would make of the same counts.
     pub score: bool,
+    /// Probability of the confidence interval.
+    pub confidence: f64,
+}
+
+impl RunContext {
+    /// The preset, with the confidence interval of 99.99 %.
+    #[must_use]
+    pub fn new(vehicle: Vehicle, preset: Preset, score: bool) -> Self {
+        Self { vehicle, preset, score, confidence: preset.settings().confidence }
+    }
+
+    fn settings(&self, preset: Preset) -> OdometrySettings {
+        OdometrySettings { confidence: self.confidence, ..preset.settings() }
+    }
 }
 
 /// One run of a train through the odometer.
@@ -86,7 +113,7 @@ impl OdometryRun {
     /// # Errors
     /// The first value of the vehicle that no railway has.
     pub fn new(context: &RunContext) -> Result<Self, VehicleError> {
-        let odometer = Odometer::new(context.vehicle, context.preset.settings())?;
+        let odometer = Odometer::new(context.vehicle, context.settings(context.preset))?;
         let scoring = if context.score { Some(Box::new(Scoring::new(context)?)) } else { None };
         Ok(Self { odometer, summary: RunSummary::default(), scoring })
     }
@@ -108,6 +135,12 @@ impl OdometryRun {
         &self.summary
     }
 
+    /// Claims of the vehicle file that the run contradicts.
+    #[must_use]
+    pub fn doubtful_claims(&self) -> DoubtfulClaims {
+        self.odometer.doubtful_claims()
+    }
+
     /// How good its estimates were, if that was asked for.
     #[must_use]
     pub fn scores(&self) -> Option<&RunScores> {
@@ -119,13 +152,13 @@ impl Scoring {
     fn new(context: &RunContext) -> Result<Self, VehicleError> {
         let RunContext { vehicle, preset, .. } = context;
         let other = match preset {
-            Preset::Paper => Preset::Recommended,
+            Preset::Paper | Preset::Literal => Preset::Recommended,
             Preset::Recommended => Preset::Paper,
         };
         let counter = WayCounter::new(vehicle);
         Ok(Self {
             preset: *preset,
-            other: Odometer::new(*vehicle, other.settings())?,
+            other: Odometer::new(*vehicle, context.settings(other))?,
             rivals: Rival::ALL.map(|rival| RivalOdometer::new(rival, vehicle)),
             slip: SlipWatch::new(counter.pitches()),
             flags: [FlagWatch::default(); 2],
@@ -137,7 +170,7 @@ impl Scoring {
     fn see(&mut self, period: &Period, estimate: &MotionEstimate, truth: &Truth) {
         let other = self.other.step(period);
         let estimates = match self.preset {
-            Preset::Paper => [estimate, &other],
+            Preset::Paper | Preset::Literal => [estimate, &other],
             Preset::Recommended => [&other, estimate],
         };
         let counted = self.counter.count(period);
@@ -159,7 +192,9 @@ impl RunScores {
     #[must_use]
     pub fn preset(&self, preset: Preset) -> OdometryScore {
         match (preset, &self.presets) {
-            (Preset::Paper, [scorer, _]) | (Preset::Recommended, [_, scorer]) => scorer.score(),
+            (Preset::Paper | Preset::Literal, [scorer, _]) | (Preset::Recommended, [_, scorer]) => {
+                scorer.score()
+            }
         }
     }
 
@@ -181,7 +216,9 @@ fn claim(estimate: &MotionEstimate) -> Claim {
     Claim {
         speed: estimate.speed,
         distance: estimate.distance,
-        speed_bounds: Some([estimate.speed_low, estimate.speed_high]),
-        distance_bounds: Some([estimate.distance_low, estimate.distance_high]),
+        speed_bounds: Some([estimate.guaranteed.speed_low, estimate.guaranteed.speed_high]),
+        distance_bounds: Some([estimate.guaranteed.distance_low, estimate.guaranteed.distance_high]),
+        likely_speed_bounds: Some([estimate.confidence.speed_low, estimate.confidence.speed_high]),
+        likely_distance_bounds: Some([estimate.confidence.distance_low, estimate.confidence.distance_high]),
     }
 }

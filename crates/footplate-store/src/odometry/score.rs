@@ -10,8 +10,26 @@ use crate::tachometer::Truth;
 pub(super) struct Claim {
     pub(super) speed: Speed,
     pub(super) distance: Length,
+    /// That hold as long as what is claimed of the vehicle is true.
     pub(super) speed_bounds: Option<[Speed; 2]>,
     pub(super) distance_bounds: Option<[Length; 2]>,
+    /// That hold with the probability stated.
+    pub(super) likely_speed_bounds: Option<[Speed; 2]>,
+    pub(super) likely_distance_bounds: Option<[Length; 2]>,
+}
+
+impl Claim {
+    /// A speed and a distance without any bounds.
+    pub(super) const fn plain(speed: Speed, distance: Length) -> Self {
+        Self {
+            speed,
+            distance,
+            speed_bounds: None,
+            distance_bounds: None,
+            likely_speed_bounds: None,
+            likely_distance_bounds: None,
+        }
+    }
 }
 
 /// How good an odometer was. What there is no figure for is `None`: no truth, or no interval.
@@ -32,14 +50,22 @@ pub struct OdometryScore {
     pub distance_end_pct: Option<f64>,
     /// Its largest amount within the run.
     pub distance_max_m: Option<f64>,
-    /// Share of periods whose true speed lies within the interval.
+    /// Share of periods whose true speed lies within the guaranteed bounds.
     pub speed_inside_pct: Option<f64>,
-    /// Share of periods whose true distance lies within the interval.
+    /// Share of periods whose true distance lies within the guaranteed bounds.
     pub distance_inside_pct: Option<f64>,
-    /// Mean width of the interval of the speed.
+    /// Mean width of the guaranteed bounds of the speed.
     pub speed_width_mean_m_s: Option<f64>,
-    /// Width of the interval of the distance at the end of the run.
+    /// Width of the guaranteed bounds of the distance at the end of the run.
     pub distance_width_end_m: Option<f64>,
+    /// Share of periods whose true speed lies within the interval of the stated confidence.
+    pub confidence_speed_inside_pct: Option<f64>,
+    /// Share of periods whose true distance does.
+    pub confidence_distance_inside_pct: Option<f64>,
+    /// Mean width of that interval of the speed.
+    pub confidence_speed_width_m_s: Option<f64>,
+    /// Width of that of the distance at the end of the run.
+    pub confidence_distance_width_m: Option<f64>,
     /// Share of periods whose speed is off by more than ETCS allows.
     pub etcs_speed_violation_pct: Option<f64>,
     /// Share of periods whose distance is off by more than ETCS allows.
@@ -51,17 +77,21 @@ pub struct OdometryScore {
 impl OdometryScore {
     /// Every figure and what it is called in files, in the order of docs/formats/odometry-result.md.
     #[must_use]
-    pub fn figures(&self) -> [(&'static str, Option<f64>); 12] {
+    pub fn figures(&self) -> [(&'static str, Option<f64>); 16] {
         [
             ("speed_rms_m_s", self.speed_rms_m_s),
             ("speed_max_m_s", self.speed_max_m_s),
             ("distance_end_m", self.distance_end_m),
             ("distance_end_pct", self.distance_end_pct),
             ("distance_max_m", self.distance_max_m),
-            ("speed_inside_pct", self.speed_inside_pct),
-            ("distance_inside_pct", self.distance_inside_pct),
-            ("speed_width_mean_m_s", self.speed_width_mean_m_s),
-            ("distance_width_end_m", self.distance_width_end_m),
+            ("guaranteed_speed_inside_pct", self.speed_inside_pct),
+            ("guaranteed_distance_inside_pct", self.distance_inside_pct),
+            ("guaranteed_speed_width_m_s", self.speed_width_mean_m_s),
+            ("guaranteed_distance_width_m", self.distance_width_end_m),
+            ("confidence_speed_inside_pct", self.confidence_speed_inside_pct),
+            ("confidence_distance_inside_pct", self.confidence_distance_inside_pct),
+            ("confidence_speed_width_m_s", self.confidence_speed_width_m_s),
+            ("confidence_distance_width_m", self.confidence_distance_width_m),
             ("etcs_speed_violation_pct", self.etcs_speed_violation_pct),
             ("etcs_distance_violation_pct", self.etcs_distance_violation_pct),
             ("detect_delay_s", self.detect_delay_s),
@@ -103,6 +133,10 @@ pub(super) struct Scorer {
     speed_inside: Share,
     distance_inside: Share,
     width_sum: f64,
+    likely_speed_inside: Share,
+    likely_distance_inside: Share,
+    likely_width_sum: f64,
+    likely_distance_width_end: Option<f64>,
     speed_violation: Share,
     distance_violation: Share,
     /// The true distance at the first row, where that of the odometer is 0.
@@ -140,6 +174,10 @@ impl Scorer {
             self.speed_inside.count(low <= true_speed && true_speed <= high);
             self.width_sum += (high - low).as_m_per_s();
         }
+        if let Some([low, high]) = claim.likely_speed_bounds {
+            self.likely_speed_inside.count(low <= true_speed && true_speed <= high);
+            self.likely_width_sum += (high - low).as_m_per_s();
+        }
     }
 
     fn see_distance(&mut self, claim: &Claim, true_distance: f64) {
@@ -156,6 +194,10 @@ impl Scorer {
         if let Some([low, high]) = claim.distance_bounds {
             self.distance_inside.count(low.as_m() <= gone && gone <= high.as_m());
             self.distance_width_end = Some((high - low).as_m());
+        }
+        if let Some([low, high]) = claim.likely_distance_bounds {
+            self.likely_distance_inside.count(low.as_m() <= gone && gone <= high.as_m());
+            self.likely_distance_width_end = Some((high - low).as_m());
         }
     }
 
@@ -174,6 +216,11 @@ impl Scorer {
         self.speed_inside.merge(other.speed_inside);
         self.distance_inside.merge(other.distance_inside);
         self.width_sum += other.width_sum;
+        self.likely_speed_inside.merge(other.likely_speed_inside);
+        self.likely_distance_inside.merge(other.likely_distance_inside);
+        self.likely_width_sum += other.likely_width_sum;
+        self.likely_distance_width_end =
+            farther(self.likely_distance_width_end, other.likely_distance_width_end);
         self.speed_violation.merge(other.speed_violation);
         self.distance_violation.merge(other.distance_violation);
         self.distance_end = farther(self.distance_end, other.distance_end);
@@ -185,6 +232,7 @@ impl Scorer {
     pub(super) fn score(&self) -> OdometryScore {
         let speeds = (self.speeds > 0).then_some(self.speeds as f64);
         let bounds = (self.speed_inside.of > 0).then_some(self.speed_inside.of as f64);
+        let likely = (self.likely_speed_inside.of > 0).then_some(self.likely_speed_inside.of as f64);
         OdometryScore {
             scored: self.scored,
             speed_rms_m_s: speeds.map(|count| (self.squares / count).sqrt()),
@@ -196,6 +244,10 @@ impl Scorer {
             distance_inside_pct: self.distance_inside.pct(),
             speed_width_mean_m_s: bounds.map(|count| self.width_sum / count),
             distance_width_end_m: self.distance_width_end,
+            confidence_speed_inside_pct: self.likely_speed_inside.pct(),
+            confidence_distance_inside_pct: self.likely_distance_inside.pct(),
+            confidence_speed_width_m_s: likely.map(|count| self.likely_width_sum / count),
+            confidence_distance_width_m: self.likely_distance_width_end,
             etcs_speed_violation_pct: self.speed_violation.pct(),
             etcs_distance_violation_pct: self.distance_violation.pct(),
             detect_delay_s: self.detect_delay,
@@ -222,6 +274,8 @@ mod tests {
             distance: Length::from_m(distance),
             speed_bounds: Some([speed - half, speed + half].map(Speed::from_m_per_s)),
             distance_bounds: Some([distance - half, distance + half].map(Length::from_m)),
+            likely_speed_bounds: None,
+            likely_distance_bounds: None,
         }
     }
 

@@ -25,7 +25,8 @@ pub fn simulated_vehicle(believed: &LineVehicle) -> Result<VehicleFile, VehicleE
     let wheelsets = believed.wheelsets.map(wheelset);
     let mut vehicle = Vehicle::new(believed.period, believed.max_speed, limits, wheelsets)?;
     let LineBrake { full, tolerance, gradient, resistance, build_up } = believed.brake_command;
-    vehicle.brake_command = BrakeCommand { full, tolerance, gradient, resistance, build_up };
+    vehicle.brake_command =
+        BrakeCommand { full, tolerance, gradient, resistance, build_up, ..vehicle.brake_command };
     vehicle.independent = believed.independent;
     vehicle.check()?;
     Ok(VehicleFile { name: believed.name.clone(), vehicle })

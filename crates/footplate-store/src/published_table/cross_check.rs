@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use footplate_core::{Approach, SpeedStep, TrainId};
 
 use super::read::{CountedFrom, PublishedFigure, PublishedQuantity};
-use crate::calibration_file::{CalibrationFile, TrainForm};
+use crate::findings::{Findings, TrainFindings};
+use crate::motion_file::MotionStepForm;
 
 /// The upper quartile of the standard normal distribution: half of all values lie within.
 const QUARTILE: f64 = 0.674_489_750_196_081_7;
@@ -120,7 +121,7 @@ impl CrossCheck {
     ///
     /// # Errors
     /// [`NothingToCompare`].
-    pub fn of(file: &CalibrationFile, figures: &[PublishedFigure]) -> Result<Self, NothingToCompare> {
+    pub fn of(report: &Findings, figures: &[PublishedFigure]) -> Result<Self, NothingToCompare> {
         let mut teams: BTreeMap<Key<'_>, Vec<f64>> = BTreeMap::new();
         for figure in figures {
             let PublishedFigure { quantity, train, step, approach, ref team, ref term, value } = *figure;
@@ -144,7 +145,7 @@ impl CrossCheck {
                 PublishedQuantity::Speed => (&mut check.speeds, speed_spread),
                 PublishedQuantity::Stop(_) => (&mut check.stops, stop_spread),
             };
-            match between.and_then(|between| checked(file, key, values, between)) {
+            match between.and_then(|between| checked(report, key, values, between)) {
                 Some(figure) => kind.push(figure),
                 None => check.without_counterpart[1] += 1,
             }
@@ -203,16 +204,18 @@ fn spread(teams: &BTreeMap<Key<'_>, Vec<f64>>, of: impl Fn(PublishedQuantity) ->
     median(ratios).map(|ratio| ratio / (QUARTILE * std::f64::consts::SQRT_2)).filter(|spread| *spread > 0.0)
 }
 
-fn checked(file: &CalibrationFile, key: &Key<'_>, values: &[f64], between: f64) -> Option<CheckedFigure> {
+fn checked(report: &Findings, key: &Key<'_>, values: &[f64], between: f64) -> Option<CheckedFigure> {
     let (quantity, train, step, approach, team, term) = *key;
-    let form = file.trains.iter().find(|form| form.train == train)?;
+    let form = report.trains.iter().find(|form| form.train == train)?;
     let (ours, definition) = match quantity {
-        PublishedQuantity::Speed => (our_speed(form, step, approach)?, 0.0),
+        PublishedQuantity::Speed => {
+            let own = our_step(form, step, approach, MotionStepForm::is_measured)?;
+            ([own.speed.value, own.speed.uncertainty], 0.0)
+        }
         PublishedQuantity::Stop(counted) => {
-            let own = form.stops.as_ref()?.steps.iter().find(|own| own.step == step)?;
-            let doubt =
-                if counted == CountedFrom::NotStated { NOT_STATED_S * own.speed_mm_per_s } else { 0.0 };
-            ([own.distance.value, own.distance.uncertainty], doubt)
+            let own = our_step(form, step, approach, |own| own.stop.measurements > 0)?;
+            let doubt = if counted == CountedFrom::NotStated { NOT_STATED_S * own.speed.value } else { 0.0 };
+            ([own.stop.value, own.stop.uncertainty], doubt)
         }
     };
     let theirs = mean(values);
@@ -238,17 +241,20 @@ fn checked(file: &CalibrationFile, key: &Key<'_>, values: &[f64], between: f64) 
     })
 }
 
-/// Our speed of a step reached from the side that they reached it from, or from one that is not known.
-fn our_speed(form: &TrainForm, step: SpeedStep, theirs: Approach) -> Option<[f64; 2]> {
+/// Our numbers of a step reached from the side that they reached it from; of one that is not known from either.
+fn our_step(
+    form: &TrainFindings,
+    step: SpeedStep,
+    theirs: Approach,
+    is_measured: impl Fn(&MotionStepForm) -> bool,
+) -> Option<&MotionStepForm> {
     let sides: &[Approach] = match theirs {
-        Approach::Below => &[Approach::Below, Approach::Unknown],
-        Approach::Above => &[Approach::Above, Approach::Unknown],
-        Approach::Unknown => &[Approach::Below, Approach::Unknown, Approach::Above],
+        Approach::Below => &[Approach::Below],
+        Approach::Above => &[Approach::Above],
+        Approach::Unknown => &[Approach::Below, Approach::Above],
     };
-    let speed = sides
-        .iter()
-        .find_map(|side| form.speeds.iter().find(|speed| speed.step == step && speed.approach == *side))?;
-    Some([speed.speed.value, speed.speed.uncertainty])
+    let at = |side: &Approach| form.steps.iter().find(|own| own.step == step && own.approach == *side);
+    sides.iter().filter_map(at).find(|own| is_measured(own))
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -266,7 +272,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration_file::{Quantity, SpeedForm};
+    use crate::quantity::Quantity;
 
     fn speed(step: u8, value: f64, team: &str) -> PublishedFigure {
         PublishedFigure {
@@ -280,25 +286,30 @@ mod tests {
         }
     }
 
-    fn ours(step: u8, value: f64, uncertainty: f64) -> CalibrationFile {
-        let speed = SpeedForm {
+    fn ours(step: u8, value: f64, uncertainty: f64) -> Findings {
+        let step = MotionStepForm {
             step: SpeedStep::new(step).unwrap(),
             approach: Approach::Below,
-            speed: Quantity { value, uncertainty, unit: "mm/s".into(), measurements: 9, measured_at_s: None },
-            runs: 1,
+            speed: Quantity::new("mm/s", value, uncertainty, 9),
+            stop: Quantity::new("mm", 500.0, 5.0, 0),
+            stop_scatter_mm: 3.0,
+            stop_s: 2.0,
         };
-        let train = TrainForm {
+        let train = TrainFindings {
             train: TrainId(24),
-            speeds: vec![speed],
-            hysteresis: Vec::new(),
+            highest_step: SpeedStep::new(14).unwrap(),
+            runs: 1,
+            silent_runs: 0,
+            contacts: 9,
+            steps: vec![step],
             run_deviation_percent: 1.0,
             contact_scatter_mm: 5.0,
             sections: Vec::new(),
             laws: Vec::new(),
-            stops: None,
+            stops: Vec::new(),
             suspicious: Vec::new(),
         };
-        CalibrationFile {
+        Findings {
             model_version: "1".into(),
             layout: "line".into(),
             polling: Vec::new(),

@@ -1,7 +1,7 @@
 //! Walks a recording once with everybody side by side.
 
 use footplate_core::TrainId;
-use footplate_core::estimation::{Predictor, TrainModel};
+use footplate_core::estimation::{Predictor, TrainForecaster};
 use footplate_core::track::Layout;
 
 use super::baselines::Baselines;
@@ -102,7 +102,7 @@ fn score_run(
         let at_poll = hit.forecast.map(|forecast| forecast.report);
         let rivals = [at_poll, oracle, hindsight_table, table, slow, middle, fast, lap];
         scored.hits.push(ScoredHit { run: run.id, line: raw.line, train, hit, rivals });
-        let speed = predictor.train(train).and_then(TrainModel::running_speed);
+        let speed = predictor.train(train).and_then(TrainForecaster::running_speed);
         laps.take(hit.passage.node, speed);
     })?;
     baselines.end_run(train);

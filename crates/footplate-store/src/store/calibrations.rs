@@ -1,51 +1,14 @@
 //! What models made of the events: kept beside them, with the date of the events they saw.
 
 use footplate_core::{Timestamp, TrainId};
-use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{ErrorCode, Row};
 
 use super::error::StoreError;
 use super::file::Store;
 
-/// What a calibration was made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CalibrationKind {
-    /// Whole recordings, all at once: a [`CalibrationFile`](crate::CalibrationFile).
-    Recordings,
-    /// What a train did while it was driven: a [`MotionFile`](crate::MotionFile).
-    Motion,
-}
-
-impl CalibrationKind {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Recordings => "recordings",
-            Self::Motion => "motion",
-        }
-    }
-}
-
-impl FromSql for CalibrationKind {
-    fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
-        match value.as_str()? {
-            "recordings" => Ok(Self::Recordings),
-            "motion" => Ok(Self::Motion),
-            _ => Err(FromSqlError::InvalidType),
-        }
-    }
-}
-
-impl ToSql for CalibrationKind {
-    fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
-        Ok(self.name().into())
-    }
-}
-
 /// A calibration to be kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NewCalibration<'a> {
-    /// What it was made of, and so what its body looks like.
-    pub kind: CalibrationKind,
     /// Of which train.
     pub train: TrainId,
     /// It saw the events that were there, and not excluded, at this date: so it can be made again.
@@ -59,8 +22,6 @@ pub struct NewCalibration<'a> {
 /// A calibration that was kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Calibration {
-    /// What it was made of, and so what its body looks like.
-    pub kind: CalibrationKind,
     /// Of which train.
     pub train: TrainId,
     /// When it was made.
@@ -73,13 +34,16 @@ pub struct Calibration {
     pub body: String,
 }
 
-const COLUMNS: &str = "kind, train, made_at_ns, as_of_ns, model_version, body";
+const COLUMNS: &str = "train, made_at_ns, as_of_ns, model_version, body";
+/// What kept models are called in the column `kind`. Older programs kept fits of another form there, too, as `recordings`:
+/// they stay in the table and are never read as models.
+const KIND: &str = "motion";
 
 impl Store {
     /// Keeps a calibration; those before it stay.
     pub fn keep_calibration(&mut self, new: NewCalibration<'_>, now: Timestamp) -> Result<(), StoreError> {
-        let sql = format!("INSERT INTO calibrations ({COLUMNS}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)");
-        let row = (new.kind, new.train.0, now.as_ns(), new.as_of.as_ns(), new.model_version, new.body);
+        let sql = format!("INSERT INTO calibrations (kind, {COLUMNS}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)");
+        let row = (KIND, new.train.0, now.as_ns(), new.as_of.as_ns(), new.model_version, new.body);
         match self.connection.execute(&sql, row) {
             Ok(_) => Ok(()),
             // The only constraint that a value of these types can break.
@@ -90,21 +54,16 @@ impl Store {
         }
     }
 
-    /// The calibration of a kind that was in force for a train at a date: the last one made until then.
-    pub fn calibration(
-        &self,
-        kind: CalibrationKind,
-        train: TrainId,
-        at: Timestamp,
-    ) -> Result<Option<Calibration>, StoreError> {
+    /// The calibration that was in force for a train at a date: the last one made until then.
+    pub fn calibration(&self, train: TrainId, at: Timestamp) -> Result<Option<Calibration>, StoreError> {
         let sql = format!(
             "SELECT {COLUMNS} FROM calibrations WHERE kind = ?1 AND train = ?2 AND made_at_ns <= ?3 \
              ORDER BY id DESC LIMIT 1"
         );
-        Ok(self.rows(&sql, (kind, train.0, at.as_ns()), read)?.pop())
+        Ok(self.rows(&sql, (KIND, train.0, at.as_ns()), read)?.pop())
     }
 
-    /// All calibrations of a train in the order in which they were made.
+    /// All calibrations of a train in the order in which they were made, those of older forms as well.
     pub fn calibrations(&self, train: TrainId) -> Result<Vec<Calibration>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE train = ?1 ORDER BY id");
         self.rows(&sql, [train.0], read)
@@ -120,11 +79,10 @@ impl Store {
 
 fn read(row: &Row<'_>) -> rusqlite::Result<Calibration> {
     Ok(Calibration {
-        kind: row.get(0)?,
-        train: TrainId(row.get(1)?),
-        made_at: Timestamp::from_ns(row.get(2)?),
-        as_of: Timestamp::from_ns(row.get(3)?),
-        model_version: row.get(4)?,
-        body: row.get(5)?,
+        train: TrainId(row.get(0)?),
+        made_at: Timestamp::from_ns(row.get(1)?),
+        as_of: Timestamp::from_ns(row.get(2)?),
+        model_version: row.get(3)?,
+        body: row.get(4)?,
     })
 }

@@ -28,7 +28,7 @@ mod replays;
 mod row;
 mod salvage;
 
-pub use calibrations::{Calibration, CalibrationKind, NewCalibration};
+pub use calibrations::{Calibration, NewCalibration};
 pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};
 pub use error::StoreError;
 pub use file::Store;

@@ -1,6 +1,6 @@
 //! The optional keys of a vehicle file, and where each of them stands in the vehicle.
 
-use footplate_core::wheels::{BrakeCommand, Thresholds};
+use footplate_core::wheels::{BrakeCommand, SlideProtection, Thresholds};
 use footplate_core::{Acceleration, Speed, TimeSpan};
 
 /// One key of a table of numbers.
@@ -69,7 +69,7 @@ pub(super) const THRESHOLDS: [Key<Thresholds>; 14] = [
 ];
 
 /// The keys of `[brake_command]`.
-pub(super) const BRAKE_COMMAND: [Key<BrakeCommand>; 5] = [
+pub(super) const BRAKE_COMMAND: [Key<BrakeCommand>; 6] = [
     key("full_brake_m_s2", |b| b.full.as_m_per_s2(), |b, value| b.full = Acceleration::from_m_per_s2(value)),
     key("full_brake_tolerance", |b| b.tolerance, |b, value| b.tolerance = value),
     key(
@@ -83,4 +83,11 @@ pub(super) const BRAKE_COMMAND: [Key<BrakeCommand>; 5] = [
         |b, value| b.resistance = Acceleration::from_m_per_s2(value),
     ),
     key("build_up_s", |b| b.build_up.as_s(), |b, value| b.build_up = TimeSpan::from_s(value)),
+    key("release_s", |b| b.release.as_s(), |b, value| b.release = TimeSpan::from_s(value)),
+];
+
+/// The keys of `[slide_protection]`, all of which it needs.
+pub(super) const SLIDE_PROTECTION: [Key<SlideProtection>; 2] = [
+    key("creepage", |s| s.creepage, |s, value| s.creepage = value),
+    key("longest_s", |s| s.longest.as_s(), |s, value| s.longest = TimeSpan::from_s(value)),
 ];

@@ -4,14 +4,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use footplate_core::wheels::{Axle, Vehicle, VehicleError, Wheelset};
+use footplate_core::wheels::{Axle, SlideProtection, Vehicle, VehicleError, Wheelset};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::entries::{Entries, Fault, Number, kind, table, text};
 use super::error::{VehicleFileError, VehicleProblem};
-use super::keys::{BRAKE_COMMAND, Key, THRESHOLDS};
+use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
 use crate::layout_file::TextPlace;
 
 /// The largest file that is read, in bytes: a hundred times the built-in vehicle.
@@ -72,6 +72,7 @@ fn read_text(text: &str) -> Result<VehicleFile, Fault> {
     let independent = entries.optional_truth("independent")?.unwrap_or(false);
     let wheelsets = wheelsets(entries.needs("wheelset")?, &mut numbers)?;
     let brake_command = entries.take("brake_command");
+    let slide_protection = entries.take("slide_protection");
     let thresholds = entries.take("thresholds");
     entries.end()?;
     let mut vehicle = Vehicle::new(
@@ -86,6 +87,16 @@ fn read_text(text: &str) -> Result<VehicleFile, Fault> {
         let table = table("brake_command", value, "a table `[brake_command]`")?;
         let entries = Entries::new(table, value.span(), "`[brake_command]`");
         numbers.replace(entries, &BRAKE_COMMAND, &mut vehicle.brake_command)?;
+    }
+    if let Some(value) = slide_protection {
+        let table = table("slide_protection", value, "a table `[slide_protection]`")?;
+        let mut entries = Entries::new(table, value.span(), "`[slide_protection]`");
+        let mut protection = SlideProtection { creepage: 0.0, longest: TimeSpan::ZERO };
+        for key in &SLIDE_PROTECTION {
+            (key.set)(&mut protection, numbers.take(&mut entries, key.name)?);
+        }
+        entries.end()?;
+        vehicle.slide_protection = Some(protection);
     }
     if let Some(value) = thresholds {
         let table = table("thresholds", value, "a table `[thresholds]`")?;

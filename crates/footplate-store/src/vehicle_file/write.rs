@@ -5,7 +5,7 @@ use std::fmt::Write;
 use footplate_core::Acceleration;
 use footplate_core::wheels::{Axle, BrakeCommand, Thresholds};
 
-use super::keys::{BRAKE_COMMAND, Key, THRESHOLDS};
+use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
 use super::read::VehicleFile;
 
 /// The text of a vehicle file. What follows from the rest is left out.
@@ -41,6 +41,12 @@ pub fn write_vehicle(file: &VehicleFile) -> String {
     }
     let claimed = BrakeCommand::cautious(vehicle.max_brake);
     changed(&mut text, "brake_command", &BRAKE_COMMAND, [&vehicle.brake_command, &claimed]);
+    if let Some(protection) = &vehicle.slide_protection {
+        text.push_str("\n[slide_protection]\n");
+        for key in &SLIDE_PROTECTION {
+            line(&mut text, key.name, (key.get)(protection), "");
+        }
+    }
     let derived = Thresholds::derived(vehicle.max_traction, vehicle.max_brake);
     changed(&mut text, "thresholds", &THRESHOLDS, [&vehicle.thresholds, &derived]);
     text
@@ -69,6 +75,7 @@ mod tests {
     use super::super::{VehicleFile, default_vehicle};
     use super::*;
     use footplate_core::TimeSpan;
+    use footplate_core::wheels::SlideProtection;
 
     #[test]
     fn what_is_written_reads_back_as_the_same_vehicle() {
@@ -83,7 +90,10 @@ mod tests {
             gradient: Acceleration::from_m_per_s2(1e-7),
             resistance: Acceleration::from_m_per_s2(0.2),
             build_up: TimeSpan::from_ms(1500),
+            release: TimeSpan::from_ms(2500),
         };
+        file.vehicle.slide_protection =
+            Some(SlideProtection { creepage: 0.2, longest: TimeSpan::from_ms(4000) });
         file.vehicle.independent = true;
         file.vehicle.thresholds.creepage = 0.07;
         file.vehicle.thresholds.rolling_creepage = 0.01;

@@ -109,8 +109,8 @@ fn keys_are_those_of_a_layout() {
     assert_eq!(
         complaint("edges = [", "edge = ["),
         "oval.toml, line 18, column 1: unknown field `edge`, expected one of `format`, `name`, `about`, \
-         `length_uncertainty_mm`, `length_origin`, `sensors`, `turnouts`, `never_both_curved`, `ends`, \
-         `zones`, `edges`"
+         `length_uncertainty_mm`, `length_origin`, `length_scale_uncertainty_percent`, `sensors`, `turnouts`, \
+         `never_both_curved`, `ends`, `zones`, `edges`, `distances`"
     );
     assert_eq!(
         complaint("length_origin = \"tape measure\"\n", ""),
@@ -118,7 +118,8 @@ fn keys_are_those_of_a_layout() {
     );
     assert_eq!(
         complaint("mm = 900", "cm = 90"),
-        "oval.toml, line 22, column 30: unknown field `cm`, expected one of `from`, `to`, `mm`, `zone`"
+        "oval.toml, line 22, column 30: unknown field `cm`, expected one of `from`, `to`, `mm`, \
+         `uncertainty_mm`, `zone`"
     );
     assert_eq!(
         complaint("mm = 900", "mm = \"900\""),

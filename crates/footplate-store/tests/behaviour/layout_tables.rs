@@ -45,7 +45,7 @@ fn context() -> ImportContext {
     ImportContext {
         name: "two tracks".into(),
         about: String::new(),
-        survey: Survey { uncertainty: Length::from_mm(3.0), origin: "ruler".into() },
+        survey: Survey::taped(Length::from_mm(3.0), "ruler".into()),
         never_both_curved: vec![],
     }
 }

@@ -158,8 +158,9 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
                 let legs =
                     |swap| if swap { [Leg::Curved, Leg::Straight] } else { [Leg::Straight, Leg::Curved] };
                 let ([first, second], [third, fourth]) = (legs(*swap_first), legs(*swap_last));
-                let mut join =
-                    |from: RailEnd, to: RailEnd, length| stretches.push(Stretch { from, to, length });
+                let mut join = |from: RailEnd, to: RailEnd, length| {
+                    stretches.push(Stretch { from, to, length: Length::into(length) });
+                };
                 join(plain(ahead), plain(format!("S{number}")), mm(*long));
                 join(end(Some(first))(format!("S{number}")), plain(format!("P{number}")), mm(*short));
                 join(plain(format!("P{number}")), end(Some(third))(format!("T{number}_back")), mm(*long));
@@ -173,7 +174,11 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
             }
             places.push(Place::End { names: ["in".to_owned(), "in_out".to_owned()] });
             places.push(Place::End { names: ["out_in".to_owned(), "out".to_owned()] });
-            stretches.push(Stretch { from: plain(ahead), to: plain("out".to_owned()), length: mm(1.0) });
+            stretches.push(Stretch {
+                from: plain(ahead),
+                to: plain("out".to_owned()),
+                length: mm(1.0).into(),
+            });
             // Files list sensors, turnouts, ends.
             places.sort_by_key(|place| match place {
                 Place::Sensor { .. } => 0,
@@ -192,7 +197,7 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
                     .collect(),
             });
             let zones = zones.collect();
-            let survey = Survey { uncertainty: Length::from_mm(2.5), origin: "made up".to_owned() };
+            let survey = Survey::taped(Length::from_mm(2.5), "made up".to_owned());
             let plan = LayoutPlan { name, survey, places, stretches, never_both_curved: vec![], zones };
             let layout = Layout::build(&plan).unwrap();
             let mut drawing = Drawing::default();

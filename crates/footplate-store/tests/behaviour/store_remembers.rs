@@ -2,8 +2,8 @@
 
 use footplate_core::{Event, EventKind, Report, RunId, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{
-    CalibrationKind, Change, EventKey, Import, MarkKind, NewCalibration, Run, Store, StoreError, StoredEvent,
-    StoredRun, TrainAtStart,
+    Change, EventKey, Import, MarkKind, NewCalibration, Run, Store, StoreError, StoredEvent, StoredRun,
+    TrainAtStart,
 };
 
 use crate::recordings::{ALL, real};
@@ -118,21 +118,13 @@ fn a_mark_that_changes_nothing_is_refused_and_so_are_those_beside_it() {
 fn the_calibration_in_force_at_a_date_is_the_last_one_made_until_then() {
     let shelf = Shelf::new();
     let mut store = shelf.store();
-    let calibration = |train, body| NewCalibration {
-        kind: CalibrationKind::Recordings,
-        train: TrainId(train),
-        as_of: minute(0),
-        model_version: "3",
-        body,
-    };
+    let calibration =
+        |train, body| NewCalibration { train: TrainId(train), as_of: minute(0), model_version: "3", body };
     store.keep_calibration(calibration(24, r#"{"speed":1}"#), minute(10)).unwrap();
     store.keep_calibration(calibration(58, r#"{"speed":9}"#), minute(15)).unwrap();
     store.keep_calibration(calibration(24, r#"{"speed":2}"#), minute(20)).unwrap();
     let in_force = |minutes| {
-        store
-            .calibration(CalibrationKind::Recordings, TrainId(24), minute(minutes))
-            .unwrap()
-            .map(|calibration| calibration.body)
+        store.calibration(TrainId(24), minute(minutes)).unwrap().map(|calibration| calibration.body)
     };
     assert_eq!(in_force(9), None);
     assert_eq!(in_force(19).as_deref(), Some(r#"{"speed":1}"#));
@@ -148,13 +140,7 @@ fn what_changed_between_two_dates_is_told_in_order() {
     let shelf = Shelf::new();
     let mut store = shelf.store();
     import_new(&mut store, ALL[0], minute(0));
-    let body = NewCalibration {
-        kind: CalibrationKind::Recordings,
-        train: TrainId(1),
-        as_of: minute(1),
-        model_version: "3",
-        body: "{}",
-    };
+    let body = NewCalibration { train: TrainId(1), as_of: minute(1), model_version: "3", body: "{}" };
     store.keep_calibration(body, minute(1)).unwrap();
     import_new(&mut store, ALL[1], minute(2));
     store.exclude(&[EventKey(2)], "stale", minute(3)).unwrap();

@@ -106,7 +106,7 @@ fn rows() -> impl Strategy<Value = Vec<(usize, Period, Truth)>> {
 
 fn estimates(whole: &Whole) -> Vec<MotionEstimate> {
     let vehicle = default_vehicle().unwrap().vehicle;
-    let context = RunContext { vehicle, preset: Preset::Recommended, score: false };
+    let context = RunContext::new(vehicle, Preset::Recommended, false);
     let mut runs: Vec<OdometryRun> = Vec::new();
     let mut all = Vec::new();
     for (run, period, truth) in &whole.rows {

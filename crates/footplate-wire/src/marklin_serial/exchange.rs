@@ -15,8 +15,12 @@ pub(super) const SILENCE: TimeSpan = TimeSpan::from_ms(100);
 /// A line that never falls silent is spoken to nevertheless after this time: trains must be stoppable.
 const LONGEST_SILENCE: TimeSpan = TimeSpan::from_ms(1000);
 
-/// By how much the longest known reply is later than its bytes take; a poll is taken for lost after that.
+/// By how much a reply of the 6051 is later than its bytes take at the most; a poll is lost after that.
 pub(super) const REPLY_ALLOWANCE: TimeSpan = TimeSpan::from_ms(20);
+
+/// A stop does not wait for all of that silence. Bytes of a reply follow each other after 4.87 ms, so that none is under
+/// way after four times that.
+const STOP_SILENCE: TimeSpan = TimeSpan::from_ms(20);
 
 /// After a whole reply with a newly closed contact, one byte more would still come within this time if one too many
 /// is on its way, and then none of them can be trusted.
@@ -78,11 +82,18 @@ pub(super) struct Awaited {
     pub(super) asked: Timestamp,
     /// When it is lost, or settled.
     pub(super) until: Timestamp,
+    /// When the last byte of the request or of the reply went over the line.
+    pub(super) heard: Timestamp,
 }
 
 impl Awaited {
     pub(super) fn new(request: Message, asked: Timestamp, allowance: TimeSpan) -> Self {
-        Self { request, asked, until: asked + reply_time(request) + allowance }
+        Self { request, asked, until: asked + reply_time(request) + allowance, heard: asked }
+    }
+
+    /// How much later than its bytes take a reply is whose last byte comes now.
+    pub(super) fn late(&self, now: Timestamp) -> TimeSpan {
+        now - self.asked - reply_time(self.request)
     }
 
     pub(super) fn settling(self, now: Timestamp) -> Self {
@@ -95,18 +106,29 @@ impl Awaited {
 pub(super) struct Quiet {
     pub(super) until: Timestamp,
     limit: Timestamp,
+    /// Since when the line has been silent.
+    heard: Timestamp,
     /// Whether the interface may be waiting for a second byte, so that nothing may be said to it but what brings it
     /// back into step.
     pub(super) in_doubt: bool,
+    /// The reply that was given up.
+    pub(super) lost: Option<Awaited>,
 }
 
 impl Quiet {
-    pub(super) fn begin(now: Timestamp, in_doubt: bool) -> Self {
-        Self { until: now + SILENCE, limit: now + LONGEST_SILENCE, in_doubt }
+    /// The line has been silent since a time.
+    pub(super) fn begin(now: Timestamp, heard: Timestamp, in_doubt: bool) -> Self {
+        Self { until: heard + SILENCE, limit: now + LONGEST_SILENCE, heard, in_doubt, lost: None }
     }
 
     pub(super) fn disturb(&mut self, now: Timestamp) {
+        self.heard = now;
         self.until = (now + SILENCE).min(self.limit);
+    }
+
+    /// From when on a stop may be said although the silence is not over: by then no reply is under way any more.
+    pub(super) fn stops_may_go(&self) -> Timestamp {
+        (self.heard + STOP_SILENCE).min(self.until)
     }
 }
 

@@ -75,11 +75,24 @@ impl Pacing {
         self.written = Some(Written { at: now, lowered: self.pace == Pace::Cts && !self.cts_up, ends_frame });
     }
 
+    /// What was written last was one byte that the interface swallows or obeys at once, and a stop waits: it follows as
+    /// the next byte of a message would.
+    pub(super) fn hurry(&mut self) {
+        if let Some(written) = &mut self.written {
+            written.ends_frame = false;
+        }
+    }
+
     /// A whole reply has come, so the interface is done with what was written before.
     pub(super) fn answered(&mut self) {
         if self.pace != Pace::Cts {
             self.written = None;
         }
+    }
+
+    /// When the byte that was written last had left.
+    pub(super) fn gone(&self) -> Option<Timestamp> {
+        self.written.map(|written| written.at + BYTE_TIME)
     }
 
     /// From when on the next byte may be written if CTS stays as it is; `None` while it is down.

@@ -3,9 +3,11 @@
 use footplate_core::{SensorId, TimeSpan, Timestamp};
 
 use super::codec::Message;
-use super::exchange::{REPLY_ALLOWANCE, longest_poll};
+use super::exchange::longest_poll;
 use super::line::time_on_line;
+use super::module_reads::{ModuleReads, ReadsProbe};
 use super::readings::Readings;
+use super::reply_time::ReplyTime;
 use super::s88::CONTACTS_PER_MODULE;
 use super::solenoid::Solenoid;
 
@@ -26,11 +28,12 @@ pub(super) struct Polls {
     watched: Option<u8>,
     held_until: Option<Timestamp>,
     asked_all: Option<Timestamp>,
+    reads: ReadsProbe,
 }
 
 impl Polls {
     pub(super) fn new(modules: u8) -> Self {
-        Self { modules, watched: None, held_until: None, asked_all: None }
+        Self { modules, watched: None, held_until: None, asked_all: None, reads: ReadsProbe::default() }
     }
 
     pub(super) fn hold(&mut self, until: Option<Timestamp>) {
@@ -48,34 +51,66 @@ impl Polls {
         }
     }
 
+    /// A whole reply has come; returns what has been found by it of the interface.
+    pub(super) fn answered(&mut self, request: Message) -> Option<ModuleReads> {
+        self.reads.answered(request)
+    }
+
+    /// A reply did not come whole; `found` bytes of it did. All modules are read next.
+    pub(super) fn lost(&mut self, request: Message, found: usize) {
+        self.asked_all = None;
+        if found == 0 {
+            self.reads.lost(request);
+        }
+    }
+
+    /// Which reads the interface answers; `None` until that is known.
+    pub(super) const fn reads(&self) -> Option<ModuleReads> {
+        self.reads.found()
+    }
+
+    /// The station may be another one.
+    pub(super) fn forget_reads(&mut self) {
+        self.reads = ReadsProbe::default();
+    }
+
     /// When the hold ends by itself.
     pub(super) fn hold_lapses(&self) -> Option<Timestamp> {
         self.held_until.map(|until| until + HOLD_GRACE)
     }
 
-    /// The request for now, unless the line is wanted for something else before it could end. `allowance`: how much
-    /// longer than its bytes take it may be until a solenoid can be released after it, its reply being lost.
+    /// The request for now, unless the line is wanted for something else before it could end. A solenoid has to be
+    /// released in time although the reply is lost: `recovery` is how long it takes until the line is free then.
     pub(super) fn next(
         &mut self,
         now: Timestamp,
         readings: &Readings,
         solenoid: &Solenoid,
-        allowance: TimeSpan,
+        reply_time: &ReplyTime,
+        recovery: TimeSpan,
     ) -> Option<Message> {
         if self.hold_lapses().is_some_and(|lapses| now >= lapses) {
             self.held_until = None;
         }
         let free_until = self.held_until.map(|until| until - time_on_line(COMMAND_BYTES));
         let latest_release = solenoid.latest();
+        let lost = reply_time.allowance() + recovery;
         let fits = |request: &Message| {
-            free_until.is_none_or(|until| now + longest_poll(*request, REPLY_ALLOWANCE) <= until)
+            free_until.is_none_or(|until| now + longest_poll(*request, reply_time.foreseen()) <= until)
                 // A coil bears no lost reply either.
-                && latest_release.is_none_or(|latest| now + longest_poll(*request, allowance) <= latest)
+                && latest_release.is_none_or(|latest| now + longest_poll(*request, lost) <= latest)
         };
         let all = Message::ReadModules { count: self.modules };
         let all_due = self.asked_all.is_none_or(|asked| now - asked >= ALL_EVERY);
-        let one = self.watched.unwrap_or_else(|| readings.oldest());
-        let first = if self.watched.is_none() || all_due { Some(all) } else { None };
-        first.into_iter().chain([Message::ReadModule { module: one }]).find(fits)
+        let one = Message::ReadModule { module: self.watched.unwrap_or_else(|| readings.oldest()) };
+        // One module is as quickly read as all of one.
+        let reads = if self.modules == 1 { Some(ModuleReads::AllOnly) } else { self.reads.found() };
+        let (first, second) = match reads {
+            Some(ModuleReads::AllOnly) => (Some(all), None),
+            Some(ModuleReads::Single) if self.watched.is_none() => (Some(all), Some(one)),
+            // Whether it answers is tried once all have been read.
+            None | Some(ModuleReads::Single) => (all_due.then_some(all), Some(one)),
+        };
+        first.into_iter().chain(second).find(fits)
     }
 }

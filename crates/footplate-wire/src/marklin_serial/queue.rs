@@ -70,9 +70,16 @@ impl Queue {
         let outdated = self.urgent.iter().chain(&self.usual).any(|waiting| match (command, waiting) {
             (Command::Speed { train, .. }, waiting) => concerns(waiting, train),
             (Command::Turnout { turnout, .. }, Command::Turnout { turnout: other, .. }) => turnout == *other,
+            (Command::PowerOff | Command::PowerOn, waiting) => {
+                matches!(waiting, Command::PowerOff | Command::PowerOn)
+            }
             _ => false,
         });
         !outdated && self.push(command).is_ok()
+    }
+
+    pub(super) fn has_urgent(&self) -> bool {
+        !self.urgent.is_empty()
     }
 
     pub(super) fn next_urgent(&mut self) -> Option<Command> {

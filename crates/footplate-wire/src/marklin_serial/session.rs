@@ -10,10 +10,13 @@ use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
 use super::codec::{EncodeError, Message};
 use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, SILENCE, Sending};
 use super::farewell::Farewell;
+use super::module_reads::ModuleReads;
 use super::pacing::Pacing;
 use super::polls::Polls;
 use super::queue::Queue;
 use super::readings::Readings;
+use super::recovery::Recovery;
+use super::reply_time::ReplyTime;
 use super::settings::Settings;
 use super::silence::Silence;
 use super::solenoid::Solenoid;
@@ -21,9 +24,6 @@ use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
 /// How long CTS may be down before a person should know: no message and no reply takes so long.
 const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
-
-/// Words about power that bring the interface into step.
-const WORDS_INTO_STEP: i64 = 2;
 
 /// Commands since the last reply that are said again if the next is lost; older ones were long acted on.
 const SAID_AGAIN: usize = 16;
@@ -44,8 +44,10 @@ pub struct Interface {
     readings: Readings,
     polls: Polls,
     silence: Silence,
-    /// What still has to be said to bring the interface into step.
-    recovery: VecDeque<Message>,
+    reply_time: ReplyTime,
+    recovery: Recovery,
+    /// A stop is said before the line has fallen silent; it goes on to wait for that afterwards.
+    is_overtaken: bool,
     /// What was told since the last whole reply.
     unanswered: Vec<Command>,
     farewell: Farewell,
@@ -80,7 +82,9 @@ impl Interface {
             readings: Readings::new(settings.modules),
             polls: Polls::new(settings.modules),
             silence: Silence::default(),
-            recovery: VecDeque::new(),
+            reply_time: ReplyTime::new(settings.reply_allowance),
+            recovery: Recovery::default(),
+            is_overtaken: false,
             unanswered: Vec::new(),
             farewell: Farewell::default(),
             power: true,
@@ -90,20 +94,24 @@ impl Interface {
             nudged: false,
             output: VecDeque::new(),
         };
-        interface.recover();
+        interface.recovery.begin_anew(interface.power_word());
         Ok(interface)
     }
 
-    /// Queues what brings the interface into step. The first byte may be swallowed as the second of something.
-    fn recover(&mut self) {
-        let power = if self.power { Message::Go } else { Message::Stop };
-        self.recovery.clear();
-        self.recovery.extend([power, power]);
-        if !self.solenoid.is_powered() {
-            // The swallowed byte may have thrown a turnout.
-            self.recovery.push_back(Message::SolenoidOff);
-        }
-        self.recovery.push_back(Message::ResetMode { on: true });
+    /// Which reads of sensor modules the interface answers; `None` until that has been tried.
+    #[must_use]
+    pub fn module_reads(&self) -> Option<ModuleReads> {
+        self.polls.reads()
+    }
+
+    /// How much later than its bytes take a reply comes, the latest of late; `None` before the first.
+    #[must_use]
+    pub fn reply_lateness(&self) -> Option<TimeSpan> {
+        self.reply_time.usual()
+    }
+
+    const fn power_word(&self) -> Message {
+        if self.power { Message::Go } else { Message::Stop }
     }
 
     /// Goes on as far as the clock allows.
@@ -137,6 +145,9 @@ impl Interface {
 
     /// Begins what is next, if the line may be used; returns whether it did.
     fn begin(&mut self, now: Timestamp) -> bool {
+        if self.recovery.has_just_spoken() && self.waiting.has_urgent() {
+            self.pacing.hurry();
+        }
         if !self.pacing.is_ready(now) {
             return false;
         }
@@ -152,18 +163,25 @@ impl Interface {
     }
 
     fn next_purpose(&mut self, now: Timestamp) -> Option<(Message, Purpose)> {
-        // Before the words about power the interface may take any byte for the second of something.
-        let out_of_step =
-            self.recovery.front().is_some_and(|word| matches!(word, Message::Go | Message::Stop));
-        let hurries = self.solenoid.hurries(now) && !out_of_step;
-        if let Some(message) = self.recovery.pop_front_if(|_| !hurries) {
-            return Some((message, Purpose::Recovery));
+        // Before the first word the interface may take any byte for the second of something.
+        let in_step = !self.recovery.is_out_of_step();
+        let hurries = in_step && self.solenoid.hurries(now);
+        let stops = in_step && !hurries && self.waiting.has_urgent();
+        if !(hurries || stops || in_step && self.is_overtaken)
+            && let Some(word) = self.recovery.next(self.solenoid.is_powered())
+        {
+            return Some((word, Purpose::Recovery));
         }
         if hurries {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_urgent() {
             return Some((self.message(command), Purpose::Told(command)));
+        }
+        if core::mem::take(&mut self.is_overtaken) {
+            self.recovery.cancel();
+            self.put_in_doubt(now, self.pacing.gone().unwrap_or(now));
+            return None;
         }
         if self.farewell.begun {
             return self.next_of_closing(now);
@@ -175,14 +193,13 @@ impl Interface {
             return Some((self.message(command), Purpose::Told(command)));
         }
         if core::mem::take(&mut self.disturbed) {
-            self.recover();
-            self.exchange = Exchange::Quiet(Quiet::begin(now, false));
+            self.recovery.begin(self.power_word());
+            self.exchange = Exchange::Quiet(Quiet::begin(now, now, false));
             return None;
         }
-        // If the reply is lost, the solenoid is released after the silence and the words that follow it.
-        let step = TimeSpan::from_ns(self.pacing.word_time().as_ns().saturating_mul(WORDS_INTO_STEP));
-        let allowance = self.settings.reply_allowance + SILENCE + step;
-        let request = self.polls.next(now, &self.readings, &self.solenoid, allowance)?;
+        // If the reply is lost, the solenoid is released after the silence and the word that follows it.
+        let recovery = SILENCE + self.pacing.word_time();
+        let request = self.polls.next(now, &self.readings, &self.solenoid, &self.reply_time, recovery)?;
         Some((request, Purpose::Poll(request)))
     }
 
@@ -238,6 +255,7 @@ impl Interface {
     fn left(&mut self, sending: Sending) {
         let at = sending.gone();
         self.exchange = Exchange::Free;
+        self.recovery.spoke(sending.purpose == Purpose::Recovery);
         match sending.purpose {
             Purpose::Recovery => {}
             Purpose::Release => {
@@ -251,7 +269,7 @@ impl Interface {
                 self.reply.clear();
                 self.silence.asked(at);
                 self.polls.asked(at, request);
-                self.exchange = Exchange::Awaiting(Awaited::new(request, at, self.settings.reply_allowance));
+                self.exchange = Exchange::Awaiting(Awaited::new(request, at, self.reply_time.allowance()));
             }
             Purpose::PowerAtClose => {
                 self.farewell.said_power_off();
@@ -324,7 +342,10 @@ impl Session for Interface {
     }
 
     fn handle_reopened(&mut self, now: Timestamp) {
-        self.put_in_doubt(now);
+        self.polls.forget_reads();
+        self.reply_time.forget();
+        self.put_in_doubt(now, now);
+        self.recovery.begin_anew(self.power_word());
         self.pacing = Pacing::new(now, self.settings.pace);
         self.go_on(now);
     }
@@ -369,7 +390,8 @@ impl Session for Interface {
             Exchange::Sending(_) => self.pacing.ready_at(),
             Exchange::Awaiting(awaited) | Exchange::Settling(awaited) => Some(awaited.until),
             Exchange::Quiet(quiet) => {
-                let release = [self.solenoid.due(), self.solenoid.hurries_at()];
+                let stops = (quiet.in_doubt && self.waiting.has_urgent()).then(|| quiet.stops_may_go());
+                let release = [self.solenoid.due(), self.solenoid.hurries_at(), stops];
                 let coming = release.into_iter().flatten().filter(|at| *at > self.now);
                 coming.chain([quiet.until]).min()
             }

@@ -9,6 +9,7 @@
 mod marklin_serial_bench;
 mod marklin_serial_line;
 mod marklin_serial_mishaps;
+mod marklin_serial_recovery;
 mod marklin_serial_round_trip;
 mod marklin_serial_transcript;
 mod marklin_serial_vectors;

@@ -45,6 +45,10 @@ enum Due {
 pub(crate) struct Station {
     pub(crate) hand_shake: HandShake,
     pub(crate) cable: Cable,
+    /// Whether reads of one module are answered; otherwise they are ignored.
+    pub(crate) answers_single: bool,
+    /// From the last bit of a request until the first byte of its reply begins.
+    pub(crate) turnaround: TimeSpan,
     /// Bytes that wait for the rest of their message.
     pub(crate) heard: Vec<u8>,
     pub(crate) power: bool,
@@ -68,6 +72,8 @@ impl Station {
         Self {
             hand_shake: HandShake::Edges,
             cable: Cable::default(),
+            answers_single: true,
+            turnaround: TimeSpan::from_ms(2),
             heard: Vec::new(),
             power: false,
             steps: BTreeMap::new(),
@@ -149,7 +155,10 @@ impl Station {
             Message::Stop => self.power = false,
             _ => {}
         }
-        let mut at = now + TimeSpan::from_ms(2);
+        if matches!(message, Message::ReadModule { .. }) && !self.answers_single {
+            return;
+        }
+        let mut at = now + self.turnaround;
         for module in message.modules_read() {
             let state = ModuleState::with_closed(module, self.memory.iter().copied());
             for closed in state.closed() {

@@ -66,7 +66,7 @@ export function calibrationPage(root, live, number) {
   add("stored", () => ({
     name: say("chart-stored"), x: { label: say("axis-step"), unit: "", digits: 0 }, y: say("axis-speed"), ticks: [1, 2, 5], range: upright(storedBars),
     zooms: false, series: bySide("mm/s"), bars: barsOf(storedBars, SIDES),
-  }), sides(() => (report?.calibration.speeds ?? [])
+  }), sides(() => (report?.calibration.steps ?? []).filter(({ speed }) => speed.measurements > 1)
     .map(({ step, approach, speed }) => ({ step, side: approach.toLowerCase(), value: speed.value, half: speed.uncertainty / SIGMA })), storedBars));
 
   const change = () => report?.changes[Number($("#change").value)];

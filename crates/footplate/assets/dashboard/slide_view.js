@@ -33,15 +33,17 @@ export class SlideView {
       series: [
         bound(say("at-most"), "m/s"), bound(say("at-least"), "m/s"), line(say("wheel-1"), "second", "m/s", 2), line(say("wheel-2"), "third", "m/s", 2),
         line(say("estimated"), "first", "m/s", 2), { ...line(say("in-truth"), "text", "m/s", 2), dash: [6, 4] },
+        { ...bound(say("guaranteed-at-most"), "m/s"), dash: [2, 3] }, { ...bound(say("guaranteed-at-least"), "m/s"), dash: [2, 3] },
       ],
       bands: [{ series: [1, 2], fill: colour("band") }],
-    }), () => [column(({ t_s }) => t_s), column((row) => row.speed_high), column((row) => row.speed_low), column((row) => row.wheels[0]),
-      column((row) => row.wheels[1]), column((row) => row.speed), column((row) => row.true_speed)]);
+    }), () => [column(({ t_s }) => t_s), column((row) => row.confidence_speed_high), column((row) => row.confidence_speed_low), column((row) => row.wheels[0]),
+      column((row) => row.wheels[1]), column((row) => row.speed), column((row) => row.true_speed), column((row) => row.guaranteed_speed_high),
+      column((row) => row.guaranteed_speed_low)]);
     this.#add("slide-distance", () => ({
       name: say("chart-slide-distance"), x, y: say("axis-beyond-truth"), height: 200, range, zooms: false, zero: true,
       series: [bound(say("at-most"), "m"), bound(say("at-least"), "m"), line(say("estimated"), "first", "m", 2)],
       bands: [{ series: [1, 2], fill: colour("band") }],
-    }), () => [column(({ t_s }) => t_s), column((row) => row.beyond_high), column((row) => row.beyond_low), column((row) => row.beyond)]);
+    }), () => [column(({ t_s }) => t_s), column((row) => row.confidence_beyond_high), column((row) => row.confidence_beyond_low), column((row) => row.beyond)]);
   }
 
   #add(name, options, data) {
@@ -100,7 +102,7 @@ export class SlideView {
     for (const row of rows) {
       const since = this.#rows.at(-1)?.t_s ?? row.t_s;
       this.#rows.push(row);
-      this.#inside += row.speed_low <= row.true_speed && row.true_speed <= row.speed_high;
+      this.#inside += row.guaranteed_speed_low <= row.true_speed && row.true_speed <= row.guaranteed_speed_high;
       for (const [wheel, state] of row.states.entries()) {
         if (!(state in STATES)) continue;
         const last = this.#marks[wheel].at(-1);
@@ -110,15 +112,15 @@ export class SlideView {
     }
     const now = this.#rows.at(-1);
     if (!now) return;
-    const half = Math.max(now.speed_high - now.speed, now.speed - now.speed_low);
+    const half = Math.max(now.confidence_speed_high - now.speed, now.speed - now.confidence_speed_low);
     this.#put("#slide-time", `${shown(now.t_s, 1)} s`);
-    this.#put("#slide-estimate", `${shown(now.speed, 2)} m/s (${shown(now.speed_low, 2)} … ${shown(now.speed_high, 2)})`);
+    this.#put("#slide-estimate", `${shown(now.speed, 2)} m/s (${shown(now.confidence_speed_low, 2)} … ${shown(now.confidence_speed_high, 2)})`);
     this.#root.querySelector("#slide-estimate").dataset.half = half.toFixed(3);
     this.#put("#slide-truth", now.true_speed == null ? "–" : `${shown(now.true_speed, 2)} m/s`);
     const wheel = (place) => `${now.wheels[place] == null ? "–" : shown(now.wheels[place], 2)} m/s, ${say(`wheel-${now.states[place]}`)}`;
     this.#put("#slide-wheel-1", wheel(0));
     this.#put("#slide-wheel-2", wheel(1));
-    this.#put("#slide-beyond", now.beyond == null ? "–" : `${signed(now.beyond, 2)} m (${signed(now.beyond_low, 2)} … ${signed(now.beyond_high, 2)})`);
+    this.#put("#slide-beyond", now.beyond == null ? "–" : `${signed(now.beyond, 2)} m (${signed(now.confidence_beyond_low, 2)} … ${signed(now.confidence_beyond_high, 2)})`);
     this.#put("#slide-inside", say("periods-inside", this.#inside, this.#rows.length));
     this.#charts.forEach(({ chart, data }) => chart.set(data()));
   }
@@ -126,7 +128,7 @@ export class SlideView {
   #ends(score) {
     this.#end();
     const words = [say(score.holds ? "bounds-held" : "bounds-left"), say("score-speed", shown(score.speed_rms_m_s, 3), shown(score.speed_max_m_s, 2)),
-      say("score-distance", signed(score.distance_end_m, 2), shown(score.distance_width_end_m, 1))];
+      say("score-distance", signed(score.distance_end_m, 2), shown(score.confidence_distance_width_m, 1))];
     if (score.detect_delay_s != null) words.push(say("score-noticed", shown(score.detect_delay_s, 2)));
     this.#put("#slide-score", words.join(" "));
   }

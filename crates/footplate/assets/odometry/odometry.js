@@ -21,9 +21,9 @@ const PLACES = pick(
   { wheel_1: "Radsatz 1", wheel_2: "Radsatz 2", mode: "Betriebsart" },
 );
 /** What stands on axes and beside lines. */
-const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST] = pick(
-  ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least"],
-  ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens"],
+const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST, GUARANTEED] = pick(
+  ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least", "guaranteed"],
+  ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens", "garantiert"],
 );
 
 const time = () => ({
@@ -95,19 +95,21 @@ const span = (values, unit, digits) => `${rounded(least(values), digits)} ${pick
 const bound = (label, unit, digits) => ({ ...line(label, "quiet", unit, digits), width: 1 });
 const dashed = (series) => ({ ...series, dash: [6, 4] });
 
-function speed(figure, { speed_m_s, speed_low_m_s, speed_high_m_s, true_speed_m_s }) {
+function speed(figure, lines) {
+  const { speed_m_s, confidence_speed_low_m_s, confidence_speed_high_m_s, true_speed_m_s } = lines;
   chart(figure, {
-    name: pick("Speed with its bounds", "Tempo mit seinen Grenzen"), x: time(), y: SPEED, sync: SYNC,
-    data: [run.time_s, speed_high_m_s, speed_low_m_s, speed_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
+    name: pick("Speed with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Tempo mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: SPEED, sync: SYNC,
+    data: [run.time_s, confidence_speed_high_m_s, confidence_speed_low_m_s, speed_m_s, lines.guaranteed_speed_high_m_s, lines.guaranteed_speed_low_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
     series: [
       bound(AT_MOST, "m/s", 2), bound(AT_LEAST, "m/s", 2), line(ESTIMATE, "first", "m/s", 2),
+      dashed(bound(`${AT_MOST} (${GUARANTEED})`, "m/s", 2)), dashed(bound(`${AT_LEAST} (${GUARANTEED})`, "m/s", 2)),
       ...(true_speed_m_s ? [dashed(line(pick("true", "wahr"), "truth", "m/s", 2))] : []),
     ],
     bands: [{ series: [1, 2], fill: colour("band") }],
   });
-  const widest = greatest(speed_high_m_s.map((high, place) => high - speed_low_m_s[place]));
+  const widest = greatest(confidence_speed_high_m_s.map((high, place) => high - confidence_speed_low_m_s[place]));
   const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
-  say(figure, pick(`The estimate goes from ${goes}; its bounds are at most ${apart} m/s apart.`, `Die Schätzung geht von ${goes}; ihre Grenzen sind höchstens ${apart} m/s auseinander.`));
+  say(figure, pick(`The estimate goes from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung geht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
@@ -174,20 +176,24 @@ function shares(figure, { share_1, share_1_and_2 }) {
   say(figure, `${PLACES.mode}: ${stretchesOf("mode")}.`);
 }
 
-function distance(figure, { error_m, error_low_m, error_high_m, width_m, over_m, under_m }) {
+function distance(figure, lines) {
+  const { error_m, confidence_error_low_m, confidence_error_high_m, width_m, over_m, under_m } = lines;
   if (error_m) {
     chart(figure, {
-      name: pick("Distance less the true distance, with its bounds", "Weg weniger dem wahren Weg, mit seinen Grenzen"), x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
-      data: [run.time_s, error_high_m, error_low_m, error_m],
-      series: [bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2)],
+      name: pick("Distance less the true distance, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Weg weniger dem wahren Weg, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
+      data: [run.time_s, confidence_error_high_m, confidence_error_low_m, error_m, lines.guaranteed_error_high_m, lines.guaranteed_error_low_m],
+      series: [
+        bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2),
+        dashed(bound(`${AT_MOST} (${GUARANTEED})`, "m", 2)), dashed(bound(`${AT_LEAST} (${GUARANTEED})`, "m", 2)),
+      ],
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
-    const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(error_high_m), 2)} m`];
-    say(figure, pick(`The error goes from ${goes}; its bounds from ${bounds}.`, `Der Fehler geht von ${goes}; seine Grenzen von ${bounds}.`));
+    const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(confidence_error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(confidence_error_high_m), 2)} m`];
+    say(figure, pick(`The error goes from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler geht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
     return;
   }
   chart(figure, {
-    name: pick("Width of the interval of the distance, and amounts of over- and under-reading", "Breite des Intervalls des Weges, und wie viel er zu lang und zu kurz gelesen wird"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
+    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und wie viel er garantiert höchstens zu lang und zu kurz gelesen wird"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
     series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });

@@ -18,12 +18,12 @@ const PHASES = pick({
 const [LAW, CONTACT, SPEED] = pick(["law", "contact", "speed (mm/s)"], ["Gesetz", "Kontakt", "Tempo (mm/s)"]);
 
 function speeds(figure, train) {
-  const all = train.calibration.speeds;
+  const all = train.calibration.steps.filter(({ speed }) => speed.measurements > 1);
   const parts = APPROACHES.map(([approach, label, name, shift]) => {
     const own = all.filter((speed) => speed.approach.toLowerCase() === approach);
     const points = own.map(({ step, speed }) => ({ x: step + shift, y: speed.value, dy: speed.uncertainty }));
     const told = new Map(points.map(({ x, dy }, place) =>
-      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} ${pick("hops", "Strecken")}`]));
+      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} ${pick("contacts", "Kontakte")}`]));
     return { label, name, points, told };
   }).filter(({ points }) => points.length > 0);
   const data = uPlot.join(parts.map(({ points }) => [points.map(({ x }) => x), points.map(({ y }) => y)]));
@@ -124,20 +124,20 @@ function forecasts(figure, train) {
 }
 
 function stops(figure, train) {
-  const steps = train.calibration.stops.steps;
-  const points = steps.map(({ speed_mm_per_s, distance }) => ({ x: speed_mm_per_s, y: distance.value, dy: distance.uncertainty }));
-  const told = new Map(steps.map(({ step, speed_mm_per_s, distance }) =>
-    [speed_mm_per_s, `± ${rounded(distance.uncertainty, 0)}, ${pick("step", "Stufe")} ${step}`]));
+  const taped = train.calibration.stops;
+  const points = taped.map((stop) => ({ x: stop.speed_mm_per_s, y: stop.distance_mm, dy: stop.uncertainty_mm }));
+  const told = new Map(taped.map(({ step, speed_mm_per_s, uncertainty_mm }) =>
+    [speed_mm_per_s, `± ${rounded(uncertainty_mm, 0)}, ${pick("step", "Stufe")} ${step}`]));
   points.sort((one, other) => one.x - other.x);
-  const law = train.stop_curve;
-  const fastest = Math.max(...points.map(({ x }) => x), ...law.map(([speed]) => speed));
-  const furthest = Math.max(...points.map(({ y, dy }) => y + dy), ...law.map(([, way]) => way));
+  const model = train.stop_curve;
+  const fastest = Math.max(...points.map(({ x }) => x), ...model.map(([speed]) => speed));
+  const furthest = Math.max(...points.map(({ y, dy }) => y + dy), ...model.map(([, way]) => way));
   chart(figure, {
     name: pick("Stopping distance by speed", "Anhalteweg nach Tempo"),
     x: { label: pick("speed before the stop (mm/s)", "Tempo vor dem Halt (mm/s)"), unit: "mm/s", digits: 0 }, y: pick("distance (mm)", "Weg (mm)"),
     range: { x: { range: [0, fastest] }, y: { range: [0, 1.05 * furthest] } },
-    data: uPlot.join([[law.map(([speed]) => speed), law.map(([, way]) => way)], [points.map(({ x }) => x), points.map(({ y }) => y)]]),
-    series: [line(LAW, "first", "mm", 0), dots(pick("measured", "gemessen"), "second", "mm", 0, told)],
+    data: uPlot.join([[model.map(([speed]) => speed), model.map(([, way]) => way)], [points.map(({ x }) => x), points.map(({ y }) => y)]]),
+    series: [line(pick("motion model", "Fahrmodell"), "first", "mm", 0), dots(pick("tape", "Maßband"), "second", "mm", 0, told)],
     bars: [[points, "second"]],
   });
 }

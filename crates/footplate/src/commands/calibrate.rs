@@ -9,20 +9,18 @@ mod table;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use footplate_core::track::Layout;
-use footplate_core::{TimeSpan, Timestamp, TrainId};
-use footplate_store::{
-    Batch, CalibrationFile, CalibrationKind, Import, MODEL_VERSION, NewCalibration, Recording, Store,
-    layout_named, write_whole,
-};
+use footplate_core::{TimeSpan, TrainId};
+use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
 use super::plot::PictureFile;
 use crate::clock::{Moment, now};
 use crate::dashboard::ServedAt;
+use crate::layout_check::check_runs;
 use crate::link::Address;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
@@ -32,9 +30,9 @@ pub(super) use picture::draw_calibration;
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
 /// With --link, the train is found wherever it stands, driven by a plan that is made as it goes on, and left standing
-/// within the budget: speeds and stops by throttle step, and how sure they are. From recordings: speeds, the laws by which
-/// each train changes speed, stopping distances and corrected lengths. Every number has one standard deviation and the
-/// number of measurements behind it.
+/// within the budget: speeds and stops by throttle step, and how sure they are. From recordings: the same motion model of
+/// each train, and beside it the laws that describe its changes of speed, residuals and corrected lengths. Every number has
+/// one standard deviation and the number of measurements behind it.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -75,7 +73,7 @@ pub(crate) struct Arguments {
     /// Calibrate as of this date: from what the store held then.
     #[arg(long, value_name = "DATE", requires = "store", conflicts_with = "from")]
     as_of: Option<Moment>,
-    /// Write the calibration to a file, TOML or JSON by its ending.
+    /// Write the motion model of the train to a file, TOML or JSON by its ending.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Draw speeds and stops by step to this file, SVG or PNG by its ending.
@@ -110,6 +108,7 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
+        check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
         let (batch, mut store) = match &self.store {
             None => {
                 let recordings: Vec<Recording> = logs.into_iter().map(|log| log.recording).collect();
@@ -122,20 +121,29 @@ impl Arguments {
                 (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))
             }
         };
-        let file = CalibrationFile::of(&layout, &batch);
         if let Some((store, as_of)) = &mut store {
-            keep(&file, store, *as_of)?;
+            for train in &batch.trains {
+                train.file(&layout).keep(store, *as_of, now())?;
+            }
         }
         if let Some(path) = &self.out {
-            write_calibration(&file, path)?;
+            let [train] = batch.trains.as_slice() else {
+                bail!(
+                    "{}: a motion model is of one train, and there are {}; choose one with --train",
+                    path.display(),
+                    batch.trains.len()
+                );
+            };
+            train.file(&layout).write(path)?;
         }
+        let report = Findings::of(&layout, &batch);
         if let Some(plot) = &self.plot {
-            draw_calibration(&file, plot)?;
+            draw_calibration(&report, plot)?;
         }
         match &self.explain {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,
-            None if self.json => writeln!(output, "{}", serde_json::to_string_pretty(&file)?)?,
-            None => table::write(&file, &batch, output)?,
+            None if self.json => writeln!(output, "{}", serde_json::to_string_pretty(&report)?)?,
+            None => table::write(&report, output)?,
         }
         Ok(Outcome::Done)
     }
@@ -149,30 +157,4 @@ impl Arguments {
         }
         Ok(())
     }
-}
-
-fn keep(file: &CalibrationFile, store: &mut Store, as_of: Timestamp) -> anyhow::Result<()> {
-    for form in &file.trains {
-        let body = serde_json::to_string(&file.of_one(form.train))?;
-        let new = NewCalibration {
-            kind: CalibrationKind::Recordings,
-            train: form.train,
-            as_of,
-            model_version: MODEL_VERSION,
-            body: &body,
-        };
-        store.keep_calibration(new, now())?;
-    }
-    Ok(())
-}
-
-fn write_calibration(file: &impl serde::Serialize, path: &std::path::Path) -> anyhow::Result<()> {
-    let text = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("toml") => toml::to_string_pretty(file)?,
-        Some("json") => serde_json::to_string_pretty(file)?,
-        _ => {
-            bail!("{}: a calibration is written as .toml or .json, by the ending of the file", path.display())
-        }
-    };
-    write_whole(path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))
 }

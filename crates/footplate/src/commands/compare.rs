@@ -2,6 +2,7 @@
 
 mod markdown;
 mod picture;
+mod sessions;
 mod table;
 
 use std::io::Write;
@@ -9,9 +10,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use footplate_core::track::Layout;
 use footplate_core::{Approach, TrainId};
 use footplate_store::{
-    Batch, CalibrationFile, CheckedFigure, CountedFrom, CrossCheck, PublishedQuantity, layout_named,
+    Batch, CheckedFigure, CountedFrom, CrossCheck, Findings, PublishedQuantity, SessionCheck, layout_named,
     read_published_table,
 };
 use serde_json::{Value, json};
@@ -20,14 +22,15 @@ use super::Outcome;
 use super::log_file::LogFile;
 use super::plot::PictureFile;
 
-/// Compare speeds and stops with tables that others published.
+/// Compare speeds and stops with tables that others published, or with another session.
 ///
 /// Calibrates from the recordings and sets every published figure of the same train and throttle step beside ours:
 /// the difference in percent, and in standard deviations of what teams differ by anyway.
 #[derive(Args)]
 #[command(after_help = "\
-Example:
-  footplate compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv")]
+Examples:
+  footplate compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv
+  footplate compare testdata/sensor-logs/choo*.csv --layout track-a --session testdata/sensor-logs/eadanila*.csv")]
 pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
     #[arg(required = true, value_name = "LOG")]
@@ -36,8 +39,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LAYOUT")]
     layout: String,
     /// Tables of published speeds or stops (CSV), as testdata/published-tables describes them.
-    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    #[arg(long, value_name = "FILE", num_args = 1.., required_unless_present = "session")]
     with: Vec<PathBuf>,
+    /// Compare with recordings of another session of the same trains instead (CSV).
+    #[arg(long, value_name = "LOG", num_args = 1.., conflicts_with_all = ["with", "plot", "markdown"])]
+    session: Vec<PathBuf>,
     /// Only this train; also the train of logs that name none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
@@ -56,6 +62,9 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
+        if !self.session.is_empty() {
+            return self.compare_sessions(&layout, output);
+        }
         let mut figures = Vec::new();
         for path in &self.with {
             figures.extend(read_published_table(path)?);
@@ -63,7 +72,7 @@ impl Arguments {
         figures.retain(|figure| train.is_none_or(|train| train == figure.train));
         let recordings = LogFile::recordings(&self.logs, &layout, train)?;
         let batch = Batch::of_recordings(&layout, &recordings, train)?;
-        let check = CrossCheck::of(&CalibrationFile::of(&layout, &batch), &figures)?;
+        let check = CrossCheck::of(&Findings::of(&layout, &batch), &figures)?;
         if let Some(plot) = &self.plot {
             let picture = picture::of(&check).with_context(|| {
                 format!("{}: a picture is of one train; choose one with --train", plot.path().display())
@@ -76,6 +85,22 @@ impl Arguments {
             markdown::write(&check, output)?;
         } else {
             table::write(&check, output)?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn compare_sessions(&self, layout: &Layout, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let train = self.train.map(TrainId);
+        let batch = |logs: &[PathBuf]| -> anyhow::Result<Batch> {
+            let recordings = LogFile::recordings(logs, layout, train)?;
+            Ok(Batch::of_recordings(layout, &recordings, train)?)
+        };
+        let check = SessionCheck::of(&batch(&self.logs)?, &batch(&self.session)?)
+            .context("the sessions have no step of a train in common, so there is nothing to compare")?;
+        if self.json {
+            writeln!(output, "{}", serde_json::to_string_pretty(&sessions::as_json(&check))?)?;
+        } else {
+            sessions::write(&check, output)?;
         }
         Ok(Outcome::Done)
     }

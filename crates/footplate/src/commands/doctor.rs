@@ -10,7 +10,7 @@ use clap::Args;
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
-use footplate_wire::marklin_serial::Interface;
+use footplate_wire::marklin_serial::{Interface, ModuleReads};
 use footplate_wire::{CommandError, LinkNotice};
 
 use self::figures::Figures;
@@ -71,15 +71,30 @@ impl Arguments {
             Ended::Finished | Ended::Interrupted => {}
             Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
         }
+        let interface = runtime.session();
+        let (reads, lateness) = (interface.module_reads(), interface.reply_lateness());
         let figures = Figures::of(runtime.link().passed(), ear.lost);
         if let Some(plot) = &self.plot {
             plot.write(&figures.picture())?;
         }
         if self.json {
-            writeln!(output, "{}", figures.json())?;
+            let mut json = figures.json();
+            json["answers_single_modules"] = reads.map(|reads| reads == ModuleReads::Single).into();
+            json["reply_lateness_ms"] = lateness.map(TimeSpan::as_ms).into();
+            writeln!(output, "{json}")?;
         } else {
             let hand_shake = if runtime.link().cts().is_some() { "CTS" } else { "by the clock" };
             writeln!(output, "line          {} sensor modules, hand-shake {hand_shake}", settings.modules)?;
+            match reads {
+                Some(reads) => writeln!(output, "interface     {reads}")?,
+                None => {
+                    writeln!(output, "interface     not seen long enough to know which reads it answers")?;
+                }
+            }
+            if let Some(lateness) = lateness {
+                let ms = lateness.as_ms();
+                writeln!(output, "replies       come up to {ms:.0} ms later than their bytes take")?;
+            }
             figures.write(output)?;
             for (notice, count) in &ear.noticed {
                 writeln!(output, "{count:>4} x        {notice}")?;
@@ -130,7 +145,12 @@ impl<M: Machine> Attendant<M> for Ear {
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
+            // Which reads are answered is a line of its own, and finding it out loses some.
             LinkNotice::Answers => return,
+            LinkNotice::Reads(_) => {
+                self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
+                return;
+            }
             LinkNotice::ReplyLost { .. } => self.lost += 1,
             _ => {}
         }

@@ -25,7 +25,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
-use footplate_store::{Journal, NewMachine, Store, parse_layout};
+use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
 use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::DriveBeginning;
@@ -47,6 +47,7 @@ use super::serve::open_dashboard;
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
+use crate::layout_check::LayoutWatch;
 use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
@@ -133,7 +134,9 @@ impl Arguments {
         let dashboard = self.dashboard(&written)?;
         match &self.railway.link {
             Address::Simulated(simulated) => {
-                let link = open_simulated(simulated, layout, pace)?;
+                // A simulated railway is what its address says, whatever people believe it to be.
+                let real = layout_named(&simulated.layout)?.layout;
+                let link = open_simulated(simulated, &real, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
             Address::Serial(_) => {
@@ -258,13 +261,15 @@ impl Arguments {
         }
         let mut journal = self.journal(layout, link.now(), &beginning)?;
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
+        let trains = beginning.models.len();
         let conductor = beginning.conductor()?;
         if conductor.listens_to_a_person() && !self.json {
             stage.say(HELP, "");
         }
         let mut conductor = Witnessed::new(conductor, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
-        let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
+        let mut watch = LayoutWatch::new(layout, trains, recorder);
+        let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
         let mut beginnings = Beginnings::default();
         let ending = loop {
             let ending = runtime.run(&mut conductor, &mut stage)?;
@@ -294,6 +299,9 @@ impl Arguments {
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
+        if let Some(said) = watch.lengths_doubted() {
+            eprintln!("{said}");
+        }
         let mut conductor = conductor.end(at);
         if !closing.is_complete() {
             eprintln!("{closing}");

@@ -1,8 +1,9 @@
-//! `footplate layout`: looking at layouts, checking and importing them.
+//! `footplate layout`: looking at layouts, checking, importing and surveying them.
 
 mod check;
 mod import;
 mod show;
+mod survey;
 
 use std::io::Write;
 
@@ -10,7 +11,7 @@ use clap::{Args, Subcommand};
 
 use super::Outcome;
 
-/// Show, check or import a layout.
+/// Show, check, import or survey a layout.
 #[derive(Args)]
 #[command(after_help = "Example: footplate layout show track-a")]
 pub(crate) struct Arguments {
@@ -23,6 +24,7 @@ enum Task {
     Show(show::Arguments),
     Check(check::Arguments),
     Import(import::Arguments),
+    Survey(survey::Arguments),
 }
 
 impl Arguments {
@@ -31,6 +33,7 @@ impl Arguments {
             Task::Show(arguments) => arguments.run(output),
             Task::Check(arguments) => arguments.run(output),
             Task::Import(arguments) => arguments.run(output),
+            Task::Survey(arguments) => arguments.run(output),
         }
     }
 }

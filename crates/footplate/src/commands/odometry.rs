@@ -40,18 +40,23 @@ pub(super) use watched_slide::WatchedSlide;
                   Charts:  footplate odometry run.csv --vehicle train.toml --report run.html\n\
                   Picture: footplate odometry run.csv --vehicle train.toml --plot run.svg\n\
                   Live:    tachometer | footplate odometry - --out -\n\n\
-                  Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
+                  Exit status: 0 done, 1 the truth left the guaranteed bounds (--score), a claim of the
+                  vehicle file does not hold, or there is no vehicle file, 2 wrong usage or input."
 )]
 pub(crate) struct Arguments {
     /// Tachometer recordings, CSV or Parquet; `-` for standard input.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// What is known of the train (docs/formats/vehicle.md); without it, two powered wheelsets of 80 teeth.
+    /// What is known of the train (docs/formats/vehicle.md). Without it every figure is that of a train with two powered
+    /// wheelsets of 80 teeth, and the exit status is 1.
     #[arg(long, value_name = "V.toml")]
     vehicle: Option<PathBuf>,
     /// Which of the ways to estimate.
     #[arg(long, value_enum, default_value_t = PresetName::Recommended)]
     preset: PresetName,
+    /// Probability that the truth lies within the confidence interval.
+    #[arg(long, value_name = "P", default_value_t = 0.9999, value_parser = confidence)]
+    confidence: f64,
     /// Write an estimate a period to this file, CSV or Parquet by its ending; `-` for CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -74,8 +79,10 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PresetName {
-    /// The published algorithm, as closely as it can be read.
+    /// The published algorithm, read so that its printed figures come out.
     Paper,
+    /// The published algorithm to the letter.
+    Literal,
     /// What is best on every scenario.
     Recommended,
 }
@@ -84,8 +91,19 @@ impl From<PresetName> for Preset {
     fn from(name: PresetName) -> Self {
         match name {
             PresetName::Paper => Self::Paper,
+            PresetName::Literal => Self::Literal,
             PresetName::Recommended => Self::Recommended,
         }
+    }
+}
+
+/// Reads a probability.
+fn confidence(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (0.5..1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} should lie between 0.5 and 0.999999999, as 0.9999 for 99.99 %"))
     }
 }
 
@@ -108,12 +126,14 @@ impl Arguments {
             None => default_vehicle()?,
         };
         let preset = Preset::from(self.preset);
-        let context = RunContext { vehicle: vehicle.vehicle, preset, score: self.score };
+        let context =
+            RunContext { vehicle: vehicle.vehicle, preset, score: self.score, confidence: self.confidence };
         let recordings = self.walk(&context, output)?;
         let walked = Walked {
             vehicle: vehicle.name,
             preset,
             recordings,
+            has_vehicle: self.vehicle.is_some(),
             language: self.language,
             is_scored: self.score,
         };
@@ -125,15 +145,19 @@ impl Arguments {
                 .with_context(|| format!("{}: there is no run to draw", plot.path().display()))?;
             plot.write(&picture)?;
         }
+        let outcome = if walked.falls_short() { Outcome::FallsShort } else { Outcome::Done };
         if to_standard {
-            return Ok(Outcome::Done);
+            for warning in walked.warnings() {
+                eprintln!("{warning}");
+            }
+            return Ok(outcome);
         }
         if self.json {
             writeln!(output, "{}", serde_json::to_string_pretty(&json::walked(&walked))?)?;
         } else {
             tables::write(output, &walked)?;
         }
-        Ok(if walked.falls_short() { Outcome::FallsShort } else { Outcome::Done })
+        Ok(outcome)
     }
 
     /// Walks all recordings and writes what was asked for of their estimates.

@@ -16,11 +16,12 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{TrainId, TurnoutId};
 use footplate_store::score::{Knowledge, ReplayContext, ScoredRecording, score_recording};
-use footplate_store::{CalibrationFile, Recording, layout_named};
+use footplate_store::{MotionFile, Recording, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
 use super::plot::PictureFile;
+use crate::layout_check::check_runs;
 use crate::progress::with_progress;
 
 /// Forecast every next sensor of recorded logs, and score that.
@@ -72,7 +73,8 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
-        let calibration = self.calibration.as_deref().map(CalibrationFile::read).transpose()?;
+        check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
+        let calibration = self.calibration.as_deref().map(MotionFile::read).transpose()?;
         let scored = self.score(&layout, &recordings, calibration.as_ref())?;
         if let Some(plot) = &self.plot {
             let picture = picture::of(&layout, &scored).with_context(|| {
@@ -102,14 +104,14 @@ impl Arguments {
         &self,
         layout: &Layout,
         recordings: &[Recording],
-        calibration: Option<&CalibrationFile>,
+        calibration: Option<&MotionFile>,
     ) -> anyhow::Result<Vec<ScoredRecording>> {
         let context = ReplayContext { layout, turnouts: &self.turnouts };
         let events = |recording: &Recording| recording.runs.iter().map(|run| run.events.len()).sum::<usize>();
         with_progress("scoring", recordings.iter().map(events).sum(), |done| {
             let mut before = Knowledge::of_layout(layout);
             if let Some(calibration) = calibration {
-                calibration.prime(layout, &mut before.predictor);
+                before.predictor.know(calibration.model(layout)?);
             }
             let mut knowledge = before.clone();
             let mut scored = Vec::new();

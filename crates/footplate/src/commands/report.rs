@@ -15,11 +15,12 @@ use anyhow::Context;
 use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
-use footplate_store::{Batch, CalibrationFile, Run, Store, layout_named, write_whole};
+use footplate_store::{Batch, Findings, Run, Store, layout_named, write_whole};
 
 use super::Outcome;
 use super::log_file::LogFile;
 use super::web_page::Language;
+use crate::layout_check::check_runs;
 use data::{ReportData, TrainReport};
 use german_law::german_law;
 
@@ -75,6 +76,7 @@ impl Arguments {
                 (recordings.into_iter().map(session).collect(), batch)
             }
         };
+        check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
         let language = self.language;
         let data = gather(&layout, &sessions, &batch, language)?;
         write_whole(&self.out, page::page(&data, language)?.as_bytes())
@@ -133,8 +135,8 @@ fn gather(
     batch: &Batch,
     language: Language,
 ) -> anyhow::Result<ReportData> {
-    let file = CalibrationFile::of(layout, batch);
-    let trains = file.trains.iter().map(|form| {
+    let findings = Findings::of(layout, batch);
+    let trains = findings.trains.iter().zip(&batch.trains).map(|(form, train)| {
         let mut calibration = form.clone();
         if language == Language::German {
             for law in &mut calibration.laws {
@@ -143,16 +145,16 @@ fn gather(
         }
         let forecasts = forecasts::of_train(layout, sessions, form.train)?;
         Ok(TrainReport {
-            health: health::of(form.train, batch, &forecasts, language),
-            changes: charts::changes(batch, form.train),
-            stop_curve: form.stops.as_ref().map(charts::stop_curve).unwrap_or_default(),
+            health: health::of(form, &forecasts, language),
+            changes: charts::changes(batch, train),
+            stop_curve: charts::stop_curve(form),
             calibration,
             forecasts,
         })
     });
     Ok(ReportData {
         trains: trains.collect::<anyhow::Result<_>>()?,
-        layout: file.layout.clone(),
-        polling: file.polling,
+        layout: findings.layout,
+        polling: findings.polling,
     })
 }

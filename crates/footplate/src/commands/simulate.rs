@@ -11,8 +11,10 @@ mod rehearsal;
 mod seeds;
 mod series;
 mod station;
+mod survey;
 mod traffic;
 mod truth;
+mod worlds;
 mod written_scores;
 mod zones;
 
@@ -44,7 +46,9 @@ enum World {
     Layout(layout::Arguments),
     Line(line::Arguments),
     Pacing(pacing::Arguments),
+    Survey(survey::Arguments),
     Traffic(traffic::Arguments),
+    Worlds(worlds::Arguments),
     Zones(zones::Arguments),
 }
 
@@ -56,7 +60,9 @@ impl Arguments {
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
             Some(World::Pacing(arguments)) => arguments.run(output),
+            Some(World::Survey(arguments)) => arguments.run(output),
             Some(World::Traffic(arguments)) => arguments.run(output),
+            Some(World::Worlds(arguments)) => arguments.run(output),
             Some(World::Zones(arguments)) => arguments.run(output),
             None => {
                 if self.list {

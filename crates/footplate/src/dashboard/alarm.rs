@@ -86,6 +86,7 @@ impl Alarm {
             LinkNotice::HeldClosed { sensor } => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
             }
+            LinkNotice::Reads(_) => (Grade::Warning, "line-reads-all-only", None, Vec::new()),
             LinkNotice::SolenoidLate { turnout, held } => {
                 let blanks = vec![turnout.to_string(), format!("{:.0}", held.as_ms())];
                 (Grade::Danger, "line-solenoid-late", None, blanks)

@@ -1,6 +1,6 @@
 //! What a person writes to say which station is meant.
 //!
-//! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…]` is a simulated one in this process,
+//! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
 //! `[?pace=careful&cts=no&modules=5&speed=20]`.
 
@@ -8,7 +8,7 @@ use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::str::FromStr;
 
 use footplate_core::TrainId;
-use footplate_sim::LawFamily;
+use footplate_sim::{LawFamily, PhysicsRange};
 
 const SIMULATED: &str = "sim:";
 const SERIAL: &str = "marklin-serial:";
@@ -40,6 +40,8 @@ pub(crate) struct SimulatedAddress {
     pub(crate) law: Option<LawFamily>,
     /// Whether contacts and turnouts fail now and then.
     pub(crate) faults: bool,
+    /// What is drawn from wider ranges than usual.
+    pub(crate) physics: PhysicsRange,
     /// How fast its clock runs, if it was said.
     pub(crate) speed: Option<Speed>,
 }
@@ -140,7 +142,15 @@ impl SimulatedAddress {
             return Err("`sim:` wants a layout; write sim:track-a or the path of a layout file".into());
         }
         let layout = layout.to_owned();
-        Ok(Self { layout, seed: 1, trains: TRAINS.to_vec(), law: None, faults: true, speed: None })
+        Ok(Self {
+            layout,
+            seed: 1,
+            trains: TRAINS.to_vec(),
+            law: None,
+            faults: true,
+            physics: PhysicsRange::Usual,
+            speed: None,
+        })
     }
 
     fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
@@ -150,6 +160,7 @@ impl SimulatedAddress {
             "speed" => self.speed = Some(Speed::Times(times(value)?)),
             "trains" => self.trains = trains(value)?,
             "law" => self.law = Some(law_named(value)?),
+            "world" => self.physics = physics_named(value)?,
             "faults" => {
                 self.faults = match value {
                     "some" => true,
@@ -163,7 +174,7 @@ impl SimulatedAddress {
             }
             _ => {
                 return Err(format!(
-                    "a simulated link has no `{key}`; it has seed, speed, trains, law and faults"
+                    "a simulated link has no `{key}`; it has seed, speed, trains, law, faults and world"
                 ));
             }
         }
@@ -197,6 +208,15 @@ pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
     let names = || LawFamily::ALL.map(LawFamily::name).join(", ");
     let named = LawFamily::ALL.into_iter().find(|law| law.name() == value);
     named.ok_or_else(|| format!("there is no law `{value}`; there are {}", names()))
+}
+
+/// The range of physics of a name.
+///
+/// # Errors
+/// There is none; those that there are.
+pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
+    let names = || PhysicsRange::EVERY.map(PhysicsRange::name).join(", ");
+    PhysicsRange::named(value).ok_or_else(|| format!("there is no world `{value}`; there are {}", names()))
 }
 
 impl SerialAddress {
@@ -273,6 +293,7 @@ mod tests {
             trains: vec![TrainId(24), TrainId(58), TrainId(74)],
             law: None,
             faults: false,
+            physics: PhysicsRange::Usual,
             speed: Some(Speed::Times(20.0)),
         };
         assert_eq!(written.parse(), Ok(Address::Simulated(expected)));
@@ -314,7 +335,8 @@ mod tests {
             ("sim:track-a?trains=24,24", "an address of its own"),
             ("sim:track-a?law=newton", "there are"),
             ("sim:track-a?faults=all", "faults=some"),
-            ("sim:track-a?sped=20", "seed, speed, trains, law and faults"),
+            ("sim:track-a?sped=20", "seed, speed, trains, law, faults and world"),
+            ("sim:track-a?world=mars", "there are usual, "),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),
             ("marklin-serial:tcp://host:99999", "tcp://host:port"),

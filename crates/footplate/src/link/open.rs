@@ -50,6 +50,7 @@ pub(crate) fn station<'l>(
 ) -> anyhow::Result<VirtualStation<'l>> {
     let mut switches = if address.faults { LivingSwitches::well_kept() } else { LivingSwitches::faultless() };
     switches.law = address.law;
+    switches.physics = address.physics;
     if !address.faults {
         switches.turnout_failure = Ratio::ZERO;
     }

@@ -154,11 +154,11 @@ fn two_ovals() -> Layout {
     };
     let stretch = |number: u16| {
         let next = if number % 6 == 5 { number - 5 } else { number + 1 };
-        Stretch { from: end(number), to: end(next), length: Length::from_mm(600.0) }
+        Stretch { from: end(number), to: end(next), length: Length::from_mm(600.0).into() }
     };
     let plan = LayoutPlan {
         name: "two ovals".to_owned(),
-        survey: Survey { uncertainty: Length::from_mm(10.0), origin: "chosen".to_owned() },
+        survey: Survey::taped(Length::from_mm(10.0), "chosen".to_owned()),
         places: (0..12).map(sensor).collect(),
         stretches: (0..12).map(stretch).collect(),
         never_both_curved: Vec::new(),

@@ -65,6 +65,11 @@ impl<'r, L: Link> Runtime<'r, L> {
         &mut self.link
     }
 
+    /// The program's side of the line.
+    pub(crate) const fn session(&self) -> &Interface {
+        &self.session
+    }
+
     /// Runs until the attendant has enough, somebody stops the program, or the line is lost. The session stays open:
     /// another machine may go on with it.
     ///

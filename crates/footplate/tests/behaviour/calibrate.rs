@@ -24,8 +24,8 @@ fn scratch(name: &str) -> PathBuf {
 }
 
 fn speed(calibration: &Value, step: u64, approach: &str) -> [f64; 2] {
-    let speeds = calibration["trains"][0]["speeds"].as_array().expect("speeds");
-    let found = speeds.iter().find(|speed| speed["step"] == step && speed["approach"] == approach);
+    let steps = calibration["trains"][0]["steps"].as_array().expect("steps");
+    let found = steps.iter().find(|speed| speed["step"] == step && speed["approach"] == approach);
     let speed = &found.unwrap_or_else(|| panic!("step {step} from {approach}"))["speed"];
     ["value", "uncertainty"].map(|name| speed[name].as_f64().expect("a number"))
 }
@@ -68,7 +68,7 @@ fn every_number_can_be_traced_to_its_lines() {
     );
     assert!(ask("LAW:up").output.contains("since_command_s"));
     assert!(ask("LENGTH:D9-E12").output.contains("mm to add to 369 mm"));
-    for (number, advice) in [("SPEED:99999", "SPEED:14"), ("LENGTH:A1-E16", "no way leads from A1 to E16")] {
+    for (number, advice) in [("SPEED:99999", "SPEED:14"), ("LENGTH:A1-E16", "no path leads from A1 to E16")] {
         let refused = ask(number);
         assert_eq!(refused.status, 2);
         assert!(refused.errors.contains(advice), "{}", refused.errors);

@@ -73,3 +73,23 @@ fn wrong_tables_are_refused_with_their_place() {
     let run = footplate(&["compare", "missing.csv", "--layout", "track-a", "--with", SPEEDS]);
     assert!(run.status == 2 && run.errors.contains("missing.csv"), "{}", run.errors);
 }
+
+#[test]
+fn sessions_of_two_teams_with_the_same_engines_are_compared_step_by_step() {
+    let logs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/");
+    let choochoos = [1, 74, 78].map(|train| format!("{logs}choochoos_2020_track_a_train{train}_run.csv"));
+    let other = format!("{logs}eadanila_2020_track_a.csv");
+    let mut arguments = vec!["compare"];
+    arguments.extend(choochoos.iter().map(String::as_str));
+    arguments.extend(["--layout", "track-a", "--session", &other, "--json"]);
+    let run = footplate(&arguments);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let check: serde_json::Value = serde_json::from_str(&run.output).unwrap();
+    let figures = check["speeds_mm_per_s"]["figures"].as_array().unwrap();
+    assert!(figures.len() >= 9, "{}", figures.len());
+    // The statement of the data: 1 % in the median, 10 % at worst.
+    let mut percent: Vec<f64> =
+        figures.iter().map(|figure| figure["difference_percent"].as_f64().unwrap().abs()).collect();
+    percent.sort_by(f64::total_cmp);
+    assert!(percent[percent.len() / 2] < 3.0 && percent[percent.len() - 1] < 12.0, "{percent:?}");
+}

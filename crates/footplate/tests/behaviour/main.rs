@@ -16,6 +16,7 @@ mod measure;
 mod odometer_on_scenarios;
 mod odometry;
 mod odometry_report;
+mod other_layouts;
 mod plot;
 mod predict;
 mod program;

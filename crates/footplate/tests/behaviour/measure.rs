@@ -44,25 +44,33 @@ fn a_tape_counts_like_any_other_measurement_and_says_what_it_changed() {
     let told: serde_json::Value = serde_json::from_str(&run.output).unwrap();
     assert_eq!((&told["from_step"], &told["run"]), (&8.into(), &4.into()));
     let distance = |of: &str| told[of]["distance_mm"].as_f64().unwrap();
-    // then 10 mm more on the tape are 5 mm more in the mean, of two now.
-    assert!((distance("after") - distance("before") - 5.0).abs() < 1.5, "{told}");
+    // then 10 mm more on the tape are some more in what is believed of two now.
+    let more = distance("after") - distance("before");
+    assert!((0.5..10.0).contains(&more) && (distance("after") - 203.0).abs() < 10.0, "{told}");
     assert_eq!((&told["before"]["measurements"], &told["after"]["measurements"]), (&1.into(), &2.into()));
     // The time of reading a tape is not the time it took to stop.
     let table =
         footplate(&["calibrate", "--store", store.to_str().unwrap(), "--layout", "track-a", "--json"]);
     let table: serde_json::Value = serde_json::from_str(&table.output).unwrap();
-    let stops = &table["trains"][0]["stops"]["steps"][0];
-    assert_eq!((&stops["step"], &stops["time"]["measurements"]), (&8.into(), &1.into()), "{stops}");
+    let stops = table["trains"][0]["stops"].as_array().unwrap();
+    let timed: Vec<bool> = stops.iter().map(|stop| stop["time_s"].is_number()).collect();
+    assert_eq!(timed, [true, true, true, false], "{stops:?}");
 }
 
 #[test]
 fn a_second_reading_of_the_same_stop_replaces_the_first_and_a_misread_one_is_pointed_out() {
     let store = store("measure-again");
     let run = measure(&store, &["--train", "24", "--at", "E12+860mm"]);
-    assert!(run.output.contains("standard deviations from the others; if the tape was misread"), "{run:?}");
+    assert!(
+        run.output.contains("standard deviations from what the model expected; if the tape was misread"),
+        "{run:?}"
+    );
     let run = measure(&store, &["--train", "24", "--at", "E12 + 260 mm", "--took", "1.33s"]);
     assert_eq!(run.status, 0);
-    assert!(run.output.ends_with(" -> 198 mm ± 5 mm, 2 measured\n"), "{}", run.output);
+    assert!(run.output.ends_with(" mm, 2 measured\n"), "{}", run.output);
+    let (_, after) = run.output.rsplit_once(" -> ").unwrap();
+    let stop: f64 = after.split_whitespace().next().unwrap().parse().unwrap();
+    assert!((stop - 198.0).abs() < 8.0, "{stop}");
     let event = run.output.split_whitespace().nth(1).unwrap().trim_end_matches(':');
     let path = store.to_str().unwrap();
     let excluded = footplate(&["store", "exclude", event, "--reason", "the tape slipped", "--store", path]);

@@ -39,13 +39,15 @@ fn walk(run: &LineRun, settings: OdometrySettings) -> Score {
     let mut last = None;
     for ((period, _), truth) in simulated_rows(run).zip(&run.truth) {
         let estimate = odometer.step(&period);
+        let guaranteed = estimate.guaranteed;
         let error = (estimate.speed - truth.speed).as_m_per_s();
         squares += error * error;
         worst = worst.max(error.abs());
-        width += (estimate.speed_high - estimate.speed_low).as_m_per_s();
-        outside[0] += usize::from(truth.speed < estimate.speed_low || truth.speed > estimate.speed_high);
-        outside[1] +=
-            usize::from(truth.distance < estimate.distance_low || truth.distance > estimate.distance_high);
+        width += (estimate.confidence.speed_high - estimate.confidence.speed_low).as_m_per_s();
+        outside[0] += usize::from(truth.speed < guaranteed.speed_low || truth.speed > guaranteed.speed_high);
+        outside[1] += usize::from(
+            truth.distance < guaranteed.distance_low || truth.distance > guaranteed.distance_high,
+        );
         let off = estimate.distance - truth.distance;
         violations[0] += usize::from(error.abs() > speed_tolerance(truth.speed).as_m_per_s());
         violations[1] += usize::from(off.abs() > distance_tolerance(truth.distance));

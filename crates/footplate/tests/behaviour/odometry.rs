@@ -12,25 +12,61 @@ const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachome
 const RUNS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/runs.csv");
 
 /// The fields of every score, as docs/formats/odometry-result.md names them.
-const FIELDS: [&str; 11] = [
+const FIELDS: [&str; 15] = [
     "speed_rms_m_s",
     "speed_max_m_s",
     "distance_end_m",
     "distance_end_pct",
-    "speed_inside_pct",
-    "distance_inside_pct",
-    "speed_width_mean_m_s",
-    "distance_width_end_m",
+    "guaranteed_speed_inside_pct",
+    "guaranteed_distance_inside_pct",
+    "guaranteed_speed_width_m_s",
+    "guaranteed_distance_width_m",
+    "confidence_speed_inside_pct",
+    "confidence_distance_inside_pct",
+    "confidence_speed_width_m_s",
+    "confidence_distance_width_m",
     "etcs_speed_violation_pct",
     "etcs_distance_violation_pct",
     "scored",
 ];
 
-const HEADER: &str = "t_s,speed_m_s,speed_low_m_s,speed_high_m_s,accel_m_s2,distance_m,distance_low_m,distance_high_m,\
-                      over_m,under_m,wheel_1,wheel_2,mode,share_1,share_2,share_3";
+const HEADER: &str = "t_s,speed_m_s,confidence_speed_low_m_s,confidence_speed_high_m_s,guaranteed_speed_low_m_s,\
+                      guaranteed_speed_high_m_s,accel_m_s2,distance_m,confidence_distance_low_m,confidence_distance_high_m,\
+                      guaranteed_distance_low_m,guaranteed_distance_high_m,over_m,under_m,wheel_1,wheel_2,mode,share_1,share_2,share_3";
+
+const VEHICLE: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../footplate-store/vehicles/two-measured-wheelsets.toml");
 
 fn odometry(arguments: &[&str]) -> Run {
-    footplate(&[&["odometry"], arguments].concat())
+    footplate(&[&["odometry", "--vehicle", VEHICLE], arguments].concat())
+}
+
+#[test]
+fn without_a_vehicle_file_every_output_says_so_and_the_status_is_1() {
+    let said = "no vehicle file";
+    let table = footplate(&["odometry", PLAIN]);
+    assert!(table.status == 1 && table.output.starts_with("WARNING: no vehicle file"), "{}", table.output);
+    let json = footplate(&["odometry", PLAIN, "--json"]);
+    let read: Value = serde_json::from_str(&json.output).unwrap();
+    assert!(json.status == 1 && read["warnings"][0].as_str().unwrap().contains(said));
+    let rows = footplate(&["odometry", PLAIN, "--out", "-"]);
+    assert!(rows.status == 1 && rows.errors.contains(said) && !rows.output.contains(said));
+    assert_eq!(odometry(&[PLAIN]).status, 0);
+}
+
+#[test]
+fn a_train_faster_than_its_file_claims_is_reported() {
+    let folder = folder("odometry-claims");
+    let file =
+        std::fs::read_to_string(VEHICLE).unwrap().replace("max_speed_m_s = 70.0", "max_speed_m_s = 5.0");
+    let (vehicle, recording) = (folder.join("slow.toml"), folder.join("fast.csv"));
+    std::fs::write(&vehicle, file).unwrap();
+    // 15 pulses of 33.8 mm in 50 ms: 10.1 m/s.
+    let rows: String = (0..100).map(|period| format!("{},15,15\n", 0.05 * f64::from(period))).collect();
+    std::fs::write(&recording, format!("t_s,pulses_1,pulses_2\n{rows}")).unwrap();
+    let [vehicle, recording] = [vehicle, recording].map(|path| path.display().to_string());
+    let run = footplate(&["odometry", &recording, "--vehicle", &vehicle]);
+    assert!(run.status == 1 && run.output.contains("faster than max_speed_m_s"), "{}", run.output);
 }
 
 fn folder(name: &str) -> PathBuf {
@@ -54,7 +90,7 @@ fn json_carries_the_score_of_all_presets_and_baselines() {
         for baseline in ["raw_mean", "raw_max", "wheels_only"] {
             let theirs = &scored["baselines"][baseline];
             assert!(FIELDS[..4].iter().all(|field| theirs[*field].is_number()), "{theirs}");
-            assert!(theirs["speed_inside_pct"].is_null(), "it states no interval");
+            assert!(theirs["guaranteed_speed_inside_pct"].is_null(), "it states no interval");
         }
     }
     assert_eq!(score["runs"][0]["periods"], 40);
@@ -113,7 +149,7 @@ fn runs_are_independent_of_each_other() {
 #[test]
 fn a_live_input_is_answered_line_by_line() {
     let mut live = Command::new(env!("CARGO_BIN_EXE_footplate"))
-        .args(["odometry", "-", "--out", "-"])
+        .args(["odometry", "-", "--out", "-", "--vehicle", VEHICLE])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -169,6 +205,8 @@ fn wrong_input_is_named_and_ends_with_status_2() {
     wrong(&[PLAIN, "--out", "-", "--json"], "--out - fills standard output");
     wrong(&["-", "-"], "there is only one standard input");
     let vehicle = file("train.toml", "max_speed = 70\n");
-    wrong(&[PLAIN, "--vehicle", &vehicle], "train.toml, line 1, column 1");
+    let run = footplate(&["odometry", PLAIN, "--vehicle", &vehicle]);
+    assert_eq!((run.status, run.output.as_str()), (2, ""));
+    assert!(run.errors.contains("train.toml, line 1, column 1"), "{}", run.errors);
     wrong(&[PLAIN, "--out", "missing-folder/result.csv"], "writing missing-folder/result.csv");
 }

@@ -10,6 +10,9 @@ use crate::program::footplate;
 const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/plain.csv");
 const RUNS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/runs.csv");
 
+const VEHICLE: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../footplate-store/vehicles/two-measured-wheelsets.toml");
+
 /// Half of the last digit that a page has, and a little for the rounding of decimals.
 const HALF_DIGIT: f64 = 0.000_501;
 
@@ -22,7 +25,7 @@ fn folder(name: &str) -> PathBuf {
 
 /// The page of a recording, and the data in it.
 fn page(recording: &str, out: &Path) -> (String, Value) {
-    let run = footplate(&["odometry", recording, "--report", out.to_str().unwrap()]);
+    let run = footplate(&["odometry", "--vehicle", VEHICLE, recording, "--report", out.to_str().unwrap()]);
     assert_eq!(run.status, 0, "{}", run.errors);
     assert!(!run.output.contains("against the truth"), "a score is printed only if it is asked for");
     let html = fs::read_to_string(out).unwrap();
@@ -45,20 +48,23 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 fn a_page_is_read_in_german_where_that_is_asked_for() {
     let out = folder("german").join("page.html");
     let out = out.to_str().unwrap();
-    let run = footplate(&["odometry", PLAIN, "--report", out, "--language", "de"]);
+    let run = footplate(&["odometry", "--vehicle", VEHICLE, PLAIN, "--report", out, "--language", "de"]);
     assert_eq!(run.status, 0, "{}", run.errors);
     let html = fs::read_to_string(out).unwrap();
-    for word in ["lang=\"de\"", "Odometrie von plain.csv", "die Wahrheit hat die Grenzen verlassen"] {
+    for word in ["lang=\"de\"", "Odometrie von plain.csv", "die Wahrheit blieb in den Grenzen"] {
         assert!(html.contains(word), "{word}");
     }
-    assert_eq!(footplate(&["odometry", PLAIN, "--report", out, "--language", "fr"]).status, 2);
+    assert_eq!(
+        footplate(&["odometry", "--vehicle", VEHICLE, PLAIN, "--report", out, "--language", "fr"]).status,
+        2
+    );
 }
 
 #[test]
 fn lines_are_the_result_and_bounds_are_no_narrower() {
     let folder = folder("lines");
     let (_, data) = page(PLAIN, &folder.join("page.html"));
-    let result = footplate(&["odometry", PLAIN, "--out", "-"]).output;
+    let result = footplate(&["odometry", "--vehicle", VEHICLE, PLAIN, "--out", "-"]).output;
     let recording = fs::read_to_string(PLAIN).unwrap();
     let shown = |name: &str| numbers(&data["runs"][0]["lines"][name]);
     let gone = column(&recording, "true_distance_m");
@@ -80,10 +86,10 @@ fn lines_are_the_result_and_bounds_are_no_narrower() {
     };
     near(shown("error_m"), less_gone("distance_m"), "error");
     for (line, said, outwards) in [
-        ("speed_low_m_s", column(&result, "speed_low_m_s"), -1.0),
-        ("speed_high_m_s", column(&result, "speed_high_m_s"), 1.0),
-        ("error_low_m", less_gone("distance_low_m"), -1.0),
-        ("error_high_m", less_gone("distance_high_m"), 1.0),
+        ("confidence_speed_low_m_s", column(&result, "confidence_speed_low_m_s"), -1.0),
+        ("confidence_speed_high_m_s", column(&result, "confidence_speed_high_m_s"), 1.0),
+        ("guaranteed_error_low_m", less_gone("guaranteed_distance_low_m"), -1.0),
+        ("guaranteed_error_high_m", less_gone("guaranteed_distance_high_m"), 1.0),
     ] {
         for (row, (shown, said)) in shown(line).iter().zip(&said).enumerate() {
             let beyond = outwards * (shown - said);
@@ -143,7 +149,14 @@ fn a_long_recording_has_few_points_and_all_its_peaks() {
 #[test]
 fn a_page_that_cannot_be_written_is_an_error() {
     let folder = folder("missing");
-    let run = footplate(&["odometry", PLAIN, "--report", folder.join("none/page.html").to_str().unwrap()]);
+    let run = footplate(&[
+        "odometry",
+        "--vehicle",
+        VEHICLE,
+        PLAIN,
+        "--report",
+        folder.join("none/page.html").to_str().unwrap(),
+    ]);
     assert_eq!(run.status, 2);
     assert!(run.errors.contains("page.html"), "{}", run.errors);
 }

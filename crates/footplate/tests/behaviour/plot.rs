@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::program::{Run, footplate};
 
+const VEHICLE: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../footplate-store/vehicles/two-measured-wheelsets.toml");
 const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 /// What every file of pixels begins with (PNG specification, third edition, 5.2).
 const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
@@ -40,7 +42,7 @@ fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
     let folder = folder("odometry");
     let recording = format!("{TESTDATA}/tachometer/plain.csv");
     let svg = folder.join("run.svg");
-    assert_eq!(drawn(&["odometry", &recording], &svg).status, 0);
+    assert_eq!(drawn(&["odometry", "--vehicle", VEHICLE, &recording], &svg).status, 0);
     let expected = [
         "Odometry of plain.csv",
         "speed (m/s)",
@@ -51,9 +53,9 @@ fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
     ];
     says(&svg, &expected);
     let png = folder.join("run.png");
-    assert_eq!(drawn(&["odometry", &recording], &png).status, 0);
+    assert_eq!(drawn(&["odometry", "--vehicle", VEHICLE, &recording], &png).status, 0);
     assert_eq!(fs::read(&png).unwrap()[..8], PNG_SIGNATURE);
-    let run = drawn(&["odometry", &recording], &folder.join("run.gif"));
+    let run = drawn(&["odometry", "--vehicle", VEHICLE, &recording], &folder.join("run.gif"));
     assert_eq!(run.status, 2);
     assert!(run.errors.contains("should end with .svg or .png"), "{}", run.errors);
 }
@@ -68,7 +70,13 @@ fn speeds_and_stops_are_drawn_by_step() {
     assert_eq!(done.status, 0, "{}", done.errors);
     says(
         &svg,
-        &["Train 24 on track-a", "steady speed (mm/s)", "way to rest (mm)", "throttle step", "from below"],
+        &[
+            "Train 24 on track-a",
+            "steady speed (mm/s)",
+            "stopping distance (mm)",
+            "throttle step",
+            "from below",
+        ],
     );
     // Two trains are two pictures.
     let other = format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train74_run.csv");
@@ -94,7 +102,7 @@ fn speeds_and_stops_are_drawn_by_step() {
 }
 
 #[test]
-fn stops_measured_by_hand_are_drawn_with_their_law() {
+fn stops_measured_by_hand_are_drawn_beside_the_model() {
     let folder = folder("measure");
     let store = folder.join("railway.db");
     let log = |kind| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_{kind}.csv");
@@ -119,9 +127,9 @@ fn stops_measured_by_hand_are_drawn_with_their_law() {
         &[
             "Stops of train 24",
             "speed at the command (mm/s)",
-            "way to rest (mm)",
+            "stopping distance (mm)",
             "from step 8",
-            "law through all of them",
+            "motion model",
         ],
     );
 }

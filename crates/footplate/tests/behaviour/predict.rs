@@ -129,12 +129,24 @@ fn a_calibration_makes_the_first_lap_forecast_as_well_as_the_second() {
     std::fs::create_dir_all(&folder).expect("the test folder can be made");
     let calibration = folder.join("all.toml").display().to_string();
     let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
-    let made = footplate(&["calibrate", "--from", log, "--layout", "track-a", "--out", &calibration]);
+    let made = footplate(&[
+        "calibrate",
+        "--from",
+        log,
+        "--layout",
+        "track-a",
+        "--train",
+        "74",
+        "--out",
+        &calibration,
+    ]);
     assert_eq!(made.status, 0, "{}", made.errors);
     // when the log is walked with it and without,
     let p90 = |more: &[&str]| {
-        let done =
-            footplate(&[&["predict", log, "--layout", "track-a", "--summary", "--json"][..], more].concat());
+        let done = footplate(
+            &[&["predict", log, "--layout", "track-a", "--train", "74", "--summary", "--json"][..], more]
+                .concat(),
+        );
         assert_eq!(done.status, 0, "{}", done.errors);
         let score: serde_json::Value = serde_json::from_str(&done.output).expect("JSON");
         score["overall"]["p90_abs_mm"].as_f64().expect("a number")

@@ -1,10 +1,9 @@
 //! Simulated recordings of trains drawn from seeds that nothing was tuned on.
 
-use footplate_core::calibration::{Calibration, RunPassages, SectionIndex};
-use footplate_core::estimation::Predictor;
 use footplate_core::track::Layout;
-use footplate_core::{Timestamp, TrainId};
-use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
+use footplate_core::{Event, RunId, TrainId};
+use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording, SimulatedRun};
+use footplate_store::{Batch, Form, RawEvent, Recording, Run, TrainAtStart};
 
 pub(crate) const TRAIN: TrainId = TrainId(9);
 /// Seeds of the tests; tuning used those around 1000.
@@ -26,36 +25,21 @@ pub(crate) fn for_each(
     }
 }
 
-/// A predictor that has walked all runs, event by event.
-pub(crate) fn walked(layout: &Layout, recording: &SimulatedRecording) -> Predictor {
-    let mut predictor = Predictor::new(layout);
-    for run in &recording.runs {
-        predictor.begin_run(TRAIN, run.running_at);
-        for event in &run.events {
-            predictor.take(layout, event);
-        }
-    }
-    predictor.end_run();
-    predictor
-}
-
-/// The batch fit of all runs.
-pub(crate) fn fitted(
-    layout: &Layout,
-    sections: &SectionIndex,
-    recording: &SimulatedRecording,
-    walked: &Predictor,
-) -> Calibration {
-    let mut timing = walked.timing().clone();
-    timing.fit(Timestamp::ZERO);
-    let passages: Vec<RunPassages> = recording
-        .runs
-        .iter()
-        .enumerate()
-        .map(|(place, run)| {
-            let events = run.events.iter().map(|event| (event, false));
-            RunPassages::read(layout, TRAIN, run.running_at, place, events, &timing)
-        })
-        .collect();
-    Calibration::of(layout, sections, &passages).expect("runs at a settled speed")
+/// What recordings of one train teach.
+pub(crate) fn batch_of(layout: &Layout, recording: &SimulatedRecording) -> Batch {
+    let raw = |event: &Event| RawEvent { line: 0, event: *event };
+    let run = |(number, run): (usize, &SimulatedRun)| Run {
+        id: RunId(number as u32),
+        began_at: None,
+        trains: vec![TrainAtStart { train: TRAIN, step: run.running_at }],
+        events: run.events.iter().map(raw).collect(),
+        gates: Vec::new(),
+    };
+    let recording = Recording {
+        name: "simulated".to_owned(),
+        form: Form::SensorLog,
+        runs: recording.runs.iter().enumerate().map(run).collect(),
+        notes: Vec::new(),
+    };
+    Batch::of_recordings(layout, &[recording], None).expect("runs at a settled speed")
 }

@@ -4,15 +4,18 @@ use alloc::vec::Vec;
 
 use super::parameters::Answers;
 use super::segment::Told;
-use super::trip::{Trip, TripContact};
+use super::trip::{MeasuredRest, Trip, TripContact};
 use crate::calibration::SectionIndex;
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
+use crate::units::Length;
 
 /// A poll whose interval nobody recorded: a slow 6051.
 const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
+/// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
+const BETWEEN_RUNS: f64 = 60.0;
 /// Contacts that may stay silent in a row before the way is no longer believed.
 const BELIEVED_MISSED: usize = 2;
 
@@ -21,7 +24,13 @@ const BELIEVED_MISSED: usize = 2;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Chain {
     pub(super) trips: Vec<Trip>,
+    /// The recording's clock, and the seconds of this chain that its first entry has.
     origin: Option<Timestamp>,
+    begins: f64,
+    /// Seconds of the latest entry.
+    latest: f64,
+    /// Whether the train is known to be at rest, because its run begins so.
+    at_rest: bool,
     step: u8,
     above: bool,
     /// The contact passed last.
@@ -33,7 +42,18 @@ pub(super) struct Chain {
 
 impl Chain {
     fn seconds(&mut self, time: Timestamp) -> f64 {
-        (time - *self.origin.get_or_insert(time)).as_s()
+        let seconds = self.begins + (time - *self.origin.get_or_insert(time)).as_s();
+        self.latest = self.latest.max(seconds);
+        seconds
+    }
+
+    /// A run begins in which the train has been running steadily at `step`, or is at rest at step 0. Its clock has
+    /// nothing to do with that of the run before.
+    pub(super) fn begin_run(&mut self, step: SpeedStep) {
+        self.interrupt();
+        self.origin = None;
+        self.begins = self.latest + BETWEEN_RUNS;
+        (self.step, self.above, self.at_rest) = (step.get(), false, step == SpeedStep::STAND);
     }
 
     /// Breaks the chain: where the train is now has nothing to do with where it was.
@@ -50,7 +70,9 @@ impl Chain {
         if to == from {
             return;
         }
-        let at_rest = from == 0 && self.trips.last().is_none_or(|trip| trip.rests_at(answers) <= sent);
+        let at_rest = from == 0
+            && (self.at_rest || self.trips.last().is_none_or(|trip| trip.rests_at(answers) <= sent));
+        self.at_rest = false;
         if from == 0 && (at_rest || self.trips.is_empty()) {
             if let Some(last) = self.trips.last_mut().filter(|_| self.unbroken) {
                 last.came_to_rest = true;
@@ -83,7 +105,7 @@ impl Chain {
         }
         let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs().as_s();
         let time = self.seconds(event.time) - 0.5 * interval;
-        if self.step == 0 && self.trips.is_empty() {
+        if self.step == 0 && (self.at_rest || self.trips.is_empty()) {
             return;
         }
         let way = self
@@ -100,8 +122,38 @@ impl Chain {
         let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
             (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
         });
-        trip.pass(TripContact { time, variance: interval * interval / 12.0, way: length, sections });
+        trip.pass(TripContact { node, time, variance: interval * interval / 12.0, way: length, sections });
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
+    }
+
+    /// A person measured how far past a sensor the train came to rest.
+    pub(super) fn measure_rest(
+        &mut self,
+        layout: &Layout,
+        index: &SectionIndex,
+        turnouts: &TurnoutStates,
+        landmark: SensorId,
+        offset: Length,
+    ) {
+        let Some(node) = layout.sensor_node(landmark).filter(|_| self.step == 0 && self.unbroken) else {
+            return;
+        };
+        let at = self.at;
+        let Some(trip) = self.trips.last_mut() else { return };
+        let passed = trip.contacts.iter().rposition(|contact| contact.node == node);
+        let beyond = (offset.as_m(), Vec::new());
+        let (contacts, (beyond, sections)) = match passed {
+            Some(place) => (place + 1, beyond),
+            None => {
+                let Some(reach) = at.and_then(|from| reach_of(layout, turnouts, from, landmark)) else {
+                    return;
+                };
+                let sections = reach.hops().iter().filter_map(|hop| index.section(*hop)).collect();
+                (trip.contacts.len(), (reach.length.as_m() + offset.as_m(), sections))
+            }
+        };
+        trip.came_to_rest = true;
+        trip.measured = Some(MeasuredRest { contacts, beyond, sections });
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) const LATER: usize = 4;
 const STEPS: usize = 6;
 /// Who keeps to a pace changes between three steps, each reached from below and from above.
 const STEPS_KEPT: usize = 6;
-pub(super) const N: usize = STEPS + STEPS_KEPT;
+pub(crate) const N: usize = STEPS + STEPS_KEPT;
 
 /// Commands that can wait for their effect: more than a line carries within a start's delay.
 const MOST_PENDING: usize = 6;
@@ -41,6 +41,8 @@ pub(crate) struct Course {
     pub(super) segment: Segment,
     /// What the segment is an answer to.
     pub(super) step: u8,
+    /// Whether its speed was reached from above.
+    is_above: bool,
     /// `b`, `ε`, `η`, `ζ`, `τ` and `s`.
     pub(super) x: [f64; N],
     /// Which steps `s` are of, and whether reached from above; the one that will be replaced next, and the letter of the one
@@ -61,6 +63,7 @@ impl Course {
         Self {
             segment: Segment::steady(time, 0.0),
             step: 0,
+            is_above: false,
             x: core::array::from_fn(|letter| if letter == B { place } else { 0.0 }),
             met: [(0, false); STEPS_KEPT],
             oldest: 0,
@@ -70,6 +73,12 @@ impl Course {
             slower: 0.0,
             pending: [None; MOST_PENDING],
         }
+    }
+
+    /// Running steadily at a step for long.
+    pub(super) fn running(model: &MotionModel, time: f64, step: u8, place: f64) -> Self {
+        let speed = model.answers().speed(usize::from(step), false);
+        Self { segment: Segment::steady(time, speed), step, ..Self::at_rest(time, place) }
     }
 
     /// The step told last, whether it has taken effect or not.
@@ -121,7 +130,7 @@ impl Course {
         self.x[B] = way;
         self.segment = Segment::of(&told, &model.answers(), pace);
         self.segment.begins = begins;
-        self.step = told.to;
+        (self.step, self.is_above) = (told.to, told.above());
         for letter in [H, Z] {
             self.x[letter] = 0.0;
         }
@@ -180,6 +189,17 @@ impl Course {
         self.x[B] = way;
         self.segment = Segment::steady(time, self.segment.to);
         self.slower = 0.0;
+    }
+
+    /// The model was exchanged. Of a steady run the speed is now what the model says; returns by which factor it is faster.
+    pub(super) fn exchange(&mut self, model: &MotionModel) -> f64 {
+        let before = self.segment.to;
+        let after = model.answers().speed(usize::from(self.step), self.is_above);
+        if !self.segment.is_steady() || before <= 0.0 || after <= 0.0 {
+            return 1.0;
+        }
+        self.segment = Segment::steady(self.segment.begins, after);
+        after / before
     }
 
     /// By how much way the change under way differs from its law once it is done.

@@ -1,8 +1,10 @@
 //! From the solution of a fit to a model.
 
-use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 use super::model::{Counts, MotionModel};
+use super::parameters::{DOWN, SPEEDS, START_DELAY, UP};
+use super::scatter::ScatterSums;
 use super::spread::Spread;
 use super::trip::Trip;
 use super::unknowns::Columns;
@@ -10,57 +12,90 @@ use crate::linalg::Solution;
 use crate::time::Timestamp;
 
 impl MotionModel {
-    /// Takes over what a fit found.
+    /// Takes over what a fit found; `scale` is how well the scale of the survey is known, where the fit counted it as right.
     pub(super) fn learn(
         &mut self,
         columns: &Columns,
-        x: &[f64],
+        lasting: &[f64],
         solution: &Solution,
-        scatter_scale: f64,
-        trips: &[Trip],
+        scale: Option<f64>,
+        scatter: ScatterSums,
         date: Timestamp,
     ) {
         let steps = self.steps();
         let numbers = super::parameters::count(steps);
-        self.values = x.get(..numbers).unwrap_or_default().to_vec();
-        self.spread = Spread::of(solution, steps);
-        self.sections = columns
-            .sections
-            .iter()
-            .map(|(section, column)| {
-                (*section, (x.get(*column).copied().unwrap_or(0.0), solution.variance(*column)))
-            })
-            .collect::<BTreeMap<_, _>>();
-        self.scatter_scale = scatter_scale;
+        self.values = lasting.get(..numbers).unwrap_or_default().to_vec();
+        let sections: Vec<usize> = columns.sections.values().copied().collect();
+        (self.spread, self.scale) = Spread::of(solution, steps, &sections);
+        if let Some(deviation) = scale {
+            self.scale = by_scale(&self.values, steps).map(|slope| slope * deviation).collect();
+        }
+        let with_total = |column: usize| solution.covariance_with_sum(column, &sections);
+        let total: f64 = sections.iter().map(|column| with_total(*column)).sum();
+        let known = |column: usize| {
+            let with_total = with_total(column);
+            let by_total = if total > 0.0 { with_total * with_total / total } else { 0.0 };
+            let longer = lasting.get(column).copied().unwrap_or(0.0);
+            (longer, (solution.variance(column) - by_total).max(0.0))
+        };
+        self.sections = columns.sections.iter().map(|(section, column)| (*section, known(*column))).collect();
+        (self.scatter_scale, self.start_scale) = scatter.scales();
         self.date = date;
-        for counts in &mut self.counts {
-            *counts = [Counts::default(); 2];
-        }
+    }
+
+    /// Counts again what was measured: before the trips that are kept, and in them.
+    pub(super) fn recount(&mut self, before: &[[Counts; 2]], trips: &[Trip]) {
+        self.counts.clear();
+        self.counts.extend_from_slice(before);
         for trip in trips {
-            self.count(trip);
+            count(&mut self.counts, trip);
         }
     }
+}
 
-    fn count(&mut self, trip: &Trip) {
-        let mut told = trip.told.iter().peekable();
-        let mut now = trip.running.unwrap_or((0, false));
-        for contact in &trip.contacts {
-            while let Some(next) = told.next_if(|next| next.sent <= contact.time) {
-                now = (next.to, next.above());
-            }
-            if let Some(counts) = self.counts_mut(now) {
-                counts.contacts += 1;
-            }
+/// How each number changes with ln of the scale by which lengths are measured.
+fn by_scale(values: &[f64], steps: usize) -> impl Iterator<Item = f64> + '_ {
+    let speeds = SPEEDS..SPEEDS + steps;
+    values.iter().enumerate().map(move |(place, value)| {
+        // Of delay, lag, κ and ρ all are times but κ, which is a time by speed.
+        let of_change =
+            [UP, DOWN].into_iter().find_map(|first| place.checked_sub(first).filter(|of| *of < 4));
+        match of_change {
+            Some(KAPPA) => -value,
+            Some(_) => 0.0,
+            None if place == START_DELAY => 0.0,
+            None if speeds.contains(&place) => 1.0,
+            None => *value,
         }
-        if let ([.., before, last], true) = (trip.told.as_slice(), trip.came_to_rest)
-            && last.to == 0
-            && let Some(counts) = self.counts_mut((before.to, before.above()))
+    })
+}
+
+/// Place of `κ` among the numbers of a direction.
+const KAPPA: usize = 2;
+
+/// Counts what was measured in one trip, by step and approach.
+pub(super) fn count(counts: &mut [[Counts; 2]], trip: &Trip) {
+    let mut at = |(step, above): (u8, bool), add: &dyn Fn(&mut Counts)| {
+        if let Some(slot) =
+            counts.get_mut(usize::from(step)).and_then(|both| both.get_mut(usize::from(above)))
         {
-            counts.stops += 1;
+            add(slot);
         }
+    };
+    let mut told = trip.told.iter().peekable();
+    let mut now = trip.running.unwrap_or((0, false));
+    for contact in &trip.contacts {
+        while let Some(next) = told.next_if(|next| next.sent <= contact.time) {
+            now = (next.to, next.above());
+        }
+        at(now, &|counts| counts.contacts += 1);
     }
-
-    fn counts_mut(&mut self, (step, above): (u8, bool)) -> Option<&mut Counts> {
-        self.counts.get_mut(usize::from(step))?.get_mut(usize::from(above))
+    if let ([.., last], true) = (trip.told.as_slice(), trip.came_to_rest)
+        && last.to == 0
+    {
+        let before = trip.told.iter().rev().nth(1).map(|told| (told.to, told.above())).or(trip.running);
+        if let Some(before) = before {
+            at(before, &|counts| counts.stops += 1);
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! experiments are planned and stops are promised. It is made by [`MotionFit`] from everything the train did so far:
 //! not from experiments of a set form, but from the one chain of commands and contacts that any driving is.
 
+mod arrival;
 #[cfg(feature = "serde")]
 mod bits;
 mod chain;
@@ -12,7 +13,9 @@ mod decoder_kind;
 mod doubts;
 mod fit;
 mod follow;
+mod hindsight;
 mod learn;
+mod marginal_prior;
 mod model;
 mod numbers;
 mod objective;
@@ -20,21 +23,26 @@ mod parameters;
 mod priors;
 mod prospect;
 mod rescaled;
+mod robust;
 mod rows;
 mod scatter;
 mod segment;
 mod spread;
+#[cfg(feature = "serde")]
+mod square;
 mod standing_times;
 mod trip;
 mod unknowns;
+mod variation;
 
-pub(crate) use course::Course;
+pub(crate) use arrival::Arrival;
+pub(crate) use course::{Course, N as MOTION_LETTERS};
 pub use fit::MotionFit;
 pub(crate) use follow::{Following, Guess, INTERRUPTED};
 pub use model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;
-pub(crate) use priors::FELT;
+pub(crate) use priors::{FELT, section_variance};
 pub use prospect::Prospect;
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use standing_times::StandingTimes;

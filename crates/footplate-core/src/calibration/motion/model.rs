@@ -5,10 +5,11 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
-use super::priors::section_variance;
+use super::priors::{LATE_START, section_variance};
 use super::scatter::usual_scatter;
 use super::segment::{Pace, Segment, Told};
 use super::spread::Spread;
+use super::variation::Variation;
 use crate::calibration::SectionIndex;
 use crate::estimate::Estimate;
 use crate::event::Approach;
@@ -60,8 +61,11 @@ pub struct MotionModel {
     uses: Vec<StepUse>,
     /// Contacts passed and stops made at each step, from below and from above.
     pub(super) counts: Vec<[Counts; 2]>,
-    /// How far stops scatter against what trains usually do.
+    /// How far stops scatter against what trains usually do, and how late or early starts are.
     pub(super) scatter_scale: f64,
+    pub(super) start_scale: f64,
+    /// What each number is off by for one standard deviation of the survey's scale.
+    pub(super) scale: Vec<f64>,
     pub(super) date: Timestamp,
 }
 
@@ -90,6 +94,8 @@ impl MotionModel {
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
             scatter_scale: 1.0,
+            start_scale: 1.0,
+            scale: vec![0.0; super::parameters::count(steps)],
             date: Timestamp::ZERO,
         }
     }
@@ -132,7 +138,7 @@ impl MotionModel {
         let speed = |answers: &Answers<'_>| answers.speed(place, above);
         Estimate {
             value: Speed::from_m_per_s(speed(&self.answers())),
-            uncertainty: Speed::from_m_per_s(self.deviation(speed)),
+            uncertainty: Speed::from_m_per_s(self.deviation_with_scale(speed)),
             count: self.counts_at(step, approach).contacts,
             date: self.date,
         }
@@ -144,9 +150,26 @@ impl MotionModel {
         Speed::from_m_per_s(self.answers().speed(usize::from(step.get()), above))
     }
 
-    /// One standard deviation of what follows from the model's numbers, by its slopes.
-    pub(super) fn deviation(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
-        self.spread.deviation(&self.values, self.steps(), of)
+    /// One standard deviation of what follows from the model's numbers, in the measure of a tape: the scale of the survey
+    /// may be off, too.
+    fn deviation_with_scale(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
+        let slopes = self.spread.slopes(&self.values, self.steps(), of);
+        let by_scale: f64 =
+            slopes.iter().filter_map(|(place, slope)| Some(slope * self.scale.get(*place)?)).sum();
+        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), by_scale)
+    }
+
+    /// The model with what may have changed by another session: what a measurement of today promises for tomorrow.
+    #[must_use]
+    pub fn for_later_session(&self) -> Self {
+        let mut later = self.clone();
+        later.spread.widen(&Variation::between_sessions(), self.steps());
+        later
+    }
+
+    /// One standard deviation (s) by which starts from rest are late or early.
+    pub(crate) fn start_scatter(&self) -> f64 {
+        self.start_scale * LATE_START
     }
 
     /// What experience says of a step.
@@ -176,7 +199,7 @@ impl MotionModel {
         let speed = self.answers().speed(usize::from(step.get()), above);
         StopForecast {
             distance: Length::from_m(distance.max(0.0)),
-            doubt: Length::from_m(self.deviation(|answers| stop(answers).0)),
+            doubt: Length::from_m(self.deviation_with_scale(|answers| stop(answers).0)),
             scatter: Length::from_m(self.scatter(speed)),
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
             count: self.counts_at(step, approach).stops,
@@ -209,13 +232,18 @@ impl MotionModel {
         [Length::from_m(length), Length::from_m(libm::sqrt(variance.max(0.0)))]
     }
 
+    /// The sections that it ran over: by how much they are longer than surveyed (m), with the variance.
+    pub fn sections(&self) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
+        self.sections.iter().map(|(section, (longer, variance))| (*section, *longer, *variance))
+    }
+
     /// Another estimate of by how much a section is longer than surveyed (m), with the variance.
     pub(crate) fn set_section(&mut self, section: usize, longer: f64, variance: f64) {
         self.sections.insert(section, (longer, variance));
     }
 
     /// By how much a section is longer than surveyed (m), with the variance.
-    pub(super) fn section(&self, section: usize) -> Option<(f64, f64)> {
+    pub(crate) fn section(&self, section: usize) -> Option<(f64, f64)> {
         self.sections.get(&section).copied()
     }
 

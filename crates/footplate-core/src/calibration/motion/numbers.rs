@@ -28,6 +28,10 @@ pub struct MotionNumbers {
     pub counts: Vec<[(u32, u32); 2]>,
     /// How far stops scatter against what trains usually do.
     pub scatter_scale: f64,
+    /// How late or early starts are against what trains usually do.
+    pub start_scale: f64,
+    /// What each number is off by for one standard deviation of the survey's scale.
+    pub scale: Vec<f64>,
     /// When the newest event was.
     pub date: Timestamp,
 }
@@ -82,6 +86,8 @@ impl MotionModel {
             uses: steps.map(|step| self.uses(step)).collect(),
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
             scatter_scale: self.scatter_scale,
+            start_scale: self.start_scale,
+            scale: self.scale.clone(),
             date: self.date,
         }
     }
@@ -96,6 +102,7 @@ impl MotionModel {
         let steps = usize::from(numbers.highest.get()) + 1;
         let counts = [
             ("numbers", side, numbers.values.len()),
+            ("parts of the scale", side, numbers.scale.len()),
             ("covariances", side * (side + 1) / 2, numbers.covariance.len()),
             ("uses of steps", steps, numbers.uses.len()),
             ("counts of steps", steps, numbers.counts.len()),
@@ -106,7 +113,7 @@ impl MotionModel {
             }
         }
         let wrong = |what| Err(NumbersError::NoNumber { what });
-        if !numbers.values.iter().all(|value| value.is_finite()) {
+        if !numbers.values.iter().chain(&numbers.scale).all(|value| value.is_finite()) {
             return wrong("numbers");
         }
         // The n-th of the diagonal ends the n-th row.
@@ -123,7 +130,8 @@ impl MotionModel {
         if !sections().all(is_section) {
             return wrong("sections");
         }
-        if !numbers.scatter_scale.is_finite() || numbers.scatter_scale < 0.0 {
+        if [numbers.scatter_scale, numbers.start_scale].iter().any(|scale| !scale.is_finite() || *scale < 0.0)
+        {
             return wrong("scatters");
         }
         model.values.clone_from(&numbers.values);
@@ -140,6 +148,8 @@ impl MotionModel {
             .map(|both| both.map(|(contacts, stops)| Counts { contacts, stops }))
             .collect();
         model.scatter_scale = numbers.scatter_scale;
+        model.start_scale = numbers.start_scale;
+        model.scale.clone_from(&numbers.scale);
         model.date = numbers.date;
         Ok(model)
     }

@@ -97,11 +97,15 @@ pub(super) fn prior_means(highest: usize) -> Vec<f64> {
     means
 }
 
+/// Speed (m/s) of a node.
+pub(super) const fn node_speed(node: usize) -> f64 {
+    NODE_SPACING * (node + 1) as f64
+}
+
 /// Covariance of the nodes of what laws leave over: nodes of like speeds are alike.
 pub(super) fn node_covariance(i: usize, j: usize) -> f64 {
-    let speed = |node: usize| NODE_SPACING * (node + 1) as f64;
-    let size = |node: usize| RESIDUAL_FLOOR + RESIDUAL_BY_SPEED * speed(node).min(0.5);
-    let apart = (speed(i) - speed(j)) / RESIDUAL_LENGTH;
+    let size = |node: usize| RESIDUAL_FLOOR + RESIDUAL_BY_SPEED * node_speed(node).min(0.5);
+    let apart = (node_speed(i) - node_speed(j)) / RESIDUAL_LENGTH;
     // A hundredth of its own keeps the matrix well conditioned.
     let own = if i == j { 1.01 } else { 1.0 };
     own * size(i) * size(j) * libm::exp(-0.5 * apart * apart)

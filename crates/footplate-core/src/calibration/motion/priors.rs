@@ -3,21 +3,15 @@
 use alloc::vec::Vec;
 
 use super::parameters::{
-    BEND, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, hysteresis_at, node_covariance, speed_at,
-    speed_prior,
+    BEND, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, count, hysteresis_at, node_covariance,
+    speed_at, speed_prior,
 };
-use super::trip::Trip;
-use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
 use crate::linalg::NormalEquations;
 
-/// How well the total of all sections run over counts as the survey has it (m).
-const TOTAL: f64 = 0.001;
 /// A train feels a hop up to some per cent longer or shorter than it is, for curves and slopes (published section
 /// means: 1 to 3 %).
 pub(crate) const FELT: f64 = 0.02;
-/// Where a chain begins nobody knows to some metres.
-const ANYWHERE: f64 = 10.0;
 /// A start is late or early by a tenth of its delay (seen on trains that need 0.5 to 1 s to stir).
 pub(crate) const LATE_START: f64 = 0.06;
 /// Repeats of a run differ by 0.3 to 0.8 %, ...
@@ -34,7 +28,7 @@ const LEAST_CHANGE_ERROR: f64 = 0.001;
 const USUAL_DELAY: f64 = 0.8;
 
 /// Variance beforehand of what a section is longer than its survey (m²).
-pub(super) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
+pub(crate) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
     let felt = FELT * sections.surveyed_length(section);
     sections.survey_variance(section) + felt * felt
 }
@@ -44,54 +38,9 @@ pub(super) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
 }
 
-/// Sums of numbers that are known beforehand, each give or take.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Priors {
-    rows: Vec<Known>,
-}
-
-/// The sum of numbers times slopes is `value`, give or take.
-#[derive(Debug, Clone)]
-struct Known {
-    terms: Vec<(usize, f64)>,
-    value: f64,
-    variance: f64,
-}
-
-impl Known {
-    fn cost(&self, x: &[f64]) -> f64 {
-        let sum: f64 = self.terms.iter().map(|(column, slope)| slope * at(x, *column)).sum();
-        (sum - self.value) * (sum - self.value) / self.variance
-    }
-}
-
-impl Priors {
-    fn add(&mut self, terms: &[(usize, f64)], value: f64, variance: f64) {
-        self.rows.push(Known { terms: terms.to_vec(), value, variance });
-    }
-
-    /// Adds all of them.
-    pub(super) fn add_to(&self, equations: &mut NormalEquations) {
-        for known in &self.rows {
-            equations.add(&known.terms, known.value, known.variance);
-        }
-    }
-
-    /// The sum of squares, over variances, by which numbers miss them.
-    pub(super) fn cost(&self, x: &[f64]) -> f64 {
-        self.rows.iter().map(|known| known.cost(x)).sum()
-    }
-}
-
-/// All of it.
-pub(super) fn priors(
-    columns: &Columns,
-    trips: &[Trip],
-    sections: &SectionIndex,
-    x: &[f64],
-    highest: usize,
-) -> Priors {
-    let mut equations = Priors::default();
+/// What is known of the numbers of any train: the equations that a fit begins with.
+pub(super) fn prior(highest: usize) -> NormalEquations {
+    let mut equations = NormalEquations::new(count(highest));
     for (column, (mean, deviation)) in PRIOR.iter().enumerate() {
         equations.add(&[(column, 1.0)], *mean, deviation * deviation);
     }
@@ -112,48 +61,11 @@ pub(super) fn priors(
         let terms = [(speed_at(step + 1), 1.0), (speed_at(step), -2.0), (speed_at(step - 1), 1.0)];
         equations.add(&terms, usual, deviation * deviation);
     }
-    for (section, column) in &columns.sections {
-        equations.add(&[(*column, 1.0)], 0.0, section_variance(sections, *section));
-    }
-    // Speeds and lengths could all be longer by the same part, and no timing would tell. The survey's total is the
-    // measure: all that is asked of a model, where a train comes to rest, is the same in any.
-    let all: Vec<(usize, f64)> = columns.sections.values().map(|column| (*column, 1.0)).collect();
-    if !all.is_empty() {
-        equations.add(&all, 0.0, TOTAL * TOTAL);
-    }
-    for (place, trip) in trips.iter().enumerate() {
-        if !trip.continues {
-            equations.add(&[(columns.place(place), 1.0)], 0.0, ANYWHERE * ANYWHERE);
-        }
-        equations.add(&[(columns.late_start(place), 1.0)], 0.0, LATE_START * LATE_START);
-        for piece in 0..trip.pieces.len() {
-            let own = (columns.deviation(place, piece), 1.0);
-            if piece == 0 {
-                equations.add(&[own], 0.0, TRIP_DEVIATION * TRIP_DEVIATION);
-            } else {
-                let before = (columns.deviation(place, piece - 1), -1.0);
-                equations.add(&[own, before], 0.0, WANDER * WANDER);
-            }
-        }
-        for (told, command) in trip.told.iter().enumerate() {
-            // Starts and stops have residuals of their own, by speed.
-            let is_end = command.to == 0 || command.at_rest;
-            let speed =
-                |step: u8| if step == 0 { 0.0 } else { libm::exp(at(x, speed_at(usize::from(step)))) };
-            let change = if is_end { 0.0 } else { speed(command.to) - speed(command.from) };
-            let error = change_error(change);
-            equations.add(&[(columns.change(place, trip, told), 1.0)], 0.0, error * error);
-        }
-    }
     equations
 }
 
-fn at(x: &[f64], column: usize) -> f64 {
-    x.get(column).copied().unwrap_or(0.0)
-}
-
 /// The nodes of what a law leaves over, alike where their speeds are: rows of the inverse of the covariance's root.
-fn add_nodes(equations: &mut Priors, first: usize) {
+fn add_nodes(equations: &mut NormalEquations, first: usize) {
     for (node, terms) in whitened().iter().enumerate() {
         let terms: Vec<(usize, f64)> =
             terms.iter().take(node + 1).enumerate().map(|(i, weight)| (first + i, *weight)).collect();

@@ -1,19 +1,44 @@
-//! What each contact and each stop of a trip says of the numbers, as linear equations about a point.
+//! What each sensor passed, each stop and each tape of a trip says of the numbers, as linear equations about a point.
 #![expect(clippy::indexing_slicing, reason = "columns are counted before the vectors are made by that count")]
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::decoder_kind::SHAPE_ERROR;
-use super::parameters::{Answers, SPEEDS, hysteresis_at, speed_at};
+use super::parameters::{
+    Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
+};
+use super::priors::{FELT, LATE_START, TRIP_DEVIATION, WANDER, change_error};
+use super::robust::Belief;
 use super::scatter::usual_scatter;
 use super::segment::Segment;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
 
-/// Contacts close a little earlier or later from one passage to the next (m).
-const CONTACT_SCATTER: f64 = 0.0015;
-/// What a tape or the train's own settling leaves of a place of rest (m).
+/// Sensors trip a little earlier or later from one passage to the next (m).
+const SENSOR_SCATTER: f64 = 0.0015;
+/// A tape read to the centimetre beside a train: one standard deviation (m).
+const TAPE: f64 = 0.005;
+/// What the train's own settling leaves of a place of rest (m).
 const REST_SCATTER: f64 = 0.0005;
+/// By how much the error of a law's shape counts more than that of one change: it is the same in every change of the kind, of
+/// which some ten are kept, and does not become less with their number (√10).
+const SYSTEMATIC: f64 = 3.2;
+/// Where a chain begins is known to some metres.
+const ANYWHERE: f64 = 10.0;
+
+/// What an equation comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A sensor passed, or a tape.
+    Sensor,
+    /// A stop: the next trip begins where this one came to rest.
+    Stop,
+    /// What is usual of a start from rest.
+    Start,
+    /// What is usual of a trip's other numbers.
+    Usual,
+}
 
 /// One linear equation: `residual + Σ slope·Δ = 0`, give or take.
 #[derive(Debug, Clone)]
@@ -21,147 +46,243 @@ pub(super) struct Linear {
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) residual: f64,
     pub(super) variance: f64,
-    pub(super) is_stop: bool,
+    pub(super) source: Source,
 }
-
-/// Residuals beyond this many standard deviations count linearly (Huber, 1964).
-const HUBER: f64 = 2.5;
 
 impl Linear {
     fn size(&self) -> f64 {
         self.residual.abs() / libm::sqrt(self.variance)
     }
 
+    /// How far it is believed; in full for what is only usual.
+    fn belief(&self, believes_all: bool) -> Option<Belief> {
+        match self.source {
+            _ if believes_all => None,
+            Source::Usual => None,
+            Source::Sensor => Some(Belief::SENSORS),
+            Source::Stop | Source::Start => Some(Belief::STOPS),
+        }
+    }
+
     /// How much it counts.
     pub(super) fn weight(&self, believes_all: bool) -> f64 {
-        if believes_all { 1.0 } else { (HUBER / self.size()).min(1.0) }
+        self.belief(believes_all).map_or(1.0, |belief| belief.weight(self.size()))
     }
 
     /// What its residual costs.
     pub(super) fn cost(&self, believes_all: bool) -> f64 {
         let size = self.size();
-        if believes_all || size <= HUBER { size * size } else { HUBER * (2.0 * size - HUBER) }
+        self.belief(believes_all).map_or(size * size, |belief| belief.cost(size))
     }
 }
 
-/// Steps of the numerical derivatives, in the unit of each number: small against its doubt.
-fn step_of(column: usize) -> f64 {
-    if column < SPEEDS { 1e-4 } else { 1e-5 }
-}
+/// Steps of the numerical derivatives, in the unit of each number: small against its uncertainty.
+const STEP: f64 = 1e-4;
 
-/// What a trip comes to with some numbers: way (m) at each contact, and at rest; speed and doubt of the law besides.
+/// What a trip comes to with some numbers: distance (m) at each sensor, and at rest.
 struct Outcome {
-    ways: Vec<f64>,
+    at: Vec<f64>,
     rest: f64,
 }
 
 fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) -> Outcome {
     trip.segments(answers, own, segments);
     let mut walk = Walk::new(trip, own, segments);
-    let ways = trip.contacts.iter().map(|contact| walk.way(contact.time)).collect();
-    Outcome { ways, rest: walk.way_to_rest() }
+    let at = trip.contacts.iter().map(|contact| walk.way(contact.time)).collect();
+    Outcome { at, rest: walk.way_to_rest() }
 }
 
-/// A point about which equations are made straight.
+/// What is common to the trips of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point<'p> {
-    pub(super) trips: &'p [Trip],
     pub(super) columns: &'p Columns,
-    pub(super) x: &'p [f64],
+    /// The numbers that last.
+    pub(super) lasting: &'p [f64],
     pub(super) highest: usize,
-    /// How far stops scatter against what trains usually do.
-    pub(super) scale: f64,
+    /// How far stops and starts scatter against what trains usually do.
+    pub(super) stop_scale: f64,
+    pub(super) start_scale: f64,
     /// Part of a stop's displacement by which its shape is not true in its middle.
     pub(super) stop_shape_error: f64,
 }
 
+/// A trip and what was found of it, beside where the next one begins if it continues there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TripAt<'t> {
+    pub(super) trip: &'t Trip,
+    pub(super) own: &'t Own,
+    pub(super) next_place: Option<f64>,
+}
+
 impl Point<'_> {
-    /// The equations of all trips; without slopes they only tell how far off the point is.
-    pub(super) fn rows(&self, with_slopes: bool) -> Vec<Linear> {
-        let mut rows = Vec::new();
-        for place in 0..self.trips.len() {
-            trip_rows(self, place, with_slopes, &mut rows);
+    /// Steady speed (m/s) of a step from below.
+    pub(super) fn speed(&self, step: u8) -> f64 {
+        let step = usize::from(step).min(self.highest);
+        if step == 0 { 0.0 } else { libm::exp(self.lasting[speed_at(step)]) }
+    }
+
+    /// A trip's distance to rest from where it began (m), and to the first sensor.
+    pub(super) fn reach(&self, trip: &Trip, own: &Own) -> (f64, Option<f64>) {
+        let mut segments = Vec::new();
+        let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
+        (outcome.rest, outcome.at.first().copied())
+    }
+
+    /// By how much the sections passed are longer than surveyed (m), and the terms of that.
+    fn longer<'s>(&self, sections: impl Iterator<Item = &'s usize>) -> (f64, Vec<(usize, f64)>) {
+        let mut terms: Vec<(usize, f64)> = Vec::new();
+        for column in sections.filter_map(|section| self.columns.sections.get(section)) {
+            add_term(&mut terms, *column, 1.0);
+        }
+        (terms.iter().map(|(column, slope)| slope * self.lasting[*column]).sum(), terms)
+    }
+
+    /// The equations of a trip; without slopes they only tell how far off the point is.
+    pub(super) fn rows(&self, at: TripAt<'_>, with_slopes: bool) -> Vec<Linear> {
+        let TripAt { trip, own, next_place } = at;
+        let columns = self.columns;
+        let mut rows = self.usual(trip, own);
+        let mut segments = Vec::new();
+        let here = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
+        let errors = errors(trip, own, &segments, self.stop_shape_error);
+        let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
+        let stop_step = trip.step_of(segments.len().saturating_sub(1));
+        let slopes = if with_slopes { self.slopes(trip, own, &segments) } else { Vec::new() };
+        let terms_of = |of: &dyn Fn(&Outcome) -> f64| {
+            let mut terms = vec![(columns.place(), 1.0)];
+            terms.extend(
+                slopes
+                    .iter()
+                    .map(|(column, other)| (*column, (of(other) - of(&here)) / STEP))
+                    .filter(|(_, slope)| *slope != 0.0),
+            );
+            terms
+        };
+        let row = |terms, residual, variance, source| Linear { terms, residual, variance, source };
+        let mut surveyed = 0.0;
+        for (index, contact) in trip.contacts.iter().enumerate() {
+            surveyed += contact.way;
+            let passed = trip.contacts.iter().take(index + 1).flat_map(|contact| &contact.sections);
+            let (longer, sections) = self.longer(passed);
+            let mut terms = terms_of(&|outcome| outcome.at[index]);
+            subtract(&mut terms, &sections);
+            let Error { speed, law, step } = errors[index];
+            let variance = speed * speed * contact.variance + law * law + SENSOR_SCATTER * SENSOR_SCATTER;
+            let residual = own.place + here.at[index] - surveyed - longer;
+            if with_slopes {
+                self.scaled(&mut terms, residual, step);
+            }
+            rows.push(row(terms, residual, variance, Source::Sensor));
+        }
+        let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
+        let beyond_last = own.place + here.rest - surveyed - longer;
+        let scatter = self.stop_scale * usual_scatter(stop_speed);
+        let scatter = scatter * scatter + REST_SCATTER * REST_SCATTER;
+        let next_place = next_place.filter(|_| trip.came_to_rest);
+        if let Some(next_place) = next_place {
+            let mut terms = terms_of(&|outcome| outcome.rest);
+            subtract(&mut terms, &sections);
+            terms.push((columns.next_place(), -1.0));
+            if with_slopes {
+                self.scaled(&mut terms, beyond_last - next_place, stop_step);
+            }
+            rows.push(row(terms, beyond_last - next_place, scatter, Source::Stop));
+        }
+        if let Some(rest) = &trip.measured {
+            let counted = || trip.contacts.iter().take(rest.contacts);
+            let taped = counted().map(|contact| contact.way).sum::<f64>() + rest.beyond;
+            let passed = counted().flat_map(|contact| &contact.sections).chain(&rest.sections);
+            let (taped_longer, taped_sections) = self.longer(passed);
+            let tape = TAPE * TAPE + FELT * FELT * rest.beyond * rest.beyond;
+            // Where the next trip begins is where the tape found the train; otherwise the stop itself scatters.
+            let (mut terms, at_rest, variance) = match next_place {
+                Some(place) => {
+                    let mut terms = sections;
+                    terms.push((columns.next_place(), 1.0));
+                    (terms, place + surveyed + longer, tape)
+                }
+                None => (terms_of(&|outcome| outcome.rest), own.place + here.rest, tape + scatter),
+            };
+            subtract(&mut terms, &taped_sections);
+            terms.retain(|(_, slope)| *slope != 0.0);
+            rows.push(row(terms, at_rest - taped - taped_longer, variance, Source::Sensor));
         }
         rows
     }
-}
 
-/// Adds the equations of one trip.
-fn trip_rows(point: &Point<'_>, place: usize, with_slopes: bool, rows: &mut Vec<Linear>) {
-    let Point { trips, columns, x, highest, scale, stop_shape_error } = *point;
-    let Some(trip) = trips.get(place) else { return };
-    let own = columns.own(place, trip, x);
-    let mut segments = Vec::new();
-    let mut numbers = x[..columns.lasting].to_vec();
-    let here = outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments);
-    let doubts = doubts(trip, &own, &segments, stop_shape_error);
-    let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
-
-    let mut slopes: Vec<(usize, Outcome)> = Vec::new();
-    let involved = if with_slopes { involved(trip, highest) } else { Vec::new() };
-    for column in involved {
-        let step = step_of(column);
-        numbers[column] += step;
-        slopes.push((column, outcome(trip, &Answers::new(&numbers, highest), &own, &mut segments)));
-        numbers[column] = x[column];
-    }
-    let answers = Answers::new(&numbers, highest);
-    let mut moved = own.clone();
-    let step = 1e-4;
-    if with_slopes && trip.told.first().is_some_and(|told| told.at_rest) {
-        moved.late_start += step;
-        slopes.push((columns.late_start(place), outcome(trip, &answers, &moved, &mut segments)));
-        moved.late_start = own.late_start;
-    }
-    let (pieces, told) = if with_slopes { (trip.pieces.len(), trip.told.len()) } else { (0, 0) };
-    for piece in 0..pieces {
-        moved.deviations[piece] += step;
-        slopes.push((columns.deviation(place, piece), outcome(trip, &answers, &moved, &mut segments)));
-        moved.deviations[piece] = own.deviations[piece];
-    }
-    for told in 0..told {
-        moved.changes[told] += step;
-        slopes.push((columns.change(place, trip, told), outcome(trip, &answers, &moved, &mut segments)));
-        moved.changes[told] = own.changes[told];
-    }
-    let slope_step = |column: usize| if column < columns.lasting { step_of(column) } else { step };
-
-    let began = columns.place(place);
-    let (mut way, mut sections): (f64, Vec<(usize, f64)>) = (0.0, Vec::new());
-    for (index, contact) in trip.contacts.iter().enumerate() {
-        way += contact.way;
-        for column in contact.sections.iter().filter_map(|section| columns.sections.get(section)) {
-            add_term(&mut sections, *column, -1.0);
+    /// A residual in m that noise of time makes is as large as the train is fast: its slope in ln speed is no error of speed.
+    /// Without that, speeds and lengths that are all smaller would fit better, by the sum of squares.
+    fn scaled(&self, terms: &mut Vec<(usize, f64)>, residual: f64, step: u8) {
+        if (1..=self.highest).contains(&usize::from(step)) {
+            add_term(terms, speed_at(usize::from(step)), -residual);
         }
-        let felt: f64 = sections.iter().map(|(column, slope)| slope * x[*column]).sum();
-        let mut terms = sections.clone();
-        terms.push((began, 1.0));
-        for (column, other) in &slopes {
-            let slope = (other.ways[index] - here.ways[index]) / slope_step(*column);
-            if slope != 0.0 {
-                terms.push((*column, slope));
+    }
+
+    /// What is usual of a trip's own numbers.
+    fn usual(&self, trip: &Trip, own: &Own) -> Vec<Linear> {
+        let columns = self.columns;
+        let mut rows = Vec::new();
+        let mut add = |terms: Vec<(usize, f64)>, residual: f64, deviation: f64, source: Source| {
+            let variance = deviation * deviation;
+            rows.push(Linear { terms, residual, variance, source });
+        };
+        if !trip.continues {
+            add(vec![(columns.place(), 1.0)], own.place, ANYWHERE, Source::Usual);
+        }
+        let late = self.start_scale * LATE_START;
+        add(vec![(columns.late_start(), 1.0)], own.late_start, late, Source::Start);
+        for (piece, deviation) in own.deviations.iter().enumerate() {
+            match piece.checked_sub(1) {
+                None => add(vec![(columns.deviation(0), 1.0)], *deviation, TRIP_DEVIATION, Source::Usual),
+                Some(before) => {
+                    let terms = vec![(columns.deviation(piece), 1.0), (columns.deviation(before), -1.0)];
+                    add(terms, deviation - own.deviations[before], WANDER, Source::Usual);
+                }
             }
         }
-        let (speed, law) = doubts[index];
-        let variance = speed * speed * contact.variance + law * law + CONTACT_SCATTER * CONTACT_SCATTER;
-        let residual = x[began] + here.ways[index] - way + felt;
-        rows.push(Linear { terms, residual, variance, is_stop: false });
-    }
-    if trips.get(place + 1).is_some_and(|next| next.continues) && trip.came_to_rest {
-        let felt: f64 = sections.iter().map(|(column, slope)| slope * x[*column]).sum();
-        let next = columns.place(place + 1);
-        let mut terms = sections;
-        terms.extend([(began, 1.0), (next, -1.0)]);
-        for (column, other) in &slopes {
-            let slope = (other.rest - here.rest) / slope_step(*column);
-            if slope != 0.0 {
-                terms.push((*column, slope));
-            }
+        for (index, told) in trip.told.iter().enumerate() {
+            // Starts and stops have residuals of their own, by speed.
+            let is_end = told.to == 0 || told.at_rest;
+            let change = if is_end { 0.0 } else { self.speed(told.to) - self.speed(told.from) };
+            let terms = vec![(columns.change(trip, index), 1.0)];
+            add(terms, own.changes[index], change_error(change), Source::Usual);
         }
-        let scatter = scale * usual_scatter(stop_speed);
-        let residual = x[began] + here.rest - way + felt - x[next];
-        let variance = scatter * scatter + REST_SCATTER * REST_SCATTER;
-        rows.push(Linear { terms, residual, variance, is_stop: true });
+        rows
+    }
+
+    /// Outcomes with each number moved by a little on which the trip can depend.
+    fn slopes(&self, trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(usize, Outcome)> {
+        let columns = self.columns;
+        let mut slopes: Vec<(usize, Outcome)> = Vec::new();
+        let mut moved_segments = Vec::new();
+        let mut numbers = self.lasting.to_vec();
+        for column in involved(trip, segments, self.highest) {
+            numbers[column] += STEP;
+            let answers = Answers::new(&numbers, self.highest);
+            slopes.push((column, outcome(trip, &answers, own, &mut moved_segments)));
+            numbers[column] = self.lasting[column];
+        }
+        let answers = Answers::new(self.lasting, self.highest);
+        let mut moved = own.clone();
+        let mut add = |moved: &Own, column| {
+            slopes.push((column, outcome(trip, &answers, moved, &mut moved_segments)));
+        };
+        if trip.told.first().is_some_and(|told| told.at_rest) {
+            moved.late_start += STEP;
+            add(&moved, columns.late_start());
+            moved.late_start = own.late_start;
+        }
+        for piece in 0..own.deviations.len() {
+            moved.deviations[piece] += STEP;
+            add(&moved, columns.deviation(piece));
+            moved.deviations[piece] = own.deviations[piece];
+        }
+        for change in 0..own.changes.len() {
+            moved.changes[change] += STEP;
+            add(&moved, columns.change(trip, change));
+            moved.changes[change] = own.changes[change];
+        }
+        slopes
     }
 }
 
@@ -172,8 +293,23 @@ fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
     }
 }
 
-/// Speed (m/s) at each contact, and by how much the law's shape may be off there (m).
-fn doubts(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<(f64, f64)> {
+fn subtract(terms: &mut Vec<(usize, f64)>, others: &[(usize, f64)]) {
+    for (column, slope) in others {
+        add_term(terms, *column, -slope);
+    }
+}
+
+/// What makes the time or the place of a sensor uncertain.
+struct Error {
+    /// Speed there (m/s).
+    speed: f64,
+    /// By how much the law's shape may be off there (m).
+    law: f64,
+    /// The step from which that speed comes.
+    step: u8,
+}
+
+fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<Error> {
     let mut walk = Walk::new(trip, own, segments);
     trip.contacts
         .iter()
@@ -181,21 +317,41 @@ fn doubts(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -
             walk.way(contact.time);
             let (middle, displacement) = walk.in_change(contact.time);
             let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
-            (walk.speed(contact.time), shape_error * middle * displacement.abs())
+            let law = SYSTEMATIC * shape_error * middle * displacement.abs();
+            Error { speed: walk.speed(contact.time), law, step: trip.step_of(walk.segment()) }
         })
         .collect()
 }
 
 /// The columns of the train's own numbers on which a trip can depend.
-fn involved(trip: &Trip, highest: usize) -> Vec<usize> {
-    let mut columns: Vec<usize> = (0..SPEEDS).collect();
-    let mut steps: Vec<u8> =
-        trip.told.iter().map(|told| told.to).chain(trip.running.map(|(step, _)| step)).collect();
-    steps.sort_unstable();
-    steps.dedup();
-    for step in steps.into_iter().map(usize::from).filter(|step| (1..=highest).contains(step)) {
-        columns.push(speed_at(step));
-        columns.push(hysteresis_at(step, highest));
+fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
+    let mut columns: Vec<usize> = (0..STOP_NODES).collect();
+    let mut add = |column: usize| {
+        if !columns.contains(&column) {
+            columns.push(column);
+        }
+    };
+    for (told, segment) in trip.told.iter().zip(segments.iter().skip(1)) {
+        let nodes = if told.to == 0 {
+            Some((STOP_NODES, segment.from.set))
+        } else {
+            told.at_rest.then_some((START_NODES, segment.to))
+        };
+        for (node, weight) in nodes.into_iter().flat_map(|(first, speed)| {
+            nodes_about(speed).into_iter().map(move |(node, weight)| (first + node.min(NODES - 1), weight))
+        }) {
+            if weight != 0.0 {
+                add(node);
+            }
+        }
     }
+    let steps = trip.told.iter().flat_map(|told| [told.from, told.to]);
+    for step in steps.chain(trip.running.map(|(step, _)| step)).map(usize::from) {
+        if (1..=highest).contains(&step) {
+            add(speed_at(step));
+            add(hysteresis_at(step, highest));
+        }
+    }
+    debug_assert!(columns.iter().all(|column| *column < SPEEDS + 2 * highest));
     columns
 }

@@ -105,6 +105,11 @@ impl Segment {
         Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
     }
 
+    /// Whether its speed is and stays the same.
+    pub(super) fn is_steady(&self) -> bool {
+        self.from == Pace::steady(self.to)
+    }
+
     /// What a command makes of a train that goes at a pace when it takes effect.
     pub(super) fn of(told: &Told, answers: &Answers<'_>, from: Pace) -> Self {
         let to = answers.speed(usize::from(told.to), told.above());

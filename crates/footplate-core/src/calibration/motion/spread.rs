@@ -8,6 +8,7 @@ use super::parameters::{
     Answers, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, count, hysteresis_at, node_covariance,
     speed_at, speed_prior,
 };
+use super::variation::Variation;
 use crate::linalg::Solution;
 
 /// Steps of numerical slopes.
@@ -45,11 +46,31 @@ impl Spread {
         spread
     }
 
-    /// Of the first numbers of a solution.
-    pub(super) fn of(solution: &Solution, highest: usize) -> Self {
+    /// Of the first numbers of a solution, if the total length of the sections passed (by their columns) were known; and what
+    /// each number is off by for one standard deviation of that total.
+    ///
+    /// Speeds and lengths could all be larger by the same part and no timing would tell. Where a train is and where it comes to
+    /// rest is the same either way, so the scale of the survey is kept apart from what is not known of the train.
+    pub(super) fn of(solution: &Solution, highest: usize, sections: &[usize]) -> (Self, Vec<f64>) {
         let side = count(highest);
-        let at = |i: usize| solution.covariance(i / side, i % side);
-        Self { side, covariance: (0..side * side).map(at).collect() }
+        let with_total = |i: usize| solution.covariance_with_sum(i, sections);
+        let total: f64 = sections.iter().map(|section| with_total(*section)).sum();
+        let deviation = libm::sqrt(total.max(0.0));
+        let scale = |i: usize| if deviation > 0.0 { with_total(i) / deviation } else { 0.0 };
+        let scale: Vec<f64> = (0..side).map(scale).collect();
+        let at = |i: usize| solution.covariance(i / side, i % side) - scale[i / side] * scale[i % side];
+        (Self { side, covariance: (0..side * side).map(at).collect() }, scale)
+    }
+
+    /// What may have changed is known less well.
+    pub(super) fn widen(&mut self, by: &Variation, highest: usize) {
+        let (side, covariance) = (self.side, &mut self.covariance);
+        by.each(highest, |one, other, more| {
+            covariance[one * side + other] += more;
+            if one != other {
+                covariance[other * side + one] += more;
+            }
+        });
     }
 
     /// Of a lower triangle, row after row, that is as long as `side` asks for.
@@ -66,11 +87,6 @@ impl Spread {
     /// Variance of one number.
     pub(super) fn variance(&self, place: usize) -> f64 {
         if place < self.side { self.covariance[place * self.side + place].max(0.0) } else { 0.0 }
-    }
-
-    /// One standard deviation of what follows from the numbers.
-    pub(super) fn deviation(&self, values: &[f64], highest: usize, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
-        libm::sqrt(self.variance_along(&self.slopes(values, highest, of)))
     }
 
     /// Variance of the sum of numbers times slopes.

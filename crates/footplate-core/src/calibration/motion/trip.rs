@@ -4,16 +4,31 @@ use alloc::vec::Vec;
 
 use super::parameters::Answers;
 use super::segment::{Segment, Told};
+use crate::ids::NodeId;
 
 /// A contact passed, and the way there from the one before (or from where the trip's ways are counted).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct TripContact {
+    /// Its node.
+    pub(super) node: NodeId,
     /// Mean time at which it closed (s, on the clock of the run) and the variance of that.
     pub(super) time: f64,
     pub(super) variance: f64,
     /// Way by the survey (m) and the sections on it.
     pub(super) way: f64,
+    pub(super) sections: Vec<usize>,
+}
+
+/// Where a person measured that the train came to rest: a distance beyond one of the contacts of the trip.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct MeasuredRest {
+    /// Contacts of the trip up to the one from which it is counted.
+    pub(super) contacts: usize,
+    /// Distance beyond that contact (m), by tape and survey.
+    pub(super) beyond: f64,
+    /// Sections between that contact and the one from which the tape was laid.
     pub(super) sections: Vec<usize>,
 }
 
@@ -34,18 +49,52 @@ pub(super) struct Trip {
     pub(super) pieces: Vec<f64>,
     /// Whether it ended at rest by the train's own law.
     pub(super) came_to_rest: bool,
+    /// Where it did, if a person measured that.
+    pub(super) measured: Option<MeasuredRest>,
+    /// What the last fit found of it.
+    pub(super) own: Option<Own>,
 }
 
 /// A piece of a trip over which the deviation of the speed counts as constant, at most this long (s): trains wander over
 /// a lap, not over a hop.
 const LONGEST_PIECE: f64 = 4.0;
 
-/// What a trip has of its own: late start (s), deviations of ln speed by piece, and additional way of changes (m).
-#[derive(Debug, Clone, PartialEq)]
+/// What a trip has of its own: where it began (m beyond the sensor passed last before), late start (s), deviations of ln
+/// speed by piece, and additional distance of changes (m).
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Own {
+    pub(super) place: f64,
     pub(super) late_start: f64,
     pub(super) deviations: Vec<f64>,
     pub(super) changes: Vec<f64>,
+}
+
+impl Own {
+    /// How many numbers there are beside the place.
+    pub(super) const fn count(&self) -> usize {
+        1 + self.deviations.len() + self.changes.len()
+    }
+
+    /// All of them in the order of their columns, the place first.
+    pub(super) fn flat(&self) -> Vec<f64> {
+        let mut all = alloc::vec![self.place, self.late_start];
+        all.extend(&self.deviations);
+        all.extend(&self.changes);
+        all
+    }
+
+    /// Each number together with another's.
+    pub(super) fn with(&self, other: &Self, of: impl Fn(&f64, &f64) -> f64) -> Self {
+        let all =
+            |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| of(one, other)).collect();
+        Self {
+            place: of(&self.place, &other.place),
+            late_start: of(&self.late_start, &other.late_start),
+            deviations: all(&self.deviations, &other.deviations),
+            changes: all(&self.changes, &other.changes),
+        }
+    }
 }
 
 impl Trip {
@@ -58,6 +107,8 @@ impl Trip {
             contacts: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
+            measured: None,
+            own: None,
         }
     }
 
@@ -76,15 +127,28 @@ impl Trip {
         self.contacts.push(contact);
     }
 
+    /// The step from which the speed of a segment comes: of a stop, the one before.
+    pub(super) fn step_of(&self, segment: usize) -> u8 {
+        let told = segment.checked_sub(1).and_then(|place| self.told.get(place));
+        told.map_or(
+            self.running.map_or(0, |(step, _)| step),
+            |told| if told.to == 0 { told.from } else { told.to },
+        )
+    }
+
+    /// Its own numbers as the last fit found them; what it has done since is as usual.
+    pub(super) fn start(&self) -> Own {
+        let mut own = self.own.clone().unwrap_or_default();
+        let deviation = own.deviations.last().copied().unwrap_or(0.0);
+        own.deviations.resize(self.pieces.len(), deviation);
+        own.changes.resize(self.told.len(), 0.0);
+        own
+    }
+
     /// When the train rests, if it was told to stop last (s).
     pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
-        let own = Own {
-            late_start: 0.0,
-            deviations: alloc::vec![0.0; self.pieces.len()],
-            changes: alloc::vec![0.0; self.told.len()],
-        };
         let mut segments = Vec::new();
-        self.segments(answers, &own, &mut segments);
+        self.segments(answers, &self.start(), &mut segments);
         segments.last().filter(|last| last.to == 0.0).map_or(f64::INFINITY, Segment::settled)
     }
 
@@ -179,6 +243,11 @@ impl<'t> Walk<'t> {
     /// Speed (m/s) at the time last asked for, or later.
     pub(super) fn speed(&self, time: f64) -> f64 {
         self.deviation() * self.segments.get(self.segment).map_or(0.0, |segment| segment.speed(time))
+    }
+
+    /// The segment of the time last asked for.
+    pub(super) const fn segment(&self) -> usize {
+        self.segment
     }
 
     /// Whether the change under way ends at rest.

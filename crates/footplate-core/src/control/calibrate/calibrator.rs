@@ -8,9 +8,10 @@ use super::activity::Activity;
 use super::notice::{CalibrationNotice, Ending, Mishap, Progress};
 use super::planner::{KNOWN_FROM, Planner, Stance};
 use super::settings::CalibratorSettings;
+use super::surveying::Passes;
 use super::tracker::{Tracker, Verdict};
-use crate::calibration::SectionIndex;
 use crate::calibration::motion::{MotionFit, MotionModel, StepUse};
+use crate::calibration::{SectionIndex, SurveyTest};
 use crate::control::{Machine, Output};
 use crate::estimation::{Ground, Locator};
 use crate::event::{Approach, Command, Event, EventKind, Report};
@@ -26,7 +27,12 @@ const COMMAND_PATIENCE: TimeSpan = TimeSpan::from_ms(3_000);
 #[derive(Debug, Clone)]
 pub struct Calibrator<'l> {
     pub(super) layout: &'l Layout,
+    /// The layout's lengths as it says them, ...
+    pub(super) surveyed: SectionIndex,
+    /// ... and as far as they are believed after what the train made of them.
     pub(super) sections: SectionIndex,
+    pub(super) survey_test: SurveyTest,
+    pub(super) passes: Passes,
     pub(super) settings: CalibratorSettings,
     pub(super) train: TrainId,
     pub(super) fit: MotionFit,
@@ -71,7 +77,10 @@ impl<'l> Calibrator<'l> {
         note_what_moved(&mut fit);
         Self {
             layout,
+            surveyed: SectionIndex::of(layout),
             sections: SectionIndex::of(layout),
+            survey_test: SurveyTest::default(),
+            passes: Passes::default(),
             settings,
             train,
             fit,
@@ -121,6 +130,18 @@ impl<'l> Calibrator<'l> {
     #[must_use]
     pub fn into_fit(self) -> MotionFit {
         self.fit
+    }
+
+    /// The sections of the layout, with what their lengths are worth after what the train made of them.
+    #[must_use]
+    pub const fn sections(&self) -> &SectionIndex {
+        &self.sections
+    }
+
+    /// How the lengths of the layout compare with those that the train ran over.
+    #[must_use]
+    pub const fn survey_test(&self) -> &SurveyTest {
+        &self.survey_test
     }
 
     /// Where the train is, for whoever drives it next.
@@ -291,6 +312,7 @@ impl<'l> Calibrator<'l> {
         self.expect_contact(now);
         self.watch_next();
         if let Some(node) = self.tracker.last() {
+            self.count_passage(node);
             self.on_passage(now, node);
         }
     }

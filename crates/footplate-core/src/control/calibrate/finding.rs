@@ -132,7 +132,7 @@ impl Calibrator<'_> {
             self.say(CalibrationNotice::Found { node, step: self.stance.step });
         }
         let held = self.held(node);
-        let circuit = self.layout.circuit_from(node, &held, &self.settings.avoid);
+        let circuit = self.circuit_worth_most(node, &held);
         if let Some(circuit) = circuit {
             self.turns = 0;
             self.say(CalibrationNotice::Circuit(circuit.clone()));
@@ -219,7 +219,7 @@ impl Calibrator<'_> {
     }
 
     /// Turnouts that the train is on, or reaches before they would have moved, and those that do not move at all.
-    fn held(&self, node: NodeId) -> BTreeMap<TurnoutId, Option<Leg>> {
+    pub(super) fn held(&self, node: NodeId) -> BTreeMap<TurnoutId, Option<Leg>> {
         // Turnouts move one after the other: the last of a handful does so after as many times.
         let ahead = self.fastest_now() * THROWN_WITHIN + MARGIN;
         let mut held = held_turnouts(self.layout, &self.turnouts, node, ahead, self.settings.train_length);

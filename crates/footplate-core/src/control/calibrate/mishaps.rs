@@ -6,11 +6,12 @@ use super::activity::{Activity, Stage};
 use super::calibrator::Calibrator;
 use super::notice::{CalibrationNotice, Ending, Mishap};
 use crate::calibration::motion::StepUse;
+use crate::calibration::{OddSection, SurveyTest};
 use crate::estimation::PassedContact;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{HopId, Leg};
+use crate::track::{Hop, HopId, Leg};
 use crate::units::{Length, Speed};
 
 /// A contact is late when it is this much later than expected ...
@@ -30,15 +31,6 @@ const MOST_PUSHES: u8 = 2;
 
 /// Before a lost train is looked for, it stands; whoever lifted it may put it down meanwhile.
 const WAIT_FOR_LOST: TimeSpan = TimeSpan::from_ms(6_000);
-
-/// A length is off by more than a survey explains when it is so many of its standard deviations off, ...
-const ODD: f64 = 4.0;
-
-/// ... and by more than curves and dirt make of it (published factors of edges: most within 10 %) ...
-const ODD_PART: f64 = 0.12;
-
-/// ... and surely so, in standard deviations of what is felt.
-const SURE: f64 = 3.0;
 
 /// One such hop may be a mistake of the survey.
 const FEWEST_ODD: usize = 2;
@@ -69,16 +61,25 @@ impl Calibrator<'_> {
             None => {
                 // No forecast: the longest that the hop would take at half the speed, from rest.
                 let hop = self.tracker.last().and_then(|node| self.ground().hop_from(node));
-                let length = hop.map_or(super::gain::TYPICAL_HOP, |hop| hop.length);
+                let length = hop.map_or(super::gain::TYPICAL_HOP, |hop| self.longest(&hop));
                 let speed = self.model().speed(self.stance.step, Approach::Below).value;
                 let slowest = (0.5 * speed).max(Speed::from_mm_per_s(20.0));
                 self.steady_at.max(since) + length / slowest + LATE
             }
         };
         let pushed = self.tracker.last().and_then(|node| self.ground().hop_from(node));
-        let pushed = pushed.map(|hop| self.told_at + hop.length / PUSHED_SPEED + LATE);
+        let pushed = pushed.map(|hop| self.told_at + self.longest(&hop) / PUSHED_SPEED + LATE);
         self.due_by =
             Some(if self.pushes > 0 { pushed.unwrap_or(due_by).min(due_by) } else { due_by }.max(now));
+    }
+
+    /// A length that a hop hardly exceeds.
+    fn longest(&self, hop: &Hop<'_>) -> Length {
+        if self.sections.is_measured(hop.id) {
+            return hop.length;
+        }
+        let [length, uncertainty] = self.model().length(&self.sections, hop);
+        length + 2.0 * uncertainty
     }
 
     /// No contact by the time it was due at the latest.
@@ -142,38 +143,28 @@ impl Calibrator<'_> {
         self.report_mishap(Mishap::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
     }
 
-    /// Says if several hops of the lap take times that their surveyed lengths cannot explain; again when more do.
-    ///
-    /// Only lengths beside each other count: on another layout all of them would be off by as much as its total is.
-    pub(super) fn check_lengths(&mut self) {
-        let Some(circuit) = &self.circuit else { return };
-        let model = self.fit.model();
-        let survey = self.layout.survey().uncertainty;
-        let lap = circuit.lap.iter().filter_map(|id| self.layout.hop(*id));
-        let felt: Vec<(HopId, Length, Length, Length)> = lap
-            .map(|hop| {
-                let [felt, doubt] = model.length(&self.sections, &hop);
-                (hop.id, hop.length, felt, doubt)
-            })
-            .filter(|(_, surveyed, ..)| *surveyed > Length::ZERO)
-            .collect();
-        let mut ratios: Vec<f64> = felt.iter().map(|(_, surveyed, felt, _)| *felt / *surveyed).collect();
-        ratios.sort_unstable_by(f64::total_cmp);
-        let Some(scale) = ratios.get(ratios.len() / 2).copied().filter(|scale| *scale > 0.0) else { return };
-        let hops: Vec<(HopId, Length, Length)> = felt
-            .into_iter()
-            .map(|(id, surveyed, felt, doubt)| (id, surveyed, felt / scale, doubt))
-            .filter(|(_, surveyed, felt, doubt)| {
-                let off = (*felt - *surveyed).abs();
-                off > SURE * *doubt && off > ODD * survey && off > ODD_PART * *surveyed
-            })
-            .map(|(id, surveyed, felt, _)| (id, surveyed, felt))
-            .collect();
-        let is_news = hops.len() != self.odd_lengths;
-        if hops.len() >= FEWEST_ODD && is_news {
+    /// Fits anew, and compares the lengths of the layout with what the train makes of them: where they contradict each other
+    /// the layout's count for less, and it is said, again when there are more.
+    pub(super) fn refit(&mut self) {
+        self.fit.refit(&self.sections);
+        let test = SurveyTest::of(&self.surveyed, self.model().sections());
+        if test != self.survey_test {
+            self.sections = test.applied_to(&self.surveyed);
+            self.survey_test = test;
+            self.fit.refit(&self.sections);
+        }
+        let hops: Vec<(HopId, Length, Length)> =
+            self.survey_test.odd.iter().filter_map(|odd| self.odd_hop(odd)).collect();
+        if hops.len() >= FEWEST_ODD && hops.len() > self.odd_lengths {
             self.odd_lengths = hops.len();
             self.report_mishap(Mishap::LengthsDiffer { hops });
         }
+    }
+
+    /// A hop over a section that is not as long as the layout says, the length there, and what the train makes of it.
+    fn odd_hop(&self, odd: &OddSection) -> Option<(HopId, Length, Length)> {
+        let mut hops = self.layout.hops().filter(|hop| self.sections.section(hop.id) == Some(odd.section));
+        Some((hops.next()?.id, Length::from_m(odd.surveyed), Length::from_m(odd.felt)))
     }
 
     /// The train stops for good.
@@ -192,7 +183,7 @@ impl Calibrator<'_> {
 
     /// The train stands: the last fit, and the table.
     pub(super) fn finish(&mut self) {
-        self.fit.refit(&self.sections);
+        self.refit();
         let ending = self.ending.take().unwrap_or(Ending::Told);
         self.activity = Activity::Finished;
         self.finished = Some(ending.clone());

@@ -6,6 +6,7 @@
 //! - `planner.rs`: what to try next, by what it would gain for its time; [`gain`] is the one place that says what that is;
 //! - `running.rs`: do it: run, stop short of a contact, crawl on to it;
 //! - `tracker.rs`: which reports are of the train; `mishaps.rs`: what to do when it stalls, is lifted or lost;
+//! - `surveying.rs`: where lengths are unknown, round by other ways;
 //! - `points.rs`: turnouts that may be thrown, and track ends ahead.
 
 mod accuracy;
@@ -24,6 +25,7 @@ mod running;
 #[cfg(test)]
 mod scripted_train;
 mod settings;
+mod surveying;
 mod tracker;
 
 pub use accuracy::{StepAccuracy, usable_steps};

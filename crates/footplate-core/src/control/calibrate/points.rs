@@ -26,8 +26,9 @@ pub(super) fn turnouts_within(layout: &Layout, from: NodeId, way: Length) -> BTr
             found.insert(turnout);
         }
         for edge in layout.ways(node).edges().filter_map(|id| layout.edge(id)) {
-            if edge.length <= left {
-                open.push((edge.to, left - edge.length));
+            let length = edge.known.shortest();
+            if length <= left {
+                open.push((edge.to, left - length));
             }
         }
     }
@@ -64,7 +65,7 @@ pub(super) fn end_within(
             break;
         }
         for hop in layout.open_hops_from(node, turnouts) {
-            let length = gone + hop.length;
+            let length = gone + layout.least_length(&hop);
             if length > way {
                 continue;
             }

@@ -15,7 +15,7 @@ use crate::units::Length;
 fn large_oval() -> Layout {
     let mut plan = oval_plan();
     for stretch in &mut plan.stretches {
-        stretch.length = 3.0 * stretch.length;
+        stretch.length = (3.0 * stretch.length.estimate(&plan.survey).0).into();
     }
     Layout::build(&plan).unwrap()
 }
@@ -54,7 +54,7 @@ fn a_train_that_faces_the_end_of_its_track_is_turned_around_in_time() {
     // The track apart, with its one contact far from both of its ends.
     let mut plan = oval_plan();
     for stretch in plan.stretches.iter_mut().rev().take(2) {
-        stretch.length = Length::from_mm(2_000.0);
+        stretch.length = Length::from_mm(2_000.0).into();
     }
     let layout = Layout::build(&plan).unwrap();
     let mut train = ScriptedTrain::new(&layout, "EN1", "E1", 1_500.0);

@@ -295,7 +295,7 @@ impl Calibrator<'_> {
                 self.tell(now, step);
             }
             (Stage::Braking { until } | Stage::BrakingAgain { until }, _) if now >= *until => {
-                self.fit.refit(&self.sections);
+                self.refit();
                 self.set_stage(Stage::Crawling);
                 let step = self.step_to_next_contact(now);
                 self.tell(now, step);
@@ -326,11 +326,12 @@ impl Calibrator<'_> {
         let Activity::Trying(trial) = &self.activity else { return };
         let (experiment, begun, before) = (trial.experiment, trial.begun, trial.before);
         self.planner.note(&experiment);
-        self.fit.refit(&self.sections);
-        self.check_lengths();
+        self.refit();
         let after = self.line(before.step, before.approach);
         self.say(CalibrationNotice::Done(Done { experiment, took: now - begun, before, after }));
-        self.begin_next(now);
+        if !self.goes_where_more_is_unknown(now) {
+            self.begin_next(now);
+        }
     }
 
     pub(super) fn say_progress(&mut self, now: Timestamp) {

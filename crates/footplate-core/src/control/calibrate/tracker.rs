@@ -9,7 +9,7 @@ use crate::estimation::{Ground, Locator};
 use crate::ids::{NodeId, SensorId, TurnoutId};
 use crate::latency::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, TurnoutStates};
+use crate::track::{Layout, Leg, Reach, TurnoutStates};
 use crate::units::{Length, Speed};
 
 /// Contacts in a row that a train is believed to have passed unseen. Beyond that it is somewhere else.
@@ -166,7 +166,10 @@ impl Tracker {
         let Some((from, then)) = was else { return false };
         let unknown = TurnoutStates::unknown();
         let reach = (now - then) * FASTEST + Length::from_mm(50.0);
-        layout.reaches(from, &unknown, 1).any(|way| way.to == node && way.length <= reach)
+        let shortest = |way: &Reach| -> Length {
+            way.hops().iter().filter_map(|id| layout.hop(*id)).map(|hop| layout.least_length(&hop)).sum()
+        };
+        layout.reaches(from, &unknown, 1).any(|way| way.to == node && shortest(&way) <= reach)
     }
 }
 

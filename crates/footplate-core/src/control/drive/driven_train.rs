@@ -291,7 +291,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.seen();
-        self.note_passage(ground, node, passed.window.middle());
+        self.note_passage(ground, node, passed.at);
         self.count_limit_from(ground, node);
         self.expect_next(ground, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });

@@ -1,25 +1,15 @@
 //! What the command allows the train and its wheels to do right now.
 //!
-//! A brake takes time to build up and to let go, and a wheel that was held back takes time to turn with the train
-//! again. What may still hold is assumed to hold; what may not yet is not.
+//! A brake takes time to build up and to release, and a wheel that was held back takes time to turn with the train
+//! again. What may still act is assumed to act; what may not act yet is not.
 
 use super::sound::sound;
 use crate::wheels::{Range, Vehicle, larger, smaller};
 
 /// Efforts nearer to zero are coasting: what analogue controllers show at rest.
 const COASTING: f64 = 0.02;
-/// How long after the brake is let go a wheel may still slide (s): 1 s for the cylinder to empty, 1 s for the wheel to
-/// be turned up, by 10 m/s² and more on the poorest rail seen.
-const LET_GO_BRAKE_S: f64 = 2.0;
-/// The same for a wheel that does slide as the brake is let go (s): it has to be turned up from far below.
-const LET_GO_SLIDING_S: f64 = 5.0;
-/// How long after traction ends a wheel may still slip (s): as for the brake, motors let go faster.
-const LET_GO_TRACTION_S: f64 = 1.5;
 /// How long full traction or full brake takes to fade (s): by 0.5 m/s³, the comfort limit of passenger trains.
 const FADE_S: f64 = 2.5;
-/// Without a recorded command, a deceleration of all wheels beyond what resistance and gradients of main lines do
-/// (m/s²: 15 mm/m and 1 % of weight) is taken for braking, and an acceleration beyond it for traction.
-const BY_ITSELF: f64 = 0.25;
 /// How long an acceleration is remembered because a window of counts may reach back over it (s).
 const REMEMBERED_S: f64 = 0.9;
 
@@ -35,27 +25,24 @@ pub(super) struct CommandWatch {
     traction: f64,
     widest: Range,
     narrower_for: f64,
-    /// A slide was seen in this application of the brake: adhesion does not carry the command.
-    disproved: bool,
 }
 
-/// What the command allows in one period.
+/// What the command allows in one period, in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Allowed {
     /// A braked wheel may turn slower than the train moves.
     pub(super) slide: bool,
     /// A powered wheel may turn faster than the train moves.
     pub(super) slip: bool,
-    /// Acceleration of the train (m/s², in the direction of travel) within the last windows of counts.
+    /// Acceleration of the train (m/s²) within the last windows of counts, whatever the rail carries.
     pub(super) acceleration: Range,
-    /// The highest acceleration if the command is believed: below `acceleration.high` while the brake is on.
-    pub(super) at_most_by_command: f64,
-    /// How much of full traction may act, 0 to 1.
-    pub(super) traction_effort: f64,
-    /// By how much the train decelerates by its command where the rail carries it (m/s²); infinite if there is none.
-    pub(super) commanded: f64,
-    /// How much of the full brake may act, 0 to 1.
-    pub(super) brake_effort: f64,
+    /// The same for a train whose wheels roll: brakes and motors do what is claimed of them.
+    pub(super) rolling: Range,
+    /// What the command makes the train do where the rail carries it (m/s²); nothing if it is not recorded.
+    pub(super) commanded: Option<f64>,
+    /// How much of full traction and of the full brake may act, 0 to 1.
+    pub(super) traction: f64,
+    pub(super) brake: f64,
 }
 
 impl CommandWatch {
@@ -68,76 +55,71 @@ impl CommandWatch {
             traction: 0.0,
             widest: Range { low: 0.0, high: 0.0 },
             narrower_for: 0.0,
-            disproved: false,
         }
     }
 
-    /// A slide was seen: until the brake is let go, its command says nothing about the train.
-    pub(super) fn disprove(&mut self) {
-        self.disproved = true;
-    }
-
-    /// The command of the next `t` seconds; where it is not recorded, `seen` tells it: how all wheels accelerate.
-    /// `held` if a wheel slides now.
-    pub(super) fn next(
-        &mut self,
-        effort: Option<f64>,
-        seen: f64,
-        held: bool,
-        t: f64,
-        vehicle: &Vehicle,
-    ) -> Allowed {
-        let (braking, traction) = match effort {
-            Some(effort) => (effort < -COASTING, effort > COASTING),
-            None => (seen < -BY_ITSELF, seen > BY_ITSELF),
-        };
-        self.since_brake = if braking { 0.0 } else { self.since_brake + t };
-        self.since_traction = if traction { 0.0 } else { self.since_traction + t };
-        let let_go = if held { LET_GO_SLIDING_S } else { LET_GO_BRAKE_S };
-        let slide = self.since_brake < let_go;
-        let slip = self.since_traction < LET_GO_TRACTION_S;
-        self.disproved &= slide;
-
-        let command = &vehicle.brake_command;
-        let full = command.full.as_m_per_s2();
-        let wanted = effort.map_or(0.0, |effort| sound(-effort, 0.0, 1.0));
-        let driven = effort.map_or(f64::from(u8::from(traction)), |effort| sound(effort, 0.0, 1.0));
-        self.built_up = smaller(wanted, self.built_up + t / larger(command.build_up.as_s(), t));
-        self.brake = larger(wanted, self.brake - t / FADE_S);
-        self.traction = larger(driven, self.traction - t / FADE_S);
-
-        let gradient = command.gradient.as_m_per_s2();
-        let resistance = command.resistance.as_m_per_s2();
+    /// The command of the next `t` seconds.
+    pub(super) fn next(&mut self, effort: Option<f64>, t: f64, vehicle: &Vehicle) -> Allowed {
         let max_traction = vehicle.max_traction.as_m_per_s2();
         let max_brake = vehicle.max_brake.as_m_per_s2();
-        let now = if effort.is_some() {
-            Range {
-                low: -smaller(
-                    self.brake * full * (1.0 + command.tolerance) + gradient + resistance,
-                    max_brake,
-                ),
-                high: smaller(self.traction * max_traction + gradient, max_traction),
-            }
-        } else {
-            Range { low: -max_brake, high: max_traction }
+        let Some(effort) = effort else {
+            let any = Range { low: -max_brake, high: max_traction };
+            *self = Self {
+                since_brake: 0.0,
+                since_traction: 0.0,
+                built_up: 0.0,
+                brake: 1.0,
+                traction: 1.0,
+                ..self.clone()
+            };
+            let acceleration = self.lately(any, t);
+            return Allowed {
+                slide: true,
+                slip: true,
+                acceleration,
+                rolling: acceleration,
+                commanded: None,
+                traction: 1.0,
+                brake: 1.0,
+            };
         };
+        let command = &vehicle.brake_command;
+        let release = command.release.as_s();
+        self.since_brake = if effort < -COASTING { 0.0 } else { self.since_brake + t };
+        self.since_traction = if effort > COASTING { 0.0 } else { self.since_traction + t };
+        let slide = self.since_brake < release;
+        let slip = self.since_traction < release;
+        let full = command.full.as_m_per_s2();
+        let wanted = sound(-effort, 0.0, 1.0);
+        let driven = sound(effort, 0.0, 1.0);
+        self.built_up = smaller(wanted, self.built_up + t / larger(command.build_up.as_s(), t));
+        // Until the brake must have released, all of it may still act.
+        self.brake = larger(wanted, if slide { self.brake } else { self.brake - t / FADE_S });
+        self.traction = larger(driven, if slip { self.traction } else { self.traction - t / FADE_S });
+
+        let gradient = command.gradient.as_m_per_s2();
+        let strongest =
+            self.brake * full * (1.0 + command.tolerance) + gradient + command.resistance.as_m_per_s2();
+        let low = -smaller(strongest, max_brake);
+        let high = smaller(self.traction * max_traction + gradient, max_traction);
+        let least = vehicle.thresholds.least_sliding_deceleration.as_m_per_s2();
+        let by_brake = gradient - self.built_up * full * (1.0 - command.tolerance);
+        let held = effort < -COASTING && self.traction <= 0.0;
+        let now = Range { low, high: if held && least > 0.0 { larger(by_brake, -least) } else { high } };
         let acceleration = self.lately(now, t);
-        let by_command = if traction {
-            acceleration.high
-        } else if self.disproved {
-            -vehicle.thresholds.least_sliding_deceleration.as_m_per_s2()
-        } else {
-            gradient - self.built_up * full * (1.0 - command.tolerance)
+        let rolling = Range {
+            low: acceleration.low,
+            high: if held { larger(by_brake, low) } else { acceleration.high },
         };
-        let at_most_by_command = smaller(by_command, acceleration.high);
+        let commanded = if effort < 0.0 { -wanted * full } else { driven * max_traction };
         Allowed {
             slide,
             slip,
             acceleration,
-            at_most_by_command,
-            traction_effort: self.traction,
-            commanded: if effort.is_some() { self.brake * full } else { f64::INFINITY },
-            brake_effort: if effort.is_some() { self.brake } else { 1.0 },
+            rolling,
+            commanded: Some(commanded),
+            traction: self.traction,
+            brake: self.brake,
         }
     }
 

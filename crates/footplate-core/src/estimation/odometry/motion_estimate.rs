@@ -12,21 +12,18 @@ pub struct MotionEstimate {
     pub speed: Speed,
     /// Its standard deviation as the filter believes it.
     pub speed_deviation: Speed,
-    /// The speed lies between this ...
-    pub speed_low: Speed,
-    /// ... and this, as long as what is assumed of the vehicle is true.
-    pub speed_high: Speed,
     /// The best estimate of the acceleration.
     pub acceleration: Acceleration,
     /// The best estimate of the distance since the first period.
     pub distance: Length,
-    /// The distance lies between this ...
-    pub distance_low: Length,
-    /// ... and this.
-    pub distance_high: Length,
-    /// By how much at most the distance estimated can be too long, summed up over the way; never decreases.
+    /// Speed and distance lie within these whenever the claims of the vehicle hold.
+    pub guaranteed: MotionBounds,
+    /// They lie within these with the stated probability, by the stated priors; never wider than the guaranteed ones.
+    pub confidence: MotionBounds,
+    /// By how much at most the distance estimated can be too long, by the guaranteed bounds, summed up along the path;
+    /// never decreases.
     pub over: Length,
-    /// By how much at most the distance estimated can be too short, summed up over the way; never decreases.
+    /// The same of too short.
     pub under: Length,
     /// What each wheelset does.
     pub wheels: [WheelState; 2],
@@ -34,6 +31,19 @@ pub struct MotionEstimate {
     pub mode: Mode,
     /// The share that the first wheelset, the second and the virtual sensor had in it; they add up to 1.
     pub shares: [f64; 3],
+}
+
+/// Between which speeds and distances a train is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionBounds {
+    /// The speed is at least this ...
+    pub speed_low: Speed,
+    /// ... and at most this.
+    pub speed_high: Speed,
+    /// The distance since the first period is at least this ...
+    pub distance_low: Length,
+    /// ... and at most this.
+    pub distance_high: Length,
 }
 
 impl MotionEstimate {

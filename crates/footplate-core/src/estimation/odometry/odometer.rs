@@ -1,42 +1,36 @@
 //! One period in, one estimate out.
 //!
-//! The order of a period: read both wheelsets; ask what the command allows; predict the train; judge which wheelset
-//! slips or slides; narrow the bounds; let the trusted wheels correct the filter, or the virtual sensor stand in for
-//! them; add up the distance.
+//! The order of a period: read both wheelsets; ask what the command allows; narrow the guaranteed bounds; let every
+//! hypothesis explain the counts; sum up the estimate and its interval; add up the distance.
 
 use super::balise_link::DistanceInterval;
 use super::command_watch::CommandWatch;
 use super::distance_bounds::DistanceBounds;
+use super::guaranteed_speed::GuaranteedSpeed;
+use super::hypotheses::Bank;
 use super::inertia::Inertia;
-use super::motion_estimate::{Mode, MotionEstimate, WheelState};
-use super::past::Past;
+use super::motion_estimate::{Mode, MotionBounds, MotionEstimate, WheelState};
 use super::places::{Places, Rolled};
 use super::published::Published;
 use super::settings::{Carrier, OdometrySettings};
-use super::speed_bounds::SpeedBounds;
-use super::train_filter::TrainFilter;
-use super::virtual_sensor::VirtualSensor;
 use super::wheel_channel::WheelChannel;
 use crate::calibration::WheelScale;
 use crate::units::{Acceleration, Length, Speed};
-use crate::wheels::{Heading, Loss, Period, Range, SlipSlide, Vehicle, VehicleError, larger, smaller};
+use crate::wheels::{Loss, Period, Range, Vehicle, VehicleError, larger, smaller};
 
 /// A longer time without a period breaks the run: the train can have done anything (s).
 const GAP_S: f64 = 2.0;
-/// Faster than this a train does not turn round from one period to the next (m/s).
-const CERTAIN_HEADING: f64 = 1.5;
 /// Slower than this it may (m/s).
 const TURNED_ROUND: f64 = 0.1;
-/// Variance of the speed that the first period tells, in squared pulses per period: a count at a random phase.
-const FIRST_COUNT: f64 = 1.0 / 6.0;
-/// By how much the speed of the first period may be wrong for the diameter and creepage of a wheel (part of it).
-const FIRST_CREEP: f64 = 0.02;
-/// What is larger is no command, no reading of an accelerometer (m/s²) and no place on any line (m).
+/// First counts that differ by less are of one speed (pulses).
+const AGREE_PULSES: f64 = 2.5;
+/// Deviation of the speed that the first period tells (m/s): its counts may be a spike.
+const FIRST_SPEED: f64 = 20.0;
+/// What is larger is no command and no place on any line (m).
 const LARGEST_EFFORT: f64 = 1.5;
-const LARGEST_READING: f64 = 50.0;
 const FARTHEST_PLACE: f64 = 1e8;
-/// Jerk density while the virtual sensor stands in (m²/s⁵): accelerations are known to 0.3 m/s² after a second.
-const BLIND_JERK: f64 = 0.1;
+/// Wheels that turn this much faster than the train can run (part) are no noise.
+const TOO_FAST: f64 = 1.05;
 
 /// Follows one train from its first period.
 #[derive(Debug, Clone)]
@@ -45,33 +39,37 @@ pub struct Odometer {
     pub(super) settings: OdometrySettings,
     pub(super) wheels: [WheelChannel; 2],
     pub(super) command: CommandWatch,
-    pub(super) slips: SlipSlide,
-    pub(super) bounds: SpeedBounds,
+    /// Guaranteed bounds of speed and distance, in the direction of travel.
+    pub(super) bounds: GuaranteedSpeed,
     pub(super) ways: DistanceBounds,
-    pub(super) train: TrainFilter,
-    pub(super) stand_in: Option<VirtualSensor>,
+    pub(super) bank: Bank,
+    /// The same with the stated probability.
+    pub(super) probable_speed: Range,
+    pub(super) probable_distance: Range,
     pub(super) last: Option<MotionEstimate>,
-    /// Seconds since the first period.
-    pub(super) clock: f64,
     /// 1 the way in which distance grows, −1 the other.
     pub(super) way: f64,
+    /// Speed and acceleration in the direction of travel (m/s, m/s²), and the variance of the speed.
+    pub(super) speed: f64,
+    pub(super) acceleration: f64,
+    pub(super) variance: f64,
     pub(super) distance: f64,
-    /// How far the counts put the train ahead of where the filter believes it (m).
-    pub(super) ahead: f64,
     pub(super) blind: f64,
+    /// How long no wheelset has told the speed (s).
+    pub(super) corrected_for: f64,
     /// No wheel has been read yet.
     pub(super) unread: bool,
-    /// How long both wheels have turned alike (s).
-    pub(super) alike_for: f64,
-    /// What the train did before anything slipped or slid.
-    pub(super) past: Past,
-    /// The published filter, where it carries the estimate.
+    /// The published odometer, where it carries the estimate.
     pub(super) published: Option<Published>,
     pub(super) places: Option<Places>,
     /// The inertial sensor, once there is one.
     pub(super) inertia: Option<Inertia>,
     /// Over- and under-reading up to the last balise (m).
     pub(super) amounts: [f64; 2],
+    /// Periods in which both wheelsets turned faster than the train can run.
+    pub(super) above_top: u64,
+    /// A sensor has told a direction.
+    pub(super) signed: bool,
 }
 
 impl Odometer {
@@ -96,6 +94,12 @@ impl Odometer {
         self.places.as_ref().map(|places| places.diameters().scales())
     }
 
+    /// The probability of every hypothesis, in the order of [`HYPOTHESES`](super::HYPOTHESES).
+    #[must_use]
+    pub fn probabilities(&self) -> [f64; 8] {
+        self.bank.probabilities()
+    }
+
     /// Takes in the readings of one period. Distance is zero at the end of the first.
     pub fn step(&mut self, period: &Period) -> MotionEstimate {
         let Some(last) = self.last else { return self.begin(period) };
@@ -116,59 +120,61 @@ impl Odometer {
     /// A period after a first one of which nothing was read, as of running counters, whose first value says nothing.
     fn begin_late(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         let first = self.begin(period);
-        let Range { low, high } = self.bounds.speed();
+        let top = self.vehicle.max_speed.as_m_per_s();
         let before = self.ways.distance();
-        let reach = Range { low: before.low + (low * t).min(0.0), high: before.high + (high * t).max(0.0) };
-        self.ways.relocate(reach);
-        self.distance += self.train.v * t;
+        let reach = Range { low: before.low - top * t, high: before.high + top * t };
+        self.relocate(reach, reach);
+        self.distance += self.speed * t;
         self.finished(MotionEstimate { distance: Length::from_m(self.distance), ..first }, &last)
     }
 
-    /// The first period of a run.
+    /// The first period of a run. Its counts may be a spike: they begin the estimate and bound nothing.
     fn begin(&mut self, period: &Period) -> MotionEstimate {
         let t = self.vehicle.period.as_s();
         let [first, second] = &mut self.wheels;
         let read = [first.begin(period, 0, t), second.begin(period, 1, t)];
+        let pulse = larger(first.pitch, second.pitch) / t;
         let most = self.vehicle.max_speed.as_m_per_s();
-        let off = 1.5 * first.pitch.max(second.pitch) / t;
-        let mut bounds = Range { low: 0.0, high: most };
-        let speeds = read.iter().flatten();
-        if let Some(fastest) = speeds.clone().copied().reduce(f64::max) {
-            bounds.high = (fastest + FIRST_CREEP * fastest.abs() + off).min(most);
-        }
-        if let Some(slowest) = speeds.copied().reduce(f64::min) {
-            let low = (slowest - FIRST_CREEP * slowest.abs() - off).max(-most);
-            bounds.low = if slowest < 0.0 { low } else { low.max(0.0) };
-        }
-        let (speed, variance) = match read {
-            [Some(a), Some(b)] => (0.5 * (a + b), 0.5 * FIRST_COUNT),
-            [Some(v), None] | [None, Some(v)] => (v, FIRST_COUNT),
-            [None, None] => (0.0, most * most * t * t),
+        let backwards = read.iter().flatten().any(|speed| *speed < 0.0) || read == [None, None];
+        let bounds = Range { low: if backwards { -most } else { 0.0 }, high: most };
+        let speed = match read {
+            [Some(a), Some(b)] if (a - b).abs() < AGREE_PULSES * pulse => 0.5 * (a + b),
+            // A spike adds pulses.
+            [Some(a), Some(b)] if a.abs() < b.abs() => a,
+            [_, Some(b)] => b,
+            [Some(a), None] => a,
+            [None, None] => 0.0,
         };
         self.unread = read == [None, None];
-        if bounds.is_empty() {
-            // Faster than the train can be: no count of a wheel.
-            bounds = Range { low: -most, high: most };
-        }
         let speed = bounds.nearest(speed);
-        self.bounds = SpeedBounds::new(bounds);
-        self.train = TrainFilter::new(speed, variance * (first.pitch / t) * (first.pitch / t) + 1e-4);
+        self.bounds = GuaranteedSpeed::new(bounds, most);
+        self.bank = Bank::new(speed, FIRST_SPEED * FIRST_SPEED, &self.vehicle.wheelsets);
+        (self.speed, self.acceleration, self.variance) = (speed, 0.0, FIRST_SPEED * FIRST_SPEED);
+        self.probable_speed = bounds;
+        if let Some(published) = &mut self.published {
+            published.begin(speed);
+        }
+        let nothing = MotionBounds {
+            speed_low: Speed::ZERO,
+            speed_high: Speed::ZERO,
+            distance_low: Length::ZERO,
+            distance_high: Length::ZERO,
+        };
         let estimate = MotionEstimate {
             time: period.time,
             speed: Speed::from_m_per_s(speed),
-            speed_deviation: Speed::from_m_per_s(self.train.speed_deviation()),
-            speed_low: Speed::from_m_per_s(bounds.low),
-            speed_high: Speed::from_m_per_s(bounds.high),
+            speed_deviation: Speed::from_m_per_s(FIRST_SPEED),
+            guaranteed: nothing,
+            confidence: nothing,
             acceleration: Acceleration::ZERO,
             distance: Length::ZERO,
-            distance_low: Length::ZERO,
-            distance_high: Length::ZERO,
             over: Length::ZERO,
             under: Length::ZERO,
             wheels: [WheelState::Rolling; 2],
             mode: if read.iter().all(Option::is_some) { Mode::Normal } else { Mode::Degraded },
             shares: [0.5, 0.5, 0.0],
         };
+        let estimate = self.finished(estimate, &estimate);
         self.last = Some(estimate);
         estimate
     }
@@ -184,9 +190,11 @@ impl Odometer {
             distance: self.distance,
             places: self.places.clone(),
             amounts: self.amounts,
+            above_top: self.above_top,
+            signed: self.signed,
             ..fresh
         };
-        fresh.ways.relocate(reach);
+        fresh.relocate(reach, reach);
         let first = fresh.begin(period);
         *self = fresh;
         let estimate =
@@ -197,108 +205,87 @@ impl Odometer {
 
     fn fresh(vehicle: Vehicle, settings: OdometrySettings) -> Self {
         let [first, second] = vehicle.wheelsets;
-        let fastest = vehicle.max_speed.as_m_per_s();
+        let top = vehicle.max_speed.as_m_per_s();
+        let all = Range { low: -top, high: top };
         Self {
             vehicle,
             settings,
             wheels: [WheelChannel::new(first, &vehicle), WheelChannel::new(second, &vehicle)],
             command: CommandWatch::new(),
-            slips: SlipSlide::new(vehicle.thresholds, settings.both_axles, settings.latch),
-            bounds: SpeedBounds::new(Range { low: 0.0, high: fastest }),
+            bounds: GuaranteedSpeed::new(all, top),
             ways: DistanceBounds::new(Range::exactly(0.0)),
-            train: TrainFilter::new(0.0, fastest * fastest),
-            stand_in: None,
+            bank: Bank::new(0.0, top * top, &vehicle.wheelsets),
+            probable_speed: all,
+            probable_distance: Range::exactly(0.0),
             last: None,
-            clock: 0.0,
             way: 1.0,
+            speed: 0.0,
+            acceleration: 0.0,
+            variance: top * top,
             distance: 0.0,
-            ahead: 0.0,
             blind: 0.0,
+            corrected_for: 0.0,
             unread: true,
-            alike_for: 0.0,
-            past: Past::new(),
             published: match settings.carrier {
-                Carrier::Published { fusion, manoeuvre } => Some(Published::new(fusion, manoeuvre)),
-                Carrier::Counts { .. } => None,
+                Carrier::Published { fusion, manoeuvre, reading } => {
+                    Some(Published::new(fusion, manoeuvre, reading, &vehicle))
+                }
+                Carrier::Hypotheses => None,
             },
             places: settings.balises.map(|accuracy| Places::new(vehicle.wheelsets, accuracy)),
             inertia: None,
             amounts: [0.0; 2],
+            above_top: 0,
+            signed: false,
         }
     }
 
     fn follow(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
-        self.clock += t;
         let effort = period.effort.filter(|effort| effort.abs() <= LARGEST_EFFORT);
-        let seen = {
-            let [first, second] = &self.wheels;
-            let (a, b) = (first.smooth_acceleration, second.smooth_acceleration);
-            if smaller(a, b) < -larger(a, b) { smaller(a, b) } else { larger(a, b) }
-        };
-        let held = self.slips.lost().contains(&Some(Loss::Slide));
-        let allowed = self.command.next(effort, seen, held, t, &self.vehicle);
-        // One forward and the other backward: then neither says that the train has turned round.
-        for (wheel, reading) in self.wheels.iter_mut().zip(&period.wheels) {
-            wheel.hear(reading, self.way, t);
-        }
-        let disputed = {
-            let [first, second] = &self.wheels;
-            first.told.way() * second.told.way() < 0.0
-        };
-        if disputed && self.way < 0.0 {
-            // One of the two is wired the wrong way round; trains that run backward are rarer.
-            self.turn();
-        }
-        let heading = Heading { way: self.way, certain: self.train.v.abs() > CERTAIN_HEADING, disputed };
-        let [first_lost, second_lost] = self.slips.lost();
-        let at = (t, self.vehicle.period.as_s());
-        let [first, second] = &mut self.wheels;
-        let counted = [
-            first.read(period, 0, at, heading, &allowed, first_lost),
-            second.read(period, 1, at, heading, &allowed, second_lost),
-        ];
-
-        let possible = self.bounds.possible(&allowed, t);
-        let turns = [first.turns(allowed.acceleration), second.turns(allowed.acceleration)];
-        let before = self.train.v;
-        let jerk = match self.settings.carrier {
-            Carrier::Counts { jerk_density } if self.stand_in.is_none() => jerk_density,
-            _ => BLIND_JERK,
-        };
-        let way = self.train.run(t, jerk);
-        let mut lost = self.judge(&turns, possible, &allowed, t);
-        if self.agreed(&allowed, t) {
-            self.slips.clear();
-            for wheel in &mut self.wheels {
-                wheel.watch.believe();
-            }
-            lost = [None; 2];
-        }
-        if lost == [Some(Loss::Slide); 2] {
-            self.command.disprove();
-        }
+        let allowed = self.command.next(effort, t, &self.vehicle);
+        let counted = self.read(period, &allowed, t);
+        let before = self.speed;
         let speed_before = self.bounds.speed();
-        let mut bounded = self.narrow(possible, &turns, &allowed, lost, t);
-        if self.settings.inertial {
-            bounded = self.feel(period, before, bounded, t);
+        let bounded = self.narrow(period, &allowed, before, t);
+        let scene = self.scene(counted, &allowed);
+        let too_fast =
+            scene.wheels.iter().all(|wheel| wheel.read && wheel.speed > TOO_FAST * scene.top_speed);
+        self.above_top += u64::from(too_fast);
+        let ran = self.bank.step(&scene, t);
+        let [probable_speed, probable_way] = self.bank.interval(&scene, 1.0 - self.settings.confidence, t);
+        let (lost, dead) = self.probable();
+        let (ran, shares, lost, dead) = if let Some(published) = &mut self.published {
+            let fused = published.next(&self.wheels, counted, &allowed, &self.vehicle, t);
+            let top = self.vehicle.max_speed.as_m_per_s();
+            let speed = larger(smaller(fused.speed, top), -top);
+            (self.speed, self.acceleration, self.variance) = (speed, fused.acceleration, fused.variance);
+            self.corrected_for = published.corrected_for();
+            (0.5 * (before + speed) * t, fused.shares, fused.lost, [false; 2])
+        } else {
+            (self.speed, self.acceleration, self.variance) = self.bank.motion();
+            self.speed = bounded.nearest(self.speed);
+            let lost_both = lost.iter().all(Option::is_some);
+            self.corrected_for = if lost_both { self.corrected_for + t } else { 0.0 };
+            (ran, self.shares(), lost, dead)
+        };
+        let read = self.wheels.iter().any(WheelChannel::is_read);
+        self.blind = if read { 0.0 } else { self.blind + t };
+        if let (Some(inertia), [None, None]) = (&mut self.inertia, lost) {
+            inertia.align(self.speed, !allowed.slide && !allowed.slip);
         }
-
-        let trusted = self.trusted(lost);
-        let (way, shares) = self.carry(counted, lost, &allowed, before, way, t);
-        if self.published.is_none() {
-            self.train.v = bounded.nearest(self.train.v);
-        }
-        self.distance += self.way * way;
-        self.ways.moved(speed_before, bounded, allowed.acceleration, &self.counted(lost, &allowed), t);
-        self.place(period, effort, lost, way);
+        self.distance += self.way * ran;
+        self.ways.moved(speed_before, bounded, allowed.acceleration, &self.counted(&allowed), t);
+        self.enclose(probable_speed, probable_way, bounded);
+        self.place(period, effort, lost, ran);
+        let states = self.states(lost, dead);
         let estimate = MotionEstimate {
             time: period.time,
-            speed: Speed::from_m_per_s(self.way * self.train.v),
-            speed_deviation: Speed::from_m_per_s(self.train.speed_deviation()),
-            acceleration: Acceleration::from_m_per_s2(self.way * self.train.a),
+            speed: Speed::from_m_per_s(self.way * self.speed),
+            speed_deviation: Speed::from_m_per_s(libm::sqrt(self.variance)),
+            acceleration: Acceleration::from_m_per_s2(self.way * self.acceleration),
             distance: Length::from_m(self.distance),
-            wheels: self.states(lost),
-            mode: self.mode(lost, trusted),
+            wheels: states,
+            mode: self.mode(states),
             shares,
             ..last
         };
@@ -307,20 +294,10 @@ impl Odometer {
         estimate
     }
 
-    /// Lets the inertial sensor narrow the bounds; what is left of them.
-    fn feel(&mut self, period: &Period, before: f64, bounded: Range, t: f64) -> Range {
-        let reading = period
-            .acceleration
-            .map(|reading| self.way * reading.as_m_per_s2())
-            .filter(|reading| reading.abs() <= LARGEST_READING);
-        if self.inertia.is_none() && reading.is_some() {
-            self.inertia = Some(Inertia::new(before, self.bounds.speed()));
-        }
-        let Some(inertia) = &mut self.inertia else { return bounded };
-        inertia.read(reading, t);
-        let both = inertia.hold(bounded);
-        self.bounds.set(both);
-        both
+    /// The train is known to be between these places (m, in the direction of travel): guaranteed, and probably.
+    fn relocate(&mut self, guaranteed: Range, probable: Range) {
+        self.ways.relocate(guaranteed);
+        self.probable_distance = probable;
     }
 
     /// Lets balises correct the distance and the diameters. The train has just run `way` (m).
@@ -351,7 +328,9 @@ impl Odometer {
             *under += (bounds.high - self.distance).max(0.0);
             self.distance = known.estimate.as_m();
             let place = Range { low: known.low.as_m(), high: known.high.as_m() };
-            self.ways.relocate(if self.way < 0.0 { place.reversed() } else { place });
+            let place = if self.way < 0.0 { place.reversed() } else { place };
+            self.ways.relocate(place);
+            self.probable_distance = place;
         }
         for (wheel, (scale, bounds)) in self.wheels.iter_mut().zip(places.scales()) {
             wheel.rescale(scale, bounds);
@@ -362,23 +341,24 @@ impl Odometer {
     fn turn_round(&mut self) {
         let says = |wheel: &WheelChannel| wheel.told.way() * self.way;
         let back = self.wheels.iter().any(|wheel| says(wheel) < 0.0 && wheel.told.convincing());
-        if self.train.v > -TURNED_ROUND || !back || self.wheels.iter().any(|wheel| says(wheel) > 0.0) {
+        if self.speed > -TURNED_ROUND || !back || self.wheels.iter().any(|wheel| says(wheel) > 0.0) {
             return;
         }
         self.turn();
     }
 
-    fn turn(&mut self) {
+    pub(super) fn turn(&mut self) {
         self.way = -self.way;
-        self.train.reverse();
+        self.speed = -self.speed;
+        self.acceleration = -self.acceleration;
+        self.bank.reverse();
         self.bounds.reverse();
         self.ways.reverse();
-        self.slips.clear();
-        self.stand_in = None;
+        self.probable_speed = self.probable_speed.reversed();
+        self.probable_distance = self.probable_distance.reversed();
         if let Some(published) = &mut self.published {
-            published.restart();
+            published.restart(self.speed);
         }
-        self.ahead = -self.ahead;
         // Its bias and the gradient are felt the other way round.
         self.inertia = None;
         for wheel in &mut self.wheels {

@@ -16,6 +16,11 @@ impl Recent {
         Self { now: value, before: value, age: 0.0, half }
     }
 
+    /// For how long a value counts at least (s).
+    pub(super) const fn half(&self) -> f64 {
+        self.half
+    }
+
     pub(super) const fn largest(&self) -> f64 {
         larger(self.now, self.before)
     }

@@ -2,8 +2,8 @@
 
 use super::command_watch::Allowed;
 use crate::wheels::{
-    CountWindows, Expected, Heading, Loss, Period, Quality, Range, SensorWatch, Tachometer, ToldWay, Vehicle,
-    WheelReading, WheelTracker, Wheelset, smaller,
+    CountWindows, Expected, Heading, Period, Quality, Range, Tachometer, ToldWay, Vehicle, WheelReading,
+    WheelTracker, Wheelset,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
@@ -11,19 +11,16 @@ use crate::wheels::{
 const SURPRISE_PULSES: f64 = 2.2;
 /// ... and by which it rarely does.
 const RARE_PULSES: f64 = 1.5;
-/// No wheelset on rails was seen to change its speed faster (m/s²): locking on the poorest rail takes 20.
-const EVER: f64 = 40.0;
-/// Accelerations of a wheelset beyond which a count is not one of a wheel (m/s²): the train's and noise, a wheel that
-/// slips or slides, one that regains its grip.
+/// Accelerations of a wheelset beyond which a count surprises (m/s²): of one that can only roll, and of one that can
+/// slip, slide or regain its grip.
 const ROLLING: f64 = 2.5;
-const LOSING: f64 = 20.0;
-const REGAINING: f64 = 30.0;
+const SLIPPING: f64 = 30.0;
+/// A count that is the same for longer is hardly that of a wheel (s).
+const STUCK_AFTER_S: f64 = 0.7;
 /// Readings before the tracker knows enough to be surprised.
 const WARM: u32 = 8;
 /// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
 const FASTER_THAN_TRAIN: f64 = 1.2;
-/// Time over which the acceleration is smoothed that tells braking from coasting (s).
-const SMOOTHED_S: f64 = 0.5;
 
 /// What one wheelset tells the odometer.
 #[derive(Debug, Clone)]
@@ -37,12 +34,12 @@ pub(super) struct WheelChannel {
     /// The inverse of the pitch (1/m).
     pulses_per_m: f64,
     pub(super) tracker: WheelTracker,
-    pub(super) watch: SensorWatch,
     pub(super) quality: Quality,
     /// Pulses of the period in the direction of travel.
     pub(super) pulses: f64,
-    pub(super) smooth_acceleration: f64,
     pub(super) missing_for: f64,
+    /// How long its count has been the same and not zero (s).
+    same_for: f64,
     /// By how many pulses its last count may be wrong.
     pub(super) doubt: f64,
     doubt_before: f64,
@@ -65,11 +62,10 @@ impl WheelChannel {
             pitch_range: Range::around(pitch, wheelset.diameter_tolerance),
             pulses_per_m: 1.0 / pitch,
             tracker: WheelTracker::new(pitch, period),
-            watch: SensorWatch::new(),
             quality: Quality::Missing,
             pulses: 0.0,
-            smooth_acceleration: 0.0,
             missing_for: 0.0,
+            same_for: 0.0,
             doubt: 0.0,
             doubt_before: 0.0,
             told: ToldWay::default(),
@@ -89,38 +85,29 @@ impl WheelChannel {
         (t, nominal): (f64, f64),
         heading: Heading,
         allowed: &Allowed,
-        lost: Option<Loss>,
     ) -> f64 {
         let Some(reading) = period.wheels.get(which) else { return 0.0 };
         let expected = self.tracker.expected(t) * self.pulses_per_m;
         let (may_slide, may_slip) = self.may_differ(allowed);
-        // Only a wheel that has lost its grip can regain it.
-        let (up, down) = match (lost, may_slide, may_slip) {
-            (Some(_), ..) => (REGAINING, REGAINING),
-            (None, true, _) => (ROLLING, LOSING),
-            (None, false, true) => (LOSING, ROLLING),
-            (None, false, false) => (ROLLING, ROLLING),
-        };
-        let warm = self.readings >= WARM && !self.watch.excluded();
+        let most = if may_slide || may_slip { SLIPPING } else { ROLLING };
+        let warm = self.readings >= WARM;
         // What an acceleration of 1 m/s² that sets in at once adds to a count.
         let added = t * t * self.pulses_per_m;
         let leeway = |acceleration: f64| {
             if warm { SURPRISE_PULSES + acceleration * added } else { f64::INFINITY }
         };
-        // Expectation and leeway in the sense in which the tachometer counts.
-        let (more, fewer) =
-            if heading.way < 0.0 { (leeway(down), leeway(up)) } else { (leeway(up), leeway(down)) };
         let expectation = Expected {
             pulses: expected * heading.way,
-            more,
-            fewer,
+            more: leeway(most),
+            fewer: leeway(most),
             rolling: RARE_PULSES + ROLLING * added,
-            ever: SURPRISE_PULSES + EVER * 2.0 * added,
             most: self.most_per_second * t + SURPRISE_PULSES,
         };
         let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
         self.quality = turn.quality;
-        self.pulses = turn.pulses * heading.way;
+        let pulses = turn.pulses * heading.way;
+        self.same_for = if pulses == self.pulses && pulses != 0.0 { self.same_for + t } else { 0.0 };
+        self.pulses = pulses;
         let counted = self.pulses * self.pitch;
         self.doubt = turn.doubt;
         if turn.doubt.is_finite() {
@@ -132,20 +119,18 @@ impl WheelChannel {
             self.windows.counted(t, self.pulses, 0.0);
             self.windows.interrupt();
         }
-        if matches!(turn.quality, Quality::Missing | Quality::Excluded) {
+        if turn.quality == Quality::Missing {
             self.missing_for += t;
             self.readings = 0;
             self.tracker.turned(self.tracker.expected(t), t);
             return counted;
         }
-        if self.readings == 0 && self.missing_for > 0.0 {
+        if self.readings == 0 {
             self.tracker.restart(counted / t);
         }
         self.missing_for = 0.0;
         self.readings = self.readings.saturating_add(1);
         self.tracker.turned(counted, t);
-        self.smooth_acceleration +=
-            (self.tracker.acceleration() - self.smooth_acceleration) * smaller(t / SMOOTHED_S, 1.0);
         counted
     }
 
@@ -159,30 +144,22 @@ impl WheelChannel {
         let reading = period.wheels.get(which)?;
         let most = self.most_per_second * t + SURPRISE_PULSES;
         let any = f64::INFINITY;
-        let open = Expected { pulses: 0.0, more: any, fewer: any, rolling: any, ever: any, most };
+        let open = Expected { pulses: 0.0, more: any, fewer: any, rolling: any, most };
         let uncertain = Heading { way: 1.0, certain: false, disputed: false };
         let turn = self.tachometer.read(reading, 1.0, uncertain, &open);
         self.quality = turn.quality;
         if turn.quality == Quality::Missing {
             return None;
         }
-        let speed = turn.pulses * self.pitch / t;
-        self.tracker.restart(speed);
-        Some(speed)
+        Some(turn.pulses * self.pitch / t)
     }
 
     /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
-        if self.watch.excluded() || self.doubt.is_infinite() {
+        if self.doubt.is_infinite() {
             return Range::ANY;
         }
         self.windows.speed(self.pitch_range, acceleration)
-    }
-
-    /// How fast it turns by its last counts alone (m/s), moved to now with an acceleration (m/s²). The tracker is quicker,
-    /// but overshoots when a wheel that regains its grip stops accelerating.
-    pub(super) fn steady_speed(&self, acceleration: f64) -> Option<f64> {
-        self.windows.mean_speed(self.pitch).map(|(speed, age)| speed + acceleration * age)
     }
 
     /// Its diameter is so many times the believed one.
@@ -193,11 +170,25 @@ impl WheelChannel {
             Range { low: self.wheelset_pitch * bounds.low, high: self.wheelset_pitch * bounds.high };
     }
 
+    /// Its count stands still, where that of a wheel that turns goes to and fro by one.
+    fn is_stuck(&self) -> bool {
+        self.same_for > STUCK_AFTER_S
+    }
+
+    /// The same, while the count of the other wheel moves.
+    pub(super) fn is_stuck_beside(&self, other: &Self) -> bool {
+        self.is_stuck() && other.is_read() && other.pulses != 0.0 && !other.is_stuck()
+    }
+
+    /// The true pitch lies within this part of the assumed one.
+    pub(super) fn tolerance(&self) -> f64 {
+        0.5 * self.pitch_range.width() * self.pulses_per_m
+    }
+
     /// The train has turned round.
     pub(super) fn reverse(&mut self) {
         self.tracker.reverse();
         self.windows.reverse();
-        self.smooth_acceleration = -self.smooth_acceleration;
     }
 
     /// Whether it may slide and whether it may slip now.
@@ -206,13 +197,8 @@ impl WheelChannel {
         (allowed.slide && axle.may_slide(), allowed.slip && axle.may_slip())
     }
 
-    /// Its sample was read, whether or not its sensor is believed.
-    pub(super) fn is_counted(&self) -> bool {
-        !matches!(self.quality, Quality::Missing | Quality::Excluded)
-    }
-
-    /// Its sample was read and its sensor is believed.
+    /// Its sample was read.
     pub(super) fn is_read(&self) -> bool {
-        self.is_counted() && !self.watch.excluded()
+        self.quality != Quality::Missing
     }
 }

@@ -1,8 +1,9 @@
 //! What becomes of the bytes that come: whole replies are read, all others dropped and the line brought into step.
 
-use footplate_core::{Command, Timestamp};
+use footplate_core::{Command, SpeedStep, Timestamp};
 
 use super::super::exchange::{Awaited, Exchange, Purpose, Quiet, Sending, reply_bytes};
+use super::super::module_reads::ModuleReads;
 use super::super::readings::Read;
 use super::super::s88::decode_reply;
 use super::Interface;
@@ -14,22 +15,26 @@ impl Interface {
         let found = self.reply.as_bytes().len();
         self.notify(LinkNotice::ReplyLost { expected: reply_bytes(awaited.request), found });
         self.silence.heard_stray(found);
+        self.polls.lost(awaited.request, found);
         let silent = self.silence.lost(now);
         self.output.extend(silent.map(Transmit::Notice));
-        self.put_in_doubt(now);
+        self.put_in_doubt(now, awaited.heard);
+        if let Exchange::Quiet(quiet) = &mut self.exchange {
+            quiet.lost = Some(awaited);
+        }
         true
     }
 
-    /// Bytes may be lost in either direction: wait, bring the interface into step, and say again what it may have missed.
-    pub(super) fn put_in_doubt(&mut self, now: Timestamp) {
+    /// Bytes may be lost in either direction: wait until the line has been silent for a while, bring the interface into
+    /// step, and say again what it may have missed.
+    pub(super) fn put_in_doubt(&mut self, now: Timestamp, heard: Timestamp) {
         // What was being said may have come half. A release is said again by itself.
         if let Exchange::Sending(Sending { purpose: Purpose::Told(command), .. }) = self.exchange {
             self.unanswered.push(command);
         }
-        self.disturbed = false;
-        self.exchange = Exchange::Quiet(Quiet::begin(now, true));
-        self.recover();
-        self.say_again();
+        (self.disturbed, self.is_overtaken) = (false, false);
+        self.exchange = Exchange::Quiet(Quiet::begin(now, heard, true));
+        self.recovery.begin(self.power_word());
     }
 
     /// What the interface may have missed before the lost reply.
@@ -37,10 +42,10 @@ impl Interface {
         for command in core::mem::take(&mut self.unanswered) {
             match command {
                 Command::Reverse { train } => self.notify(LinkNotice::ReverseInDoubt { train }),
-                // Said by the recovery.
-                Command::PowerOff | Command::PowerOn => {}
-                Command::Speed { .. } | Command::Turnout { .. } if self.farewell.begun => {}
-                Command::Speed { .. } | Command::Turnout { .. } => {
+                // The power goes off as its last word.
+                Command::PowerOff | Command::PowerOn | Command::Turnout { .. } if self.farewell.begun => {}
+                Command::Speed { step, .. } if self.farewell.begun && step != SpeedStep::STAND => {}
+                _ => {
                     if self.waiting.push_again(command) {
                         self.notify(LinkNotice::Repeated { command });
                     }
@@ -61,9 +66,13 @@ impl Interface {
                 });
             }
         }
+        if let Some(reads @ ModuleReads::AllOnly) = self.polls.answered(awaited.request) {
+            self.notify(LinkNotice::Reads(reads));
+        }
         let answers = self.silence.answered();
         self.output.extend(answers.map(Transmit::Notice));
         self.unanswered.clear();
+        self.recovery.answered();
         self.pacing.answered();
         self.exchange = Exchange::Free;
         true
@@ -75,17 +84,25 @@ impl Interface {
         let release_is_due = self.solenoid.due().is_some_and(|due| now >= due);
         let command_may_go = self.waiting.has_next(self.solenoid.is_powered());
         let interrupted = !quiet.in_doubt && (self.farewell.begun || command_may_go || release_is_due);
+        let overtakes = quiet.in_doubt && self.waiting.has_urgent() && now >= quiet.stops_may_go();
         if is_over {
             self.complain();
+            if quiet.in_doubt {
+                self.say_again();
+            }
         } else if interrupted {
             // The interface is in step; only what it answers was disturbed. The silence begins anew after this.
-            self.recovery.clear();
+            self.recovery.cancel();
             self.disturbed = true;
+        } else if overtakes {
+            // It is said again once the silence is over, because it may be lost in what is under way.
+            self.is_overtaken = true;
         }
-        if is_over || interrupted {
+        let goes_on = is_over || interrupted || overtakes;
+        if goes_on {
             self.exchange = Exchange::Free;
         }
-        is_over || interrupted
+        goes_on
     }
 
     fn complain(&mut self) {
@@ -98,6 +115,7 @@ impl Interface {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
         match &mut self.exchange {
             Exchange::Awaiting(awaited) => {
+                awaited.heard = now;
                 let awaited = *awaited;
                 self.reply.push(byte);
                 if self.reply.as_bytes().len() == reply_bytes(awaited.request) {
@@ -107,11 +125,14 @@ impl Interface {
             Exchange::Settling(awaited) => {
                 let expected = reply_bytes(awaited.request);
                 self.notify(LinkNotice::ReplyLost { expected, found: expected + 1 });
-                self.exchange = Exchange::Quiet(Quiet::begin(now, false));
-                self.recover();
+                self.exchange = Exchange::Quiet(Quiet::begin(now, now, false));
+                self.recovery.begin(self.power_word());
             }
             Exchange::Quiet(quiet) => {
                 quiet.disturb(now);
+                if let Some(lost) = quiet.lost {
+                    self.reply_time.missed(lost.late(now));
+                }
                 self.stray += 1;
                 self.silence.heard_stray(1);
             }
@@ -124,6 +145,7 @@ impl Interface {
     }
 
     fn heard_all(&mut self, now: Timestamp, awaited: Awaited) {
+        self.reply_time.answered(awaited.late(now));
         let states = decode_reply(awaited.request, self.reply.as_bytes());
         let news = states.is_ok_and(|mut states| states.any(|state| self.readings.shows_new(state)));
         if news {

@@ -4,10 +4,10 @@ use std::io::Write;
 use std::str::FromStr;
 
 use anyhow::bail;
-use footplate_core::calibration::{Direction, FittedPassage, SpeedKey};
-use footplate_core::track::Layout;
-use footplate_core::{Length, SpeedStep};
-use footplate_store::Batch;
+use footplate_core::calibration::{Direction, SettledPassage};
+use footplate_core::track::{Hop, Layout};
+use footplate_core::{Approach, SpeedStep, TimeSpan};
+use footplate_store::{Batch, BatchTrain};
 use serde_json::{Value, json};
 
 use super::table::approach;
@@ -137,21 +137,18 @@ fn place(batch: &Batch, run: usize, entry: usize) -> Value {
     }
 }
 
-fn hop_rows(layout: &Layout, batch: &Batch, passages: &[&FittedPassage]) -> Vec<Vec<Value>> {
-    let hops = passages.windows(2).filter_map(|pair| match pair {
-        [from, to] if !to.first => Some((from, to)),
-        _ => None,
-    });
-    hops.map(|(from, to)| {
+/// The hops of stretches, one row each.
+fn hop_rows<'p>(
+    layout: &Layout,
+    batch: &Batch,
+    stretches: impl Iterator<Item = &'p [SettledPassage]>,
+) -> Vec<Vec<Value>> {
+    let hop = |pair: &[SettledPassage]| {
+        let [from, to] = pair else { return None };
         let took = (to.passage.window.middle() - from.passage.window.middle()).as_s();
         let poll = from.passage.window.variance_s2() + to.passage.window.variance_s2();
         let surveyed = to.passage.way.map_or(0.0, |way| way.length.as_mm());
-        let correction = batch
-            .calibration
-            .fit
-            .correction(&batch.sections, to.key.train, &to.passage)
-            .map_or(0.0, Length::as_mm);
-        vec![
+        Some(vec![
             json!(batch.runs.get(to.run).map_or(0, |run| run.id.0)),
             json!(layout.sensor_name(from.passage.sensor)),
             json!(layout.sensor_name(to.passage.sensor)),
@@ -159,14 +156,14 @@ fn hop_rows(layout: &Layout, batch: &Batch, passages: &[&FittedPassage]) -> Vec<
             rounded(took, 4),
             rounded(poll.sqrt(), 4),
             rounded(surveyed, 0),
-            rounded(correction, 1),
-            rounded((surveyed + correction) / took, 1),
-            rounded(to.late_way.as_mm(), 1),
+            rounded(to.length.as_mm() - surveyed, 1),
+            rounded(to.length.as_mm() / took, 1),
+            rounded(to.late_length.as_mm(), 1),
             json!(if to.suspicious { "suspicious" } else { "used" }),
             place(batch, to.run, to.passage.entry),
-        ]
-    })
-    .collect()
+        ])
+    };
+    stretches.flat_map(|stretch| stretch.windows(2).filter_map(hop).collect::<Vec<_>>()).collect()
 }
 
 const HOP_COLUMNS: [&str; 12] = [
@@ -184,61 +181,73 @@ const HOP_COLUMNS: [&str; 12] = [
     "told_by",
 ];
 
+fn stretches(train: &BatchTrain) -> impl Iterator<Item = &[SettledPassage]> {
+    train.review.running.stretches.iter().map(Vec::as_slice)
+}
+
 fn speeds(layout: &Layout, batch: &Batch, step: SpeedStep) -> Vec<Listing> {
-    let keys: Vec<SpeedKey> =
-        batch.calibration.fit.speeds.keys().filter(|key| key.step == step).copied().collect();
-    keys.into_iter()
-        .map(|key| {
-            let passages: Vec<&FittedPassage> = batch.calibration.behind(key).collect();
-            let speed = batch.calibration.fit.speeds.get(&key);
-            let (value, uncertainty) = speed
-                .map_or((0.0, 0.0), |speed| (speed.value.as_mm_per_s(), speed.uncertainty.as_mm_per_s()));
-            Listing {
-                title: format!(
-                    "Train {}, step {step}, reached from {}: {value:.1} ± {uncertainty:.1} mm/s",
-                    key.train,
-                    approach(key.approach)
-                ),
-                columns: HOP_COLUMNS.to_vec(),
-                rows: hop_rows(layout, batch, &passages),
-            }
+    let listing = |train: &BatchTrain, side: Approach| {
+        let is_own = |stretch: &&[SettledPassage]| {
+            stretch.first().is_some_and(|first| {
+                let drive = first.passage.drive;
+                drive.step == step && drive.approach() == side
+            })
+        };
+        let rows = hop_rows(layout, batch, stretches(train).filter(is_own));
+        let model = train.replay.fit.model();
+        let speed = model.speed(step, side);
+        let (value, uncertainty) = (speed.value.as_mm_per_s(), speed.uncertainty.as_mm_per_s());
+        (!rows.is_empty()).then(|| Listing {
+            title: format!(
+                "Train {}, step {step}, reached from {}: {value:.1} ± {uncertainty:.1} mm/s",
+                model.train(),
+                approach(side)
+            ),
+            columns: HOP_COLUMNS.to_vec(),
+            rows,
         })
-        .collect()
+    };
+    let sides = [Approach::Below, Approach::Above, Approach::Unknown];
+    let of_train = |train| sides.into_iter().filter_map(move |side| listing(train, side));
+    batch.trains.iter().flat_map(of_train).collect()
 }
 
 fn stops(batch: &Batch, step: SpeedStep) -> Vec<Listing> {
-    let tables = batch.calibration.stops.iter().filter(|(_, table)| table.steps.contains_key(&step));
-    tables
-        .map(|(train, table)| Listing {
-            title: format!("Train {train}, stops from step {step}, counted from the command"),
+    let listing = |train: &BatchTrain| {
+        let own = train.review.stops.iter().filter(|stop| stop.step == step);
+        let rows: Vec<Vec<Value>> = own
+            .map(|stop| {
+                vec![
+                    json!(batch.runs.get(stop.run).map_or(0, |run| run.id.0)),
+                    rounded(stop.speed.as_mm_per_s(), 1),
+                    rounded(stop.distance.length().as_mm(), 0),
+                    rounded(stop.uncertainty.as_mm(), 0),
+                    stop.time.map_or(Value::Null, |time: TimeSpan| rounded(time.as_s(), 2)),
+                    place(batch, stop.run, stop.entry),
+                ]
+            })
+            .collect();
+        let model = train.replay.fit.model();
+        let stop = model.stop(step, Approach::Below);
+        (!rows.is_empty()).then(|| Listing {
+            title: format!(
+                "Train {}, stops from step {step}: {:.0} ± {:.0} mm; measured with a tape, counted from the command",
+                model.train(),
+                stop.distance.as_mm(),
+                stop.doubt.as_mm()
+            ),
             columns: vec!["run", "from_mm_per_s", "distance_mm", "uncertainty_mm", "time_s", "told_by"],
-            rows: table
-                .measurements
-                .iter()
-                .filter(|stop| stop.step == step)
-                .map(|stop| {
-                    vec![
-                        json!(batch.runs.get(stop.run).map_or(0, |run| run.id.0)),
-                        rounded(stop.speed[0].as_mm_per_s(), 1),
-                        rounded(stop.distance.length().as_mm(), 0),
-                        rounded(stop.uncertainty.as_mm(), 0),
-                        stop.time.map_or(Value::Null, |time| rounded(time.as_s(), 2)),
-                        place(batch, stop.run, stop.entry),
-                    ]
-                })
-                .collect(),
+            rows,
         })
-        .collect()
+    };
+    batch.trains.iter().filter_map(listing).collect()
 }
 
 fn changes(batch: &Batch, direction: Direction) -> Vec<Listing> {
-    let laws = batch.calibration.laws.iter().filter(|((_, of), _)| *of == direction);
-    laws.map(|((train, _), comparison)| {
-        let own = batch
-            .calibration
-            .transients
-            .iter()
-            .filter(|change| change.train == *train && change.direction() == direction);
+    let listing = |train: &BatchTrain| {
+        let review = &train.review;
+        let comparison = review.laws.get(&direction)?;
+        let own = review.changes.iter().filter(|change| change.direction() == direction);
         let rows = own.flat_map(|change| {
             let [from, to] = change.steps;
             change.points.iter().map(move |point| {
@@ -253,13 +262,17 @@ fn changes(batch: &Batch, direction: Direction) -> Vec<Listing> {
                 ]
             })
         });
-        Listing {
-            title: format!("Train {train}: {} changes behind its law", comparison.changes),
+        Some(Listing {
+            title: format!(
+                "Train {}: {} changes behind its law",
+                train.replay.fit.model().train(),
+                comparison.changes
+            ),
             columns: vec!["run", "from_step", "to_step", "since_command_s", "poll_s", "way_mm", "told_by"],
             rows: rows.collect(),
-        }
-    })
-    .collect()
+        })
+    };
+    batch.trains.iter().filter_map(listing).collect()
 }
 
 fn lengths(layout: &Layout, batch: &Batch, from: &str, to: &str) -> anyhow::Result<Vec<Listing>> {
@@ -268,42 +281,30 @@ fn lengths(layout: &Layout, batch: &Batch, from: &str, to: &str) -> anyhow::Resu
         .zip(layout.node_named(to))
         .and_then(|(from, to)| layout.hops_from(from).find(|hop| hop.to == to));
     let Some(hop) = hop else {
-        bail!("no way leads from {from} to {to} without another contact between them on {}", layout.name());
+        bail!("no path leads from {from} to {to} without another contact between them on {}", layout.name());
+    };
+    let title = |train: &BatchTrain, hop: &Hop<'_>| {
+        let model = train.replay.fit.model();
+        let [length, uncertainty] = model.length(&batch.sections, hop);
+        format!(
+            "Train {}, {from} to {to}: {:+.1} ± {:.1} mm to add to {:.0} mm",
+            model.train(),
+            (length - hop.length).as_mm(),
+            uncertainty.as_mm(),
+            hop.length.as_mm()
+        )
     };
     let Some(section) = batch.sections.section(hop.id) else { return Ok(Vec::new()) };
-    let passages: Vec<&FittedPassage> = batch.calibration.fit.passages.iter().collect();
-    let over = |passage: &FittedPassage| {
-        let ways = passage.passage.way.iter().flat_map(|way| way.hops().to_vec());
-        ways.into_iter().any(|hop| batch.sections.section(hop) == Some(section))
+    let is_over = |pair: &&[SettledPassage]| {
+        let way = pair.last().and_then(|passage| passage.passage.way);
+        way.is_some_and(|way| way.hops().iter().any(|hop| batch.sections.section(*hop) == Some(section)))
     };
-    let trains = batch.calibration.trains();
-    Ok(trains
-        .into_iter()
-        .filter_map(|train| {
-            let correction = batch.calibration.fit.sections.get(&(train, section))?;
-            let pairs: Vec<&FittedPassage> = passages
-                .windows(2)
-                .filter_map(|pair| match pair {
-                    [before, after] if after.key.train == train && !after.first && over(after) => {
-                        Some([*before, *after])
-                    }
-                    _ => None,
-                })
-                .flatten()
-                .collect();
-            let rows = pairs.chunks(2).flat_map(|pair| hop_rows(layout, batch, pair)).collect();
-            Some(Listing {
-                title: format!(
-                    "Train {train}, {from} to {to}: {:+.1} ± {:.1} mm to add to {:.0} mm",
-                    correction.value.as_mm(),
-                    correction.uncertainty.as_mm(),
-                    hop.length.as_mm()
-                ),
-                columns: HOP_COLUMNS.to_vec(),
-                rows,
-            })
-        })
-        .collect())
+    let listing = |train: &BatchTrain| {
+        let pairs = stretches(train).flat_map(|stretch| stretch.windows(2)).filter(is_over);
+        let rows = hop_rows(layout, batch, pairs);
+        (!rows.is_empty()).then(|| Listing { title: title(train, &hop), columns: HOP_COLUMNS.to_vec(), rows })
+    };
+    Ok(batch.trains.iter().filter_map(listing).collect())
 }
 
 #[cfg(test)]

@@ -14,7 +14,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::{MotionFit, StepUse};
 use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
 use footplate_core::track::{Layout, TurnoutStates};
@@ -26,7 +25,7 @@ pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
 pub(in crate::commands) use self::told::line as calibration_line;
 use self::watcher::Watcher;
-use super::{picture, write_calibration};
+use super::picture;
 use crate::clock::now;
 use crate::commands::Outcome;
 use crate::commands::plot::PictureFile;
@@ -178,8 +177,9 @@ impl Session<'_> {
         let Driven { calibrator, at, mishaps, why } = session;
         let took = calibrator.progress(at).elapsed;
         let accuracy = calibrator.accuracy();
+        let sections = calibrator.sections().clone();
         let mut fit = calibrator.into_fit();
-        fit.refit(&SectionIndex::of(layout));
+        fit.refit(&sections);
         let made = now();
         let file = MotionFile::of(layout, fit.model(), Some(made));
         if why.is_trusted() {
@@ -187,7 +187,7 @@ impl Session<'_> {
                 file.keep(&mut Store::open(path)?, made, made)?;
             }
             if let Some(path) = self.out {
-                write_calibration(&file, path)?;
+                file.write(path)?;
             }
             if let Some(plot) = self.plot {
                 plot.write(&picture::of_session(self.train, layout.name(), &accuracy))?;

@@ -3,7 +3,7 @@
 use anyhow::bail;
 use footplate_core::control::calibrate::StepAccuracy;
 use footplate_core::{Approach, HALF_95, TrainId};
-use footplate_store::{CalibrationFile, TrainForm};
+use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
 
 use crate::commands::plot::{Ink, Layer, Panel, Picture, PictureFile, Shape};
 
@@ -23,38 +23,29 @@ struct AtStep {
 ///
 /// # Errors
 /// It is of several trains, or the file cannot be written.
-pub(in crate::commands) fn draw_calibration(
-    calibration: &CalibrationFile,
-    plot: &PictureFile,
-) -> anyhow::Result<()> {
-    let [train] = calibration.trains.as_slice() else {
+pub(in crate::commands) fn draw_calibration(report: &Findings, plot: &PictureFile) -> anyhow::Result<()> {
+    let [train] = report.trains.as_slice() else {
         bail!(
             "{}: a picture is of one train, and there are {}; choose one with --train",
             plot.path().display(),
-            calibration.trains.len()
+            report.trains.len()
         );
     };
-    plot.write(&of_file(calibration, train))
+    plot.write(&of_report(report, train))
 }
 
-fn of_file(file: &CalibrationFile, train: &TrainForm) -> Picture {
-    let speeds = train.speeds.iter().map(|form| AtStep {
+fn of_report(report: &Findings, train: &TrainFindings) -> Picture {
+    let measured = train.steps.iter().filter(|form| form.is_measured());
+    let at = |form: &MotionStepForm, number: &Quantity| AtStep {
         step: form.step.get(),
         approach: form.approach,
-        value: form.speed.value,
-        half: HALF_95 * form.speed.uncertainty,
-    });
-    let mut panels = vec![panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>())];
-    if let Some(stops) = &train.stops {
-        let ways = stops.steps.iter().map(|form| AtStep {
-            step: form.step.get(),
-            approach: Approach::Unknown,
-            value: form.distance.value,
-            half: HALF_95 * form.distance.uncertainty,
-        });
-        panels.push(panel("way to rest (mm)", &ways.collect::<Vec<_>>()));
-    }
-    picture(train.train, &file.layout, "from recordings; bars are 95 % of what is not known", panels)
+        value: number.value,
+        half: HALF_95 * number.uncertainty,
+    };
+    let speeds: Vec<_> = measured.clone().map(|form| at(form, &form.speed)).collect();
+    let stops: Vec<_> = measured.map(|form| at(form, &form.stop)).collect();
+    let panels = vec![panel("steady speed (mm/s)", &speeds), panel("stopping distance (mm)", &stops)];
+    picture(train.train, &report.layout, "from recordings; bars are 95 % intervals", panels)
 }
 
 /// What a calibration of a driven train says.
@@ -73,7 +64,7 @@ pub(super) fn of_session(train: TrainId, layout: &str, accuracy: &[StepAccuracy]
     });
     let panels = vec![
         panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>()),
-        panel("way to rest (mm)", &ways.collect::<Vec<_>>()),
+        panel("stopping distance (mm)", &ways.collect::<Vec<_>>()),
     ];
     picture(
         train,

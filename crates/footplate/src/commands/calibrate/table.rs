@@ -4,13 +4,13 @@ use std::io::{self, Write};
 
 use footplate_core::Approach;
 use footplate_core::calibration::Direction;
-use footplate_store::{Batch, CalibrationFile, Quantity, StopForm, TrainForm};
+use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
 
 /// How many other laws are told beside the best.
 const RUNNERS_UP: usize = 2;
 
-pub(super) fn write(file: &CalibrationFile, batch: &Batch, output: &mut dyn Write) -> io::Result<()> {
-    for polling in &file.polling {
+pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()> {
+    for polling in &report.polling {
         match &polling.period {
             Some(period) => writeln!(
                 output,
@@ -28,67 +28,61 @@ pub(super) fn write(file: &CalibrationFile, batch: &Batch, output: &mut dyn Writ
             )?,
         }
     }
-    for train in &file.trains {
+    for train in &report.trains {
         writeln!(output)?;
-        write_train(train, batch, output)?;
+        write_train(train, output)?;
     }
     writeln!(
         output,
-        "\nvalue ± one standard deviation; hops and changes are measurements; lengths count in speeds, so all \
-         speeds share\nthe uncertainty of the survey. The measurements behind a number: --explain SPEED:14"
+        "\nvalue ± one standard deviation of what is not known; scatter is what no measuring would narrow. Lengths count in\n\
+         speeds, so all speeds share the uncertainty of the survey. The measurements behind a number: --explain SPEED:14"
     )
 }
 
-fn write_train(train: &TrainForm, batch: &Batch, output: &mut dyn Write) -> io::Result<()> {
-    let own = || batch.passages.iter().filter(|run| run.train == train.train);
-    let silent = own().filter(|run| run.passages.is_empty()).count();
-    let passages: usize = own().map(|run| run.passages.len()).sum();
-    write!(output, "Train {}: {} runs, {passages} contacts passed", train.train, own().count())?;
-    if silent > 0 {
-        write!(output, ", {silent} runs without a timed one (stalled, or too slow)")?;
+fn write_train(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
+    write!(output, "Train {}: {} runs, {} contacts passed", train.train, train.runs, train.contacts)?;
+    if train.silent_runs > 0 {
+        write!(output, ", {} runs without a timed one (stalled, or too slow)", train.silent_runs)?;
     }
     writeln!(
         output,
-        "\n  contacts scatter by {:.1} mm, a run deviates from the table by {:.1} %",
+        "\n  contacts scatter by {:.1} mm, a run deviates from the speed of its step by {:.1} %",
         train.contact_scatter_mm, train.run_deviation_percent
     )?;
-    writeln!(output, "\n  step  reached from       speed mm/s    hops  runs")?;
-    for speed in &train.speeds {
+    writeln!(
+        output,
+        "\n  step  reached from       speed mm/s   contacts         stop mm   scatter   time s   stops"
+    )?;
+    for step in train.steps.iter().filter(|step| step.is_measured()) {
+        let MotionStepForm { speed, stop, .. } = step;
         writeln!(
             output,
-            "  {:>4}  {:<12} {:>8.1} ± {:<5.1} {:>7} {:>5}",
-            speed.step,
-            approach(speed.approach),
-            speed.speed.value,
-            speed.speed.uncertainty,
-            speed.speed.measurements,
-            speed.runs
-        )?;
-    }
-    for step in &train.hysteresis {
-        writeln!(
-            output,
-            "  step {} from above less from below: {}{}",
+            "  {:>4}  {:<12} {:>8.1} ± {:<5.1} {:>7} {:>9.0} ± {:<5.0} {:>7.0} {:>8.2} {:>7}",
             step.step,
-            uncertain(&step.difference),
-            if step.told_apart { "" } else { " (not told apart by the data)" }
+            approach(step.approach),
+            speed.value,
+            speed.uncertainty,
+            speed.measurements,
+            stop.value,
+            stop.uncertainty,
+            step.stop_scatter_mm,
+            step.stop_s,
+            stop.measurements
         )?;
     }
+    write_stops(train, output)?;
     write_laws(train, output)?;
-    if let Some(stops) = &train.stops {
-        write_stops(stops, output)?;
-    }
     write_lengths(train, output)?;
     write_suspicious(train, output)
 }
 
-fn write_laws(train: &TrainForm, output: &mut dyn Write) -> io::Result<()> {
+fn write_laws(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
     for law in &train.laws {
         let direction = match law.direction {
             Direction::Up => "faster",
             Direction::Down => "slower",
         };
-        writeln!(output, "\n  getting {direction}: {}", law.best.name)?;
+        writeln!(output, "\n  getting {direction}, best described by: {}", law.best.name)?;
         writeln!(
             output,
             "    {}, begins {} after the command; {} changes, held-out error {:.0} mm",
@@ -128,54 +122,31 @@ fn write_laws(train: &TrainForm, output: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-fn write_stops(stops: &StopForm, output: &mut dyn Write) -> io::Result<()> {
-    writeln!(output, "\n  stops, counted from the command")?;
-    writeln!(
-        output,
-        "  step  from mm/s       distance mm     time s          n  scatter mm  off the law mm"
-    )?;
-    for step in &stops.steps {
-        let or_dash =
-            |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.0}"));
-        writeln!(
-            output,
-            "  {:>4}  {:>9.0} {:>11.0} ± {:<6.0} {:>13} {:>4} {:>11} {:>15}",
-            step.step,
-            step.speed_mm_per_s,
-            step.distance.value,
-            step.distance.uncertainty,
-            step.time.as_ref().map_or_else(
-                || "–".to_owned(),
-                |time| format!("{:>5.2} ± {:<5.2}", time.value, time.uncertainty)
-            ),
-            step.distance.measurements,
-            or_dash(step.scatter_mm),
-            or_dash(step.residual_mm)
-        )?;
+fn write_stops(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
+    if train.stops.is_empty() {
+        return Ok(());
     }
-    if let Some(law) = &stops.law {
+    writeln!(output, "\n  stops measured with a tape, counted from the command")?;
+    writeln!(output, "  step  from mm/s     distance mm   time s  run")?;
+    for stop in &train.stops {
+        let time = stop.time_s.map_or_else(|| "–".to_owned(), |time| format!("{time:.2}"));
         writeln!(
             output,
-            "  law: d = τ v + v²/2a with τ = {}, a = {}, rms {:.0} mm",
-            uncertain(&law.delay),
-            uncertain(&law.deceleration),
-            law.rms_mm
+            "  {:>4}  {:>9.0} {:>9.0} ± {:<3.0} {time:>8}  {}:{}",
+            stop.step, stop.speed_mm_per_s, stop.distance_mm, stop.uncertainty_mm, stop.recording, stop.run
         )?;
     }
     Ok(())
 }
 
-fn write_lengths(train: &TrainForm, output: &mut dyn Write) -> io::Result<()> {
+fn write_lengths(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
     writeln!(output, "\n  lengths, to add to the survey (mm)")?;
     for row in train.sections.chunks(4) {
         let cells: Vec<String> = row
             .iter()
             .map(|section| {
                 let name = format!("{}–{}", section.from, section.to);
-                format!(
-                    "{name:<8} {:>+5.1} ± {:<4.1}",
-                    section.correction.value, section.correction.uncertainty
-                )
+                format!("{name:<8} {:>+5.1} ± {:<4.1}", section.add.value, section.add.uncertainty)
             })
             .collect();
         writeln!(output, "  {}", cells.join("  "))?;
@@ -183,16 +154,16 @@ fn write_lengths(train: &TrainForm, output: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-fn write_suspicious(train: &TrainForm, output: &mut dyn Write) -> io::Result<()> {
+fn write_suspicious(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
     if train.suspicious.is_empty() {
         return Ok(());
     }
-    writeln!(output, "\n  suspicious, taken out of the fit")?;
+    writeln!(output, "\n  suspicious, of little weight in the fit")?;
     for suspicion in &train.suspicious {
         let number = suspicion.stored_as.map_or_else(String::new, |key| format!(", event {key}"));
         writeln!(
             output,
-            "  {} line {}{number}: {} {:.0} ms {} than fitted ({:.0} mm); chance allows one in {:.0e}",
+            "  {} line {}{number}: {} {:.0} ms {} than its neighbours say ({:.0} mm); chance allows one in {:.0e}",
             suspicion.recording,
             suspicion.line,
             suspicion.sensor,

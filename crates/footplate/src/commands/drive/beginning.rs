@@ -3,7 +3,7 @@
 use anyhow::Context;
 use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::Driver;
-use footplate_core::track::Leg;
+use footplate_core::track::{Leg, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId, TurnoutId};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,23 @@ pub(crate) struct DriveBeginning {
 impl DriveBeginning {
     /// The name of such a machine in a store.
     pub(crate) const KIND: &'static str = "drive";
+
+    /// A session of a person who has said nothing yet, with trains as they were handed over.
+    pub(crate) fn of_person(
+        written: &WrittenLayout,
+        turnouts: &TurnoutStates,
+        (models, fits): (Vec<MotionModel>, Vec<MotionFit>),
+    ) -> Self {
+        Self {
+            layout: written.text.clone(),
+            turnouts: written.legs(turnouts),
+            models,
+            fits,
+            giver: Giver::Person,
+            script: Vec::new(),
+            is_complete: false,
+        }
+    }
 
     /// The text of the layout.
     pub(crate) fn layout(&self) -> &str {

@@ -5,7 +5,7 @@ mod outcomes;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use footplate_core::calibration::motion::MotionModel;
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::{
     Dispatcher, Driver, Finished, Journey, Machine, Order, OrderId, Output, Promise, Refusal,
 };
@@ -130,6 +130,11 @@ impl Conductor {
             measured_again.flatten().or_else(|| self.learning.model(train))
         });
         learnt.collect()
+    }
+
+    /// What the next session goes on from.
+    pub(crate) fn handed_over(&mut self) -> (Vec<MotionModel>, Vec<MotionFit>) {
+        (self.learnt(), self.learning.handed_over())
     }
 
     /// A person wrote a line.

@@ -77,6 +77,16 @@ impl Learning {
         self.fits.remove(&train);
     }
 
+    /// All fits, with the chain of what trains did broken: nobody knows what becomes of them until they are driven again.
+    pub(super) fn handed_over(&self) -> Vec<MotionFit> {
+        let fits = self.fits.values().cloned();
+        fits.map(|mut fit| {
+            fit.interrupt();
+            fit
+        })
+        .collect()
+    }
+
     /// What is known of a train by now. Takes a while: not for between two reports.
     pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
         let fit = self.fits.get_mut(&train)?;

@@ -34,7 +34,7 @@ pub(crate) struct Ended {
     /// As it was written.
     pub(super) text: String,
     /// Its first word.
-    pub(super) command: &'static str,
+    pub(crate) command: &'static str,
     pub(super) train: Option<TrainId>,
     pub(super) target: Target,
     /// The target as the train faces it, where it may have come from either side.
@@ -44,13 +44,13 @@ pub(crate) struct Ended {
     /// How far beyond the target that is.
     pub(super) error: Option<Length>,
     /// What had been promised of that.
-    pub(super) promise: Option<Promise>,
+    pub(crate) promise: Option<Promise>,
     /// When, since the session began.
     pub(super) at: TimeSpan,
     /// A contact that should have reported the train and did not.
     pub(super) unseen: Option<String>,
     /// Why it was not carried out.
-    pub(super) refused: Option<String>,
+    pub(crate) refused: Option<String>,
 }
 
 /// Where an order was to lead.

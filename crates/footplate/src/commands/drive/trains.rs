@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId};
@@ -93,7 +94,7 @@ impl KnownTrains {
     ) -> anyhow::Result<()> {
         let at = now();
         match KeptModel::of_store(layout, store, train, at)? {
-            KeptModel::Model(model) => drop(self.models.insert(train, *model)),
+            KeptModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
             KeptModel::OfOtherFormulas => eprintln!(
                 "what the store says of train {train} was learnt by other formulas; it is learnt anew from its events"
             ),
@@ -105,6 +106,7 @@ impl KnownTrains {
             return Ok(());
         }
         let mut fit = replay.fit;
+        fit.begin_session(&SectionIndex::of(layout));
         if let Some(model) = self.models.get(&train) {
             // Which steps move it follows from experiments, not from the events alone.
             for step in (1..=HIGHEST).filter_map(SpeedStep::new) {

@@ -62,10 +62,7 @@ impl Arguments {
         let context = ImportContext {
             name: self.name.clone().unwrap_or_else(stem),
             about: self.about.trim().to_owned(),
-            survey: Survey {
-                uncertainty: Length::from_mm(self.length_uncertainty),
-                origin: self.length_origin.clone(),
-            },
+            survey: Survey::taped(Length::from_mm(self.length_uncertainty), self.length_origin.clone()),
             never_both_curved: self.never_both_curved.clone(),
         };
         let tables = LayoutTables::open(&self.nodes, &self.edges, self.schematic.as_deref())?;

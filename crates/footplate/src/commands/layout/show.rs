@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use footplate_core::track::{Hop, Layout, NodeKind, TurnoutNeed, Zone};
+use footplate_core::track::{Hop, Layout, NodeKind, StretchLength, TurnoutNeed, Zone};
 use footplate_store::{LayoutFile, draw_layout, layout_named, write_whole};
 use serde_json::{Value, json};
 
@@ -57,14 +57,30 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
     let [sensors, turnouts, ends] = counts(layout);
     let nodes = layout.nodes().len();
     writeln!(output, "nodes   {nodes}: {sensors} sensors, {turnouts} turnouts, {ends} track ends")?;
-    let (shortest, longest) = range_mm(layout.edges().map(|(_, edge)| edge.length.as_mm()));
-    writeln!(output, "edges   {} of {shortest:.0} to {longest:.0} mm", layout.edges().len())?;
-    writeln!(output, "rails   {:.0} mm", layout.total_length().as_mm())?;
+    let known = || layout.edges().filter(|(_, edge)| edge.known != StretchLength::Unknown);
+    let (shortest, longest) = range_mm(known().map(|(_, edge)| edge.length.as_mm()));
+    let unknown = layout.edges().len() - known().count();
+    write!(output, "edges   {} of {shortest:.0} to {longest:.0} mm", known().count())?;
+    if unknown > 0 {
+        write!(output, ", and {unknown} that were not measured")?;
+    }
+    writeln!(output)?;
+    if unknown == 0 {
+        writeln!(output, "rails   {:.0} mm", layout.total_length().as_mm())?;
+    }
     let survey = layout.survey();
     writeln!(output, "        an edge is known to {} mm: {}", survey.uncertainty.as_mm(), survey.origin)?;
-    let (shortest, longest) = range_mm(sensor_hops(layout).map(|hop| hop.length.as_mm()));
+    if survey.scale > 0.0 {
+        writeln!(output, "        all lengths together to {:.1} %", 100.0 * survey.scale)?;
+    }
+    let measured = sensor_hops(layout).filter(|hop| is_measured(layout, hop));
+    let (shortest, longest) = range_mm(measured.map(|hop| hop.length.as_mm()));
     let count = sensor_hops(layout).count();
-    writeln!(output, "hops    {count} from sensor to sensor, of {shortest:.0} to {longest:.0} mm")?;
+    write!(output, "hops    {count} from sensor to sensor")?;
+    if shortest <= longest {
+        write!(output, ", of {shortest:.0} to {longest:.0} mm")?;
+    }
+    writeln!(output)?;
     for [one, other] in layout.never_both_curved() {
         writeln!(output, "pair    turnouts {one} and {other} are never both curved")?;
     }
@@ -86,7 +102,11 @@ fn write_hops(layout: &Layout, output: &mut dyn Write) -> anyhow::Result<()> {
     for hop in sensor_hops(layout) {
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
         let needs = facing(&hop).map(|need| format!(" {} {}", need.turnout, need.leg)).collect::<String>();
-        writeln!(output, "{from:>8} {to:<8} {:>5.0} mm {needs}", hop.length.as_mm())?;
+        if is_measured(layout, &hop) {
+            writeln!(output, "{from:>8} {to:<8} {:>5.0} mm {needs}", hop.length.as_mm())?;
+        } else {
+            writeln!(output, "{from:>8} {to:<8}     ? mm {needs}")?;
+        }
     }
     Ok(())
 }
@@ -98,7 +118,7 @@ fn summary(layout: &Layout) -> Value {
         json!({
             "from": layout.node_name(hop.from),
             "to": layout.node_name(hop.to),
-            "length_mm": rounded_mm(hop.length.as_mm()),
+            "length_mm": is_measured(layout, &hop).then(|| rounded_mm(hop.length.as_mm())),
             "turnouts": turnouts.collect::<Value>(),
         })
     });
@@ -116,7 +136,7 @@ fn summary(layout: &Layout) -> Value {
         "sensors": sensors,
         "turnouts": turnouts,
         "track_ends": ends,
-        "total_length_mm": rounded_mm(layout.total_length().as_mm()),
+        "total_length_mm": layout.is_measured().then(|| rounded_mm(layout.total_length().as_mm())),
         "length_uncertainty_mm": rounded_mm(layout.survey().uncertainty.as_mm()),
         "length_origin": layout.survey().origin,
         "never_both_curved": layout.never_both_curved(),
@@ -138,6 +158,12 @@ fn counts(layout: &Layout) -> [usize; 3] {
 
 fn sensor_hops(layout: &Layout) -> impl Iterator<Item = Hop<'_>> {
     layout.hops().filter(|hop| layout.sensor_at(hop.from).is_some() && hop.sensor.is_some())
+}
+
+/// Whether the length of every edge of a hop is known in some way.
+fn is_measured(layout: &Layout, hop: &Hop<'_>) -> bool {
+    let mut edges = hop.edges.iter().filter_map(|edge| layout.edge(*edge));
+    edges.all(|edge| edge.known != StretchLength::Unknown)
 }
 
 /// The turnouts that decide whether a train takes a hop.

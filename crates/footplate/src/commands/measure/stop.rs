@@ -6,9 +6,10 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use footplate_core::calibration::{StopEntry, StopMeasurement};
+use footplate_core::calibration::TapedStop;
+use footplate_core::calibration::motion::StopForecast;
 use footplate_core::track::Layout;
-use footplate_core::{SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 use footplate_store::{Batch, EventKey, RecordingKey, Store, layout_named};
 use serde_json::{Value, json};
 
@@ -18,7 +19,7 @@ use crate::clock::now;
 use crate::commands::Outcome;
 use crate::commands::plot::PictureFile;
 
-/// Beyond this many standard deviations from the other stops a reading is pointed out: one in 300 by chance.
+/// Beyond this many standard deviations from what the model expects a reading is pointed out: one in 300 by chance.
 const REMARKABLE: f64 = 3.0;
 
 /// Add where a train stands, measured from the contact it passed last to its pickup shoe.
@@ -117,17 +118,21 @@ impl Arguments {
     }
 }
 
-/// What is known of stops from a step: all of them together, and each.
+/// What is known of stops from a step.
 struct Known {
-    entry: StopEntry,
-    last: Option<StopMeasurement>,
+    /// By the motion model.
+    stop: StopForecast,
+    /// The last stop that was measured.
+    last: Option<TapedStop>,
 }
 
 fn known(layout: &Layout, store: &Store, train: TrainId, from: SpeedStep) -> Option<Known> {
     let batch = Batch::of_store(layout, store, now(), Some(train)).ok()?;
-    let table = batch.calibration.stops.get(&train)?;
-    let last = table.measurements.iter().rev().find(|stop| stop.step == from).copied();
-    Some(Known { entry: *table.steps.get(&from)?, last })
+    let train = batch.trains.first()?;
+    let model = train.replay.fit.model();
+    let is_known = [Approach::Below, Approach::Above].iter().any(|side| model.speed(from, *side).count > 0);
+    let last = train.review.stops.iter().rev().find(|stop| stop.step == from).copied();
+    is_known.then(|| Known { stop: model.stop(from, Approach::Below), last })
 }
 
 fn last_event(store: &Store, stopped: &StoppedRun) -> anyhow::Result<EventKey> {
@@ -162,23 +167,16 @@ impl Told<'_> {
                  pass two contacts at it"
             );
         };
-        let now = after.entry.distance;
-        let shown = |mm: f64| format!("{mm:.0}");
-        let before = self
-            .before
-            .as_ref()
-            .map_or_else(String::new, |before| format!("{} -> ", shown(before.entry.distance.value.as_mm())));
-        writeln!(
-            output,
-            "stop from step {from}: {before}{} mm ± {} mm, {} measured",
-            shown(now.value.as_mm()),
-            shown(now.uncertainty.as_mm()),
-            now.count
-        )?;
+        let shown = |known: &Known| {
+            let StopForecast { distance, doubt, .. } = known.stop;
+            format!("{:.0} ± {:.0} mm", distance.as_mm(), doubt.as_mm())
+        };
+        let before = self.before.as_ref().map_or_else(String::new, |before| shown(before) + " -> ");
+        writeln!(output, "stop from step {from}: {before}{}, {} measured", shown(after), after.stop.count)?;
         if let Some(sigmas) = self.remarkable() {
             writeln!(
                 output,
-                "this one is {sigmas:.0} standard deviations from the others; if the tape was misread: footplate store \
+                "this one is {sigmas:.0} standard deviations from what the model expected; if the tape was misread: footplate store \
                  exclude {key} --reason \"misread\" --store {}",
                 self.arguments.store.display()
             )?;
@@ -186,25 +184,22 @@ impl Told<'_> {
         Ok(())
     }
 
-    /// How far the reading is from what the others made expect, if that is far.
+    /// How far the reading is from what the model expected before it, if that is far.
     fn remarkable(&self) -> Option<f64> {
-        let before = self.before.as_ref()?.entry.distance;
+        let StopForecast { distance, doubt, scatter, .. } = self.before.as_ref()?.stop;
         let this = self.after.as_ref()?.last?;
-        // The uncertainty of a mean of n is that of one by the root of n.
-        let single = before.uncertainty.as_m() * f64::from(before.count.max(1)).sqrt();
-        let variance = single.powi(2) + before.uncertainty.as_m().powi(2) + this.uncertainty.as_m().powi(2);
-        let sigmas = (this.distance.length() - before.value).as_m().abs() / variance.sqrt();
+        let variance = doubt.as_m().powi(2) + scatter.as_m().powi(2) + this.uncertainty.as_m().powi(2);
+        let sigmas = (this.distance.length() - distance).as_m().abs() / variance.sqrt();
         (sigmas > REMARKABLE).then_some(sigmas)
     }
 
     fn value(&self) -> Value {
         let known = |known: &Option<Known>| {
             known.as_ref().map(|known| {
-                let distance = known.entry.distance;
                 json!({
-                    "distance_mm": distance.value.as_mm(),
-                    "uncertainty_mm": distance.uncertainty.as_mm(),
-                    "measurements": distance.count,
+                    "distance_mm": known.stop.distance.as_mm(),
+                    "uncertainty_mm": known.stop.doubt.as_mm(),
+                    "measurements": known.stop.count,
                 })
             })
         };
@@ -218,7 +213,7 @@ impl Told<'_> {
             "from_step": self.stopped.from().get(),
             "before": known(&self.before),
             "after": known(&self.after),
-            "sigmas_from_the_others": self.remarkable(),
+            "sigmas_from_expected": self.remarkable(),
         })
     }
 }

@@ -11,6 +11,7 @@ pub(super) fn walked(walked: &Walked) -> Value {
     let mut whole = Map::new();
     whole.insert("preset".into(), json!(walked.preset.key()));
     whole.insert("vehicle".into(), json!(walked.vehicle));
+    whole.insert("warnings".into(), json!(walked.warnings()));
     if let Some(scores) = walked.scores() {
         let mut overall = Map::new();
         insert_scores(&mut overall, &scores, walked.preset);
@@ -47,8 +48,10 @@ fn run(file: &str, run: &WalkedRun, walked: &Walked) -> Value {
     if let Some(last) = summary.last {
         for (key, value) in [
             ("distance_m", last.distance),
-            ("distance_low_m", last.distance_low),
-            ("distance_high_m", last.distance_high),
+            ("confidence_distance_low_m", last.confidence.distance_low),
+            ("confidence_distance_high_m", last.confidence.distance_high),
+            ("guaranteed_distance_low_m", last.guaranteed.distance_low),
+            ("guaranteed_distance_high_m", last.guaranteed.distance_high),
             ("over_m", last.over),
             ("under_m", last.under),
         ] {
@@ -70,7 +73,7 @@ fn insert_scores(fields: &mut Map<String, Value>, scores: &RunScores, preset: Pr
         fields.extend(own);
     }
     let presets =
-        Preset::ALL.into_iter().map(|preset| (preset.key().to_owned(), score(&scores.preset(preset))));
+        preset.scored().into_iter().map(|preset| (preset.key().to_owned(), score(&scores.preset(preset))));
     fields.insert("presets".into(), Value::Object(presets.collect()));
     let rivals = scores.rivals().map(|(rival, of)| (rival.key().to_owned(), score(&of)));
     fields.insert("baselines".into(), Value::Object(rivals.collect()));

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_store::odometry::{OdometryScore, Preset, RunScores, RunSummary};
+use footplate_store::odometry::{OdometryScore, RunScores, RunSummary};
 
 use super::recording::WalkedRun;
 use super::walked::Walked;
@@ -10,6 +10,9 @@ use crate::counted::counted;
 
 /// Writes a line a run, and the scores if that was asked for.
 pub(super) fn write(output: &mut dyn Write, walked: &Walked) -> io::Result<()> {
+    for warning in walked.warnings() {
+        writeln!(output, "WARNING: {warning}\n")?;
+    }
     for recording in &walked.recordings {
         let periods: u64 = recording.runs.iter().map(|run| run.odometry.summary().periods).sum();
         let (runs, periods) = (counted(recording.runs.len(), "run"), counted(periods, "period"));
@@ -43,7 +46,8 @@ pub(super) fn write(output: &mut dyn Write, walked: &Walked) -> io::Result<()> {
 fn run_row(output: &mut dyn Write, run: &WalkedRun) -> io::Result<()> {
     let summary = run.odometry.summary();
     let RunSummary { modes, top_speed, .. } = summary;
-    let ways = summary.last.map(|last| [last.distance, last.distance_low, last.distance_high]);
+    let ways =
+        summary.last.map(|last| [last.distance, last.guaranteed.distance_low, last.guaranteed.distance_high]);
     let [distance, low, high] = ways.map_or_else(
         || [(); 3].map(|()| "–".to_owned()),
         |ways| ways.map(|way| format!("{:.2}", way.as_m())),
@@ -69,14 +73,25 @@ fn score_table(output: &mut dyn Write, walked: &Walked, scores: &RunScores) -> i
     writeln!(
         output,
         "  {:<12} {:>7} {:>7} {:>9} {:>8} {:>9} {:>9} {:>7} {:>8} {:>7} {:>7} {:>7}",
-        "", "rms", "max", "end", "end", "speed in", "dist. in", "width", "width", "ETCS v", "ETCS s", "delay"
+        "",
+        "rms",
+        "max",
+        "end",
+        "end",
+        "speed in",
+        "dist. in",
+        "99.99 %",
+        "99.99 %",
+        "ETCS v",
+        "ETCS s",
+        "delay"
     )?;
     writeln!(
         output,
         "  {:<12} {:>7} {:>7} {:>9} {:>8} {:>9} {:>9} {:>7} {:>8} {:>7} {:>7} {:>7}",
-        "", "m/s", "m/s", "m", "%", "%", "%", "m/s", "m at end", "% out", "% out", "s"
+        "", "m/s", "m/s", "m", "%", "guar. %", "guar. %", "m/s wide", "m at end", "% out", "% out", "s"
     )?;
-    let others = Preset::ALL.into_iter().filter(|preset| *preset != walked.preset);
+    let others = walked.preset.scored().into_iter().filter(|preset| *preset != walked.preset);
     for preset in [walked.preset].into_iter().chain(others) {
         score_row(output, preset.key(), &scores.preset(preset))?;
     }
@@ -99,8 +114,8 @@ fn score_row(output: &mut dyn Write, name: &str, score: &OdometryScore) -> io::R
         text(score.distance_end_pct, 3),
         text(score.speed_inside_pct, 3),
         text(score.distance_inside_pct, 3),
-        text(score.speed_width_mean_m_s, 3),
-        text(score.distance_width_end_m, 2),
+        text(score.confidence_speed_width_m_s, 3),
+        text(score.confidence_distance_width_m, 2),
         text(score.etcs_speed_violation_pct, 2),
         text(score.etcs_distance_violation_pct, 2),
         text(score.detect_delay_s, 2),

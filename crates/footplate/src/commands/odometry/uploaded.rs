@@ -40,6 +40,7 @@ pub(crate) fn uploaded_page(
     vehicle: Option<&str>,
     language: Language,
 ) -> anyhow::Result<String> {
+    let has_vehicle = vehicle.is_some();
     let vehicle = match vehicle {
         Some(text) => parse_vehicle("the vehicle's file", text.as_bytes())?,
         None => default_vehicle()?,
@@ -55,19 +56,25 @@ pub(crate) fn uploaded_page(
     let folder = Passing(folder);
     let file = folder.0.join(name);
     fs::File::create_new(&file)?.write_all(bytes)?;
-    walked_page(&file, vehicle, language).map_err(|error| {
+    walked_page(&file, vehicle, has_vehicle, language).map_err(|error| {
         // Where it passed through is nobody's concern.
         let said = format!("{error:#}").replace(&file.display().to_string(), name);
         anyhow::Error::msg(said)
     })
 }
 
-fn walked_page(path: &Path, vehicle: VehicleFile, language: Language) -> anyhow::Result<String> {
+fn walked_page(
+    path: &Path,
+    vehicle: VehicleFile,
+    has_vehicle: bool,
+    language: Language,
+) -> anyhow::Result<String> {
     let preset = Preset::Recommended;
     let recording = OpenRecording::open(path, false)?;
-    let context = RunContext { vehicle: vehicle.vehicle, preset, score: recording.has_truth() };
+    let context = RunContext::new(vehicle.vehicle, preset, recording.has_truth());
     let mut charts_left = MOST_RUNS;
     let recordings = vec![recording.walk(&context, None, &mut charts_left)?];
-    let walked = Walked { vehicle: vehicle.name, preset, recordings, language, is_scored: context.score };
+    let vehicle = vehicle.name;
+    let walked = Walked { vehicle, preset, recordings, has_vehicle, language, is_scored: context.score };
     Ok(report::page(&walked)?)
 }

@@ -4,10 +4,18 @@ use footplate_store::odometry::{OdometryScore, Preset, RunScores};
 
 use super::recording::WalkedRecording;
 use crate::commands::web_page::Language;
+use crate::counted::counted;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent): that it holds is promised for
 /// all but one period in ten thousand.
 const SPEED_INSIDE_PCT: f64 = 99.99;
+
+/// Share of periods in which claims may be contradicted before they do not hold: rows that were read late.
+const CONTRADICTED: f64 = 1e-3;
+/// What is said without a vehicle file.
+const NO_VEHICLE: &str = "no vehicle file: teeth, diameters and limits are those of a built-in example, so every speed and \
+                          distance is wrong by the ratio of the pulse pitches and no bound is guaranteed; describe the train \
+                          with --vehicle FILE (docs/formats/vehicle.md)";
 
 /// What all recordings of one call come to.
 pub(super) struct Walked {
@@ -15,6 +23,8 @@ pub(super) struct Walked {
     pub(super) vehicle: String,
     pub(super) preset: Preset,
     pub(super) recordings: Vec<WalkedRecording>,
+    /// Whether a vehicle file says what the train is.
+    pub(super) has_vehicle: bool,
     /// In which a page says it.
     pub(super) language: Language,
     /// Whether a score was asked for; a page has one wherever the truth is known.
@@ -38,9 +48,50 @@ impl Walked {
         Some(all)
     }
 
-    /// Whether the truth left the intervals more often than they promise.
+    /// Whether the truth left the guaranteed bounds, or what they rest on is missing or does not hold.
     pub(super) fn falls_short(&self) -> bool {
         self.scores().is_some_and(|scores| leaves_bounds(&scores.preset(self.preset)))
+            || !self.warnings().is_empty()
+    }
+
+    /// What makes every figure doubtful: no vehicle file, or claims of it that a run contradicts.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if !self.has_vehicle {
+            warnings.push(NO_VEHICLE.to_owned());
+        }
+        for recording in &self.recordings {
+            for run in &recording.runs {
+                let claims = run.odometry.doubtful_claims();
+                let periods = run.odometry.summary().periods;
+                let name = run.id.as_deref().map_or_else(String::new, |id| format!(", run {id}"));
+                let file = &recording.file;
+                let mut warn = |what: String| warnings.push(format!("{file}{name}: {what}"));
+                if claims.contradicted as f64 > CONTRADICTED * periods as f64 {
+                    warn(format!(
+                        "in {} no speed agrees with both the counts and the vehicle file: the guaranteed bounds do not \
+                         hold; check max_traction_m_s2, max_brake_m_s2 and [brake_command]",
+                        counted(claims.contradicted, "period")
+                    ));
+                }
+                if claims.above_top > 0 {
+                    warn(format!(
+                        "both wheelsets turn faster than max_speed_m_s in {}; check it, teeth and diameter_m",
+                        counted(claims.above_top, "period")
+                    ));
+                }
+                for (wheelset, scale) in claims.diameters.into_iter().enumerate() {
+                    if let Some(scale) = scale {
+                        warn(format!(
+                            "by the known places, wheelset {} is {scale:.4} times as large as diameter_m says, beyond \
+                             diameter_tolerance; measure it",
+                            wheelset + 1
+                        ));
+                    }
+                }
+            }
+        }
+        warnings
     }
 }
 

@@ -44,17 +44,19 @@ pub(crate) struct SlideOpening {
 pub(crate) struct SlideRow {
     t_s: f64,
     speed: f64,
-    speed_low: f64,
-    speed_high: f64,
+    confidence_speed_low: f64,
+    confidence_speed_high: f64,
+    guaranteed_speed_low: f64,
+    guaranteed_speed_high: f64,
     true_speed: Option<f64>,
     /// How fast each wheel turned, as the mean of five periods; nothing where it was not counted.
     wheels: [Option<f64>; 2],
     states: [WheelState; 2],
     mode: Mode,
-    /// The distance less the true one, and its bounds less the true one.
+    /// The distance less the true one, and its confidence interval less the true one.
     beyond: Option<f64>,
-    beyond_low: Option<f64>,
-    beyond_high: Option<f64>,
+    confidence_beyond_low: Option<f64>,
+    confidence_beyond_high: Option<f64>,
 }
 
 impl WatchedSlide {
@@ -65,7 +67,7 @@ impl WatchedSlide {
     pub(crate) fn new(scenario: LineScenario, seed: u64) -> anyhow::Result<Self> {
         let run = scenario.run(seed, LineConditions::default());
         let file = simulated_vehicle(&run.vehicle)?;
-        let context = RunContext { vehicle: file.vehicle, preset: Preset::Recommended, score: true };
+        let context = RunContext::new(file.vehicle, Preset::Recommended, true);
         let rows: Vec<(Period, Truth)> = simulated_rows(&run).collect();
         Ok(Self {
             scenario,
@@ -135,15 +137,17 @@ fn row(
     SlideRow {
         t_s: thousandths(since.as_s()),
         speed: thousandths(estimate.speed.as_m_per_s()),
-        speed_low: thousandths(estimate.speed_low.as_m_per_s()),
-        speed_high: thousandths(estimate.speed_high.as_m_per_s()),
+        confidence_speed_low: thousandths(estimate.confidence.speed_low.as_m_per_s()),
+        confidence_speed_high: thousandths(estimate.confidence.speed_high.as_m_per_s()),
+        guaranteed_speed_low: thousandths(estimate.guaranteed.speed_low.as_m_per_s()),
+        guaranteed_speed_high: thousandths(estimate.guaranteed.speed_high.as_m_per_s()),
         true_speed: true_speed.map(|speed| thousandths(speed.as_m_per_s())),
         wheels: wheels.map(|speed| speed.is_finite().then(|| thousandths(speed))),
         states: estimate.wheels,
         mode: estimate.mode,
         beyond: beyond(estimate.distance),
-        beyond_low: beyond(estimate.distance_low),
-        beyond_high: beyond(estimate.distance_high),
+        confidence_beyond_low: beyond(estimate.confidence.distance_low),
+        confidence_beyond_high: beyond(estimate.confidence.distance_high),
     }
 }
 
@@ -194,7 +198,8 @@ mod tests {
             "{locked:?}"
         );
         assert!(
-            locked.speed_low <= locked.true_speed.unwrap() && locked.true_speed.unwrap() <= locked.speed_high
+            locked.guaranteed_speed_low <= locked.true_speed.unwrap()
+                && locked.true_speed.unwrap() <= locked.guaranteed_speed_high
         );
     }
 }

@@ -1,8 +1,8 @@
-//! Curves for charts: changes of speed under their law, and the law of stopping distance.
+//! Curves for charts: changes of speed under their law, and stopping distance by speed.
 
 use footplate_core::calibration::Transient;
-use footplate_core::{SpeedStep, TimeSpan, TrainId};
-use footplate_store::{Batch, StopForm};
+use footplate_core::{Approach, SpeedStep, TimeSpan};
+use footplate_store::{Batch, BatchTrain, TrainFindings};
 
 use super::data::{ChangeChart, ContactPoint};
 
@@ -11,12 +11,11 @@ const SHOWN: usize = 4;
 /// Points of a curve (chosen: one every few pixels).
 const SAMPLES: usize = 160;
 
-pub(super) fn changes(batch: &Batch, train: TrainId) -> Vec<ChangeChart> {
-    let mut own: Vec<&Transient> =
-        batch.calibration.transients.iter().filter(|change| change.train == train).collect();
+pub(super) fn changes(batch: &Batch, train: &BatchTrain) -> Vec<ChangeChart> {
+    let mut own: Vec<&Transient> = train.review.changes.iter().collect();
     own.sort_by_key(|change| (change.direction(), change.steps, change.run));
     let directions = own.chunk_by(|one, next| one.direction() == next.direction());
-    directions.flat_map(spread_out).filter_map(|change| chart(batch, change)).collect()
+    directions.flat_map(spread_out).filter_map(|change| chart(batch, train, change)).collect()
 }
 
 /// The first, the last, and some between them at equal distances.
@@ -26,16 +25,17 @@ fn spread_out<'a>(changes: &[&'a Transient]) -> Vec<&'a Transient> {
     (0..shown).filter_map(|number| changes.get(place(number)).copied()).collect()
 }
 
-fn chart(batch: &Batch, change: &Transient) -> Option<ChangeChart> {
+fn chart(batch: &Batch, train: &BatchTrain, change: &Transient) -> Option<ChangeChart> {
     let ends = change.points.iter().map(|point| point.since_command).fold(0.0, f64::max);
     let begins = change.points.iter().map(|point| point.since_command).fold(0.0, f64::min);
     let times: Vec<TimeSpan> = (0..=SAMPLES)
         .map(|number| TimeSpan::from_s(begins + (ends - begins) * number as f64 / SAMPLES as f64))
         .collect();
-    let fitted = batch.calibration.fitted_change(change, &times)?;
+    let fit = |times: &[TimeSpan]| train.review.fitted_change(train.replay.fit.model(), change, times);
+    let fitted = fit(&times)?;
     let at_contacts: Vec<TimeSpan> =
         change.points.iter().map(|point| TimeSpan::from_s(point.since_command)).collect();
-    let there = batch.calibration.fitted_change(change, &at_contacts)?;
+    let there = fit(&at_contacts)?;
     let run = batch.runs.get(change.run)?;
     let mut before: Option<(f64, f64)> = None;
     let mut contacts = Vec::with_capacity(change.points.len());
@@ -71,13 +71,11 @@ fn chart(batch: &Batch, change: &Transient) -> Option<ChangeChart> {
     })
 }
 
-/// Speed and distance of the two-term law, up to a tenth beyond the fastest stop.
-pub(super) fn stop_curve(stops: &StopForm) -> Vec<[f64; 2]> {
-    let Some(law) = &stops.law else { return Vec::new() };
-    let fastest = stops.steps.iter().map(|step| step.speed_mm_per_s).fold(0.0, f64::max);
-    let distance = |speed: f64| law.delay.value * speed + speed * speed / (2.0 * law.deceleration.value);
-    (0..=SAMPLES)
-        .map(|number| 1.1 * fastest * number as f64 / SAMPLES as f64)
-        .map(|speed| [speed, distance(speed)])
-        .collect()
+/// Speed and stopping distance of the motion model at every step that was measured, from standstill on.
+pub(super) fn stop_curve(train: &TrainFindings) -> Vec<[f64; 2]> {
+    let steps = train.steps.iter().filter(|step| step.is_measured() && step.approach == Approach::Below);
+    let mut curve: Vec<[f64; 2]> = steps.map(|step| [step.speed.value, step.stop.value]).collect();
+    curve.push([0.0, 0.0]);
+    curve.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    curve
 }

@@ -1,6 +1,6 @@
 //! What a report shows: as JSON for its charts, and as it is for its tables.
 
-use footplate_store::{PollingForm, TrainForm};
+use footplate_store::{PollingForm, TrainFindings};
 use serde::Serialize;
 
 use crate::commands::web_page::Language;
@@ -16,10 +16,10 @@ pub(super) struct ReportData {
 /// One train.
 #[derive(Debug, Serialize)]
 pub(super) struct TrainReport {
-    pub(super) calibration: TrainForm,
+    pub(super) calibration: TrainFindings,
     pub(super) health: Health,
     pub(super) changes: Vec<ChangeChart>,
-    /// Speed (mm/s) and distance (mm) of the two-term law.
+    /// Speed (mm/s) and stopping distance (mm) by the motion model, step by step.
     pub(super) stop_curve: Vec<[f64; 2]>,
     pub(super) forecasts: Vec<ForecastPoint>,
 }

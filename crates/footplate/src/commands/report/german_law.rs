@@ -4,11 +4,7 @@ use footplate_core::calibration::{Constant, LawKind};
 use footplate_core::kinematics::SpeedLaw;
 
 pub(super) fn german_law(kind: LawKind) -> String {
-    let family = match kind {
-        LawKind::StepRamp => return "linear in der Stufe (Massensimulation)".to_owned(),
-        LawKind::Table => return "Tabelle".to_owned(),
-        LawKind::Family(family) => family,
-    };
+    let LawKind::Family(family) = kind else { return "linear in der Stufe (Massensimulation)".to_owned() };
     let shape = match family.law {
         SpeedLaw::MidStep => "Sprung in der Mitte",
         SpeedLaw::ConstantAcceleration => "gleichmäßige Beschleunigung",

@@ -1,7 +1,6 @@
 //! How a train fares: a few numbers, each judged, and the worst of them for the whole train.
 
-use footplate_core::TrainId;
-use footplate_store::Batch;
+use footplate_store::TrainFindings;
 use footplate_store::score::Coverage;
 
 use super::data::{Check, ForecastPoint, Health, State};
@@ -19,9 +18,8 @@ const SILENT: [f64; 2] = [0.2, 0.5];
 /// How far below 90 % the interval's share may lie before it is wrong and not only doubtful.
 const COVERAGE_WRONG: f64 = 0.8;
 
-pub(super) fn of(train: TrainId, batch: &Batch, points: &[ForecastPoint], language: Language) -> Health {
-    let runs = || batch.passages.iter().filter(|run| run.train == train);
-    let silent = runs().filter(|run| run.passages.is_empty()).count();
+pub(super) fn of(train: &TrainFindings, points: &[ForecastPoint], language: Language) -> Health {
+    let (silent, runs) = (train.silent_runs, train.runs);
     let checks = vec![
         error(points, language),
         coverage(points, language),
@@ -29,8 +27,8 @@ pub(super) fn of(train: TrainId, batch: &Batch, points: &[ForecastPoint], langua
         misses(points, language),
         Check {
             name: language.pick("Runs without a report", "Fahrten ohne Meldung"),
-            found: format!("{silent} {} {}", language.pick("of", "von"), runs().count()),
-            state: graded(silent as f64 / runs().count().max(1) as f64, SILENT),
+            found: format!("{silent} {} {runs}", language.pick("of", "von")),
+            state: graded(f64::from(silent) / f64::from(runs.max(1)), SILENT),
             says: language.pick(
                 "the train stalled, or crept for as long as the run lasted",
                 "der Zug blieb liegen oder kroch, solange die Fahrt dauerte",

@@ -51,7 +51,8 @@ fn overview(data: &ReportData, language: Language) -> String {
     for train in &data.trains {
         let health = &train.health;
         let number = train.calibration.train;
-        let mut steps: Vec<_> = train.calibration.speeds.iter().map(|speed| speed.step).collect();
+        let mut steps: Vec<_> =
+            train.calibration.steps.iter().filter(|step| step.is_measured()).map(|step| step.step).collect();
         steps.dedup();
         table.row_of_markup(&[
             format!("<a href=\"#train-{number}\">{number}</a>"),
@@ -107,15 +108,13 @@ fn section(train: &TrainReport, language: Language) -> String {
         "How much later than forecast each contact reported; shaded: the 90 % interval stated beforehand",
         "Wie viel später als vorhergesagt jeder Kontakt sich meldete; getönt: das vorher genannte 90-%-Intervall",
     ));
-    if let Some(stops) = &form.stops {
-        html.push_str(&heading("Stops", "Halte"));
-        html.push_str(&chart(
-            "stops",
-            "Stopping distance by speed, and the two-term law",
-            "Anhalteweg nach Tempo, und das Gesetz aus zwei Gliedern",
-        ));
-        html.push_str(&tables::stops(stops, language));
-    }
+    html.push_str(&heading("Stops", "Halte"));
+    html.push_str(&chart(
+        "stops",
+        "Stopping distance by speed: the motion model, and what a tape measured",
+        "Anhalteweg nach Tempo: das Fahrmodell, und was mit dem Maßband gemessen wurde",
+    ));
+    html.push_str(&tables::stops(form, language));
     html.push_str(&heading("Lengths", "Längen"));
     html.push_str(&tables::lengths(form, language));
     html.push_str(&heading("Suspicious measurements", "Verdächtige Messungen"));

@@ -2,7 +2,7 @@
 
 use footplate_core::Approach;
 use footplate_core::calibration::Direction;
-use footplate_store::{PollingForm, Quantity, StopForm, TrainForm};
+use footplate_store::{PollingForm, Quantity, TrainFindings};
 
 use super::data::{Check, Health, State};
 use crate::commands::web_page::Language;
@@ -26,27 +26,30 @@ pub(super) fn health(health: &Health, language: Language) -> String {
     table.end()
 }
 
-pub(super) fn speeds(train: &TrainForm, language: Language) -> String {
+pub(super) fn speeds(train: &TrainFindings, language: Language) -> String {
     let columns = match language {
-        Language::English => ["step", "reached from", "speed", "hops", "runs"],
-        Language::German => ["Stufe", "erreicht von", "Tempo", "Strecken", "Fahrten"],
+        Language::English => {
+            ["step", "reached from", "speed", "contacts", "stopping distance", "scatter", "stops"]
+        }
+        Language::German => ["Stufe", "erreicht von", "Tempo", "Kontakte", "Anhalteweg", "Streuung", "Halte"],
     };
-    let caption = language.pick("Speed by throttle step", "Tempo je Fahrstufe");
-    let mut table = Table::new(caption, &columns, &[true, false, true, true, true]);
-    for speed in &train.speeds {
-        let Quantity { measurements, .. } = speed.speed;
+    let caption = language.pick("Speed and stop by throttle step", "Tempo und Halt je Fahrstufe");
+    let mut table = Table::new(caption, &columns, &[true, false, true, true, true, true, true]);
+    for step in train.steps.iter().filter(|step| step.is_measured()) {
         table.row(&[
-            speed.step.to_string(),
-            approach(speed.approach, language).to_owned(),
-            quantity(&speed.speed),
-            measurements.to_string(),
-            speed.runs.to_string(),
+            step.step.to_string(),
+            approach(step.approach, language).to_owned(),
+            quantity(&step.speed),
+            step.speed.measurements.to_string(),
+            quantity(&step.stop),
+            format!("{:.0} mm", step.stop_scatter_mm),
+            step.stop.measurements.to_string(),
         ]);
     }
     table.end()
 }
 
-pub(super) fn laws(train: &TrainForm, language: Language) -> String {
+pub(super) fn laws(train: &TrainFindings, language: Language) -> String {
     if train.laws.is_empty() {
         let none = language.pick(
             "No law of speed change yet: it takes three changes with three contacts each.",
@@ -100,42 +103,35 @@ pub(super) fn laws(train: &TrainForm, language: Language) -> String {
     table.end()
 }
 
-pub(super) fn stops(stops: &StopForm, language: Language) -> String {
+pub(super) fn stops(train: &TrainFindings, language: Language) -> String {
+    if train.stops.is_empty() {
+        let none =
+            language.pick("No stop was measured with a tape.", "Kein Halt wurde mit dem Maßband gemessen.");
+        return format!("<p>{none}</p>\n");
+    }
     let columns = match language {
-        Language::English => ["step", "from", "distance", "time", "stops", "off the law"],
-        Language::German => ["Stufe", "aus", "Weg", "Zeit", "Halte", "neben dem Gesetz"],
+        Language::English => ["step", "from", "distance", "time", "where", "run"],
+        Language::German => ["Stufe", "aus", "Weg", "Zeit", "wo", "Fahrt"],
     };
-    let caption = language.pick("Stops, counted from the command", "Halte, vom Befehl an gezählt");
-    let mut table = Table::new(caption, &columns, &[true; 6]);
-    for step in &stops.steps {
+    let caption = language.pick(
+        "Stops measured with a tape, counted from the command",
+        "Mit dem Maßband gemessene Halte, vom Befehl an gezählt",
+    );
+    let mut table = Table::new(caption, &columns, &[true, true, true, true, false, true]);
+    for stop in &train.stops {
         table.row(&[
-            step.step.to_string(),
-            format!("{:.0} mm/s", step.speed_mm_per_s),
-            quantity(&step.distance),
-            step.time.as_ref().map_or_else(|| "–".to_owned(), quantity),
-            step.distance.measurements.to_string(),
-            step.residual_mm.map_or_else(|| "–".to_owned(), |residual| format!("{} mm", signed(residual, 0))),
+            stop.step.to_string(),
+            format!("{:.0} mm/s", stop.speed_mm_per_s),
+            format!("{:.0} ± {:.0} mm", stop.distance_mm, stop.uncertainty_mm),
+            stop.time_s.map_or_else(|| "–".to_owned(), |time| format!("{time:.2} s")),
+            stop.recording.clone(),
+            stop.run.to_string(),
         ]);
     }
-    let law = stops.law.as_ref().map_or_else(String::new, |law| {
-        let (delay, braking) = (text(&quantity(&law.delay)), text(&quantity(&law.deceleration)));
-        let formula = format!("<i>τ</i> = {delay}, <i>a</i> = {braking}");
-        let said = match language {
-            Language::English => format!("with {formula}; it misses the steps by {:.0} mm (rms)", law.rms_mm),
-            Language::German => {
-                format!(
-                    "mit {formula}; es verfehlt die Stufen um {:.0} mm (quadratisches Mittel)",
-                    law.rms_mm
-                )
-            }
-        };
-        let name = language.pick("Law", "Gesetz");
-        format!("<p>{name}: <i>d</i> = <i>τ v</i> + <i>v</i>²/2<i>a</i> {said}.</p>\n")
-    });
-    table.end() + &law
+    table.end()
 }
 
-pub(super) fn lengths(train: &TrainForm, language: Language) -> String {
+pub(super) fn lengths(train: &TrainFindings, language: Language) -> String {
     let columns = match language {
         Language::English => ["from", "to", "surveyed", "to add"],
         Language::German => ["von", "bis", "vermessen", "dazu"],
@@ -146,7 +142,7 @@ pub(super) fn lengths(train: &TrainForm, language: Language) -> String {
     );
     let mut table = Table::new(caption, &columns, &[false, false, true, true]);
     for section in &train.sections {
-        let correction = &section.correction;
+        let correction = &section.add;
         table.row(&[
             section.from.clone(),
             section.to.clone(),
@@ -157,7 +153,7 @@ pub(super) fn lengths(train: &TrainForm, language: Language) -> String {
     table.end()
 }
 
-pub(super) fn suspicious(train: &TrainForm, language: Language) -> String {
+pub(super) fn suspicious(train: &TrainFindings, language: Language) -> String {
     if train.suspicious.is_empty() {
         let none = language.pick("No measurement was suspicious.", "Keine Messung war verdächtig.");
         return format!("<p>{none}</p>\n");
@@ -168,8 +164,8 @@ pub(super) fn suspicious(train: &TrainForm, language: Language) -> String {
     };
     let numbers = &[false, true, false, true, true, true];
     let caption = language.pick(
-        "Suspicious measurements, taken out of the fit",
-        "Verdächtige Messungen, aus dem Abgleich genommen",
+        "Suspicious measurements, of little weight in the fit",
+        "Verdächtige Messungen, mit wenig Gewicht im Abgleich",
     );
     let mut table = Table::new(caption, &columns, numbers);
     for suspicion in &train.suspicious {

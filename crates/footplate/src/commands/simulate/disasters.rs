@@ -21,9 +21,11 @@ use self::kind::Kind;
 use self::page::Page;
 use self::scene::{OTHER, Outcomes, Scene, TRAIN};
 use super::super::Outcome;
+use super::again::{FailedRun, name_failed};
 use super::rehearsal::{Rehearsal, Way};
 use super::seeds::Seeds;
 use super::written_scores::ScoreForm;
+use crate::counted::counted;
 use crate::spread::each;
 
 /// A third train, for telling trains apart.
@@ -68,7 +70,33 @@ impl Arguments {
         let scored = each("disasters", &seeds, self.threads, |seed| score(&layout, *seed, budget))?;
         let page = Page { scored: &scored, asked: self.asked() };
         self.form.write(&page, output)?;
-        Ok(Outcome::Done)
+        let failed: Vec<FailedRun> = scored.iter().flat_map(|scored| self.failures(scored)).collect();
+        Ok(name_failed(&failed))
+    }
+
+    /// What came to grief, or was not noticed although something had happened.
+    fn failures(&self, scored: &Scored) -> Vec<FailedRun> {
+        let mut again = format!("simulate disasters --seed {}", scored.seed);
+        if self.layout != "track-a" {
+            again += &format!(" --layout {}", self.layout);
+        }
+        if self.budget != 240 {
+            again += &format!(" --budget {}", self.budget);
+        }
+        let failed = scored.runs.iter().filter_map(|(kind, run)| {
+            let what = if run.mishaps > 0 {
+                counted(run.mishaps, "mishap")
+            } else if *kind != Kind::Faultless && run.noticed.is_none() {
+                "not noticed".to_owned()
+            } else {
+                return None;
+            };
+            Some(FailedRun {
+                what: format!("seed {}, {}: {what}", scored.seed, kind.says()),
+                again: again.clone(),
+            })
+        });
+        failed.collect()
     }
 
     /// What was asked for, as on the command line.

@@ -2,10 +2,10 @@
 
 pub(super) mod choice;
 mod course_project;
-mod figures;
+pub(super) mod figures;
 pub(super) mod known_train;
 mod page;
-mod trial;
+pub(super) mod trial;
 
 use std::io::Write;
 use std::num::NonZeroUsize;

@@ -9,8 +9,7 @@ use clap::Args;
 use footplate_core::track::Layout;
 use footplate_core::{EventKind, SensorId, Timestamp, TrainId};
 use footplate_store::{
-    Batch, CalibrationFile, RecordingKey, SensorNames, Store, StoredEvent, StoredRecording, StoredRun,
-    layout_named,
+    Batch, Findings, RecordingKey, SensorNames, Store, StoredEvent, StoredRecording, StoredRun, layout_named,
 };
 use serde_json::{Value, json};
 
@@ -59,7 +58,7 @@ impl Arguments {
         if let Some(plot) = &self.plot {
             let layout = self.layout_drawn(&recordings)?;
             let batch = Batch::of_store(&layout, &store, as_of, self.train.map(TrainId))?;
-            draw_calibration(&CalibrationFile::of(&layout, &batch), plot)?;
+            draw_calibration(&Findings::of(&layout, &batch), plot)?;
         }
         let Some(key) = self.recording.map(RecordingKey) else {
             if self.json {

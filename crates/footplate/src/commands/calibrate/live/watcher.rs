@@ -1,26 +1,20 @@
 //! Who watches a calibration: tells it to people, and notices when the layout is another one than they said.
 
 use footplate_core::control::calibrate::{CalibrationNotice, Calibrator, Mishap};
-use footplate_core::track::{HopId, Layout};
-use footplate_core::{Command, Length, TimeSpan, Timestamp, TrainId};
-use footplate_store::{BUILT_IN, built_in};
+use footplate_core::track::Layout;
+use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
 use footplate_wire::{CommandError, LinkNotice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
 use super::told;
 use crate::dashboard::{Alarm, Showing};
+use crate::layout_check::layout_with;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::Witnessed;
 
-/// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
-const EXPLAINED: Length = Length::from_mm(40.0);
-
 /// What a browser is told that wants to drive.
 const DRIVES_ITSELF: &str = "a calibration drives by itself: `footplate serve` takes orders";
-
-/// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
-const FEWEST_EXPLAINED: usize = 2;
 
 /// Tells people how it goes, on standard error.
 pub(super) struct Watcher<'l> {
@@ -74,25 +68,6 @@ impl<'l> Watcher<'l> {
             showing.say(now, text);
         }
     }
-
-    /// Another built-in layout with the lengths that are felt.
-    fn layout_with(&self, hops: &[(HopId, Length, Length)]) -> Option<&'static str> {
-        BUILT_IN.iter().copied().filter(|name| *name != self.layout.name()).find(|name| {
-            let Ok(other) = built_in(name) else { return false };
-            // Early in a session one or the other length is still wrong.
-            let explained = hops.iter().filter(|(hop, surveyed, felt)| {
-                let Some(hop) = self.layout.hop(*hop) else { return false };
-                let ends =
-                    [hop.from, hop.to].map(|node| other.layout.node_named(self.layout.node_name(node)));
-                let [Some(from), Some(to)] = ends else { return false };
-                let there = other.layout.hops_from(from).find(|other| other.to == to);
-                let is_nearer = |there: Length| (there - *felt).abs() < 0.5 * (*surveyed - *felt).abs();
-                there
-                    .is_some_and(|there| (there.length - *felt).abs() <= EXPLAINED && is_nearer(there.length))
-            });
-            explained.count() >= FEWEST_EXPLAINED
-        })
-    }
 }
 
 impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
@@ -109,7 +84,7 @@ impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
         if let CalibrationNotice::Mishap(mishap) = &notice {
             self.mishaps += 1;
             if let Mishap::LengthsDiffer { hops } = mishap {
-                self.other_layout = self.other_layout.or_else(|| self.layout_with(hops));
+                self.other_layout = self.other_layout.or_else(|| layout_with(self.layout, hops));
             }
         }
         if let Some(line) = line {

@@ -12,10 +12,12 @@ use super::decimated::{Decimated, Shape};
 use super::wheel_speeds::WheelSpeeds;
 
 /// What each line is called and how it is drawn where there are more rows than points.
-const LINES: [(&str, Shape); 17] = [
+const LINES: [(&str, Shape); 21] = [
     ("speed_m_s", Shape::Line),
-    ("speed_low_m_s", Shape::Low),
-    ("speed_high_m_s", Shape::High),
+    ("confidence_speed_low_m_s", Shape::Low),
+    ("confidence_speed_high_m_s", Shape::High),
+    ("guaranteed_speed_low_m_s", Shape::Low),
+    ("guaranteed_speed_high_m_s", Shape::High),
     ("true_speed_m_s", Shape::Line),
     ("wheel_1_m_s", Shape::Line),
     ("wheel_2_m_s", Shape::Line),
@@ -24,8 +26,10 @@ const LINES: [(&str, Shape); 17] = [
     ("share_1_and_2", Shape::Line),
     // The distance less the true one, and its bounds less the true one.
     ("error_m", Shape::Line),
-    ("error_low_m", Shape::Low),
-    ("error_high_m", Shape::High),
+    ("confidence_error_low_m", Shape::Low),
+    ("confidence_error_high_m", Shape::High),
+    ("guaranteed_error_low_m", Shape::Low),
+    ("guaranteed_error_high_m", Shape::High),
     ("width_m", Shape::High),
     ("over_m", Shape::High),
     ("under_m", Shape::High),
@@ -105,19 +109,24 @@ impl RunSeries {
         let gone = truth.distance.map(|distance| distance - *self.origin.get_or_insert(distance));
         let beyond = |way: Length| gone.map_or(f64::NAN, |gone| (way - gone).as_m());
         let [first, second, _] = estimate.shares;
+        let (confidence, guaranteed) = (&estimate.confidence, &estimate.guaranteed);
         let columns = [
             estimate.speed.as_m_per_s(),
-            estimate.speed_low.as_m_per_s(),
-            estimate.speed_high.as_m_per_s(),
+            confidence.speed_low.as_m_per_s(),
+            confidence.speed_high.as_m_per_s(),
+            guaranteed.speed_low.as_m_per_s(),
+            guaranteed.speed_high.as_m_per_s(),
             truth.speed.map_or(f64::NAN, Speed::as_m_per_s),
             wheels[0],
             wheels[1],
             first,
             first + second,
             beyond(estimate.distance),
-            beyond(estimate.distance_low),
-            beyond(estimate.distance_high),
-            (estimate.distance_high - estimate.distance_low).as_m(),
+            beyond(confidence.distance_low),
+            beyond(confidence.distance_high),
+            beyond(guaranteed.distance_low),
+            beyond(guaranteed.distance_high),
+            (confidence.distance_high - confidence.distance_low).as_m(),
             estimate.over.as_m(),
             estimate.under.as_m(),
             estimate.acceleration.as_m_per_s2(),

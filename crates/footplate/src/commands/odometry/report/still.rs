@@ -32,7 +32,7 @@ pub(in crate::commands::odometry) fn still(walked: &Walked) -> Option<Picture> {
 
 fn speed(form: &SeriesForm) -> Panel {
     let mut layers = Vec::new();
-    if let Some(band) = band(form, "speed_low_m_s", "speed_high_m_s") {
+    if let Some(band) = band(form, "confidence_speed_low_m_s", "confidence_speed_high_m_s") {
         layers.push(Layer::new("bounds", Ink::First, band));
     }
     let lines = [
@@ -52,24 +52,26 @@ fn speed(form: &SeriesForm) -> Panel {
 /// Against the truth where it is known, or else how wide the interval is.
 fn distance(form: &SeriesForm) -> Panel {
     let x = "time since the first period (s)".to_owned();
-    let (y, layers) = match (band(form, "error_low_m", "error_high_m"), points(form, "error_m")) {
-        (Some(bounds), Some(error)) => (
-            "distance beyond the truth (m)",
-            vec![
-                Layer::new("bounds", Ink::First, bounds),
-                Layer::new("estimate", Ink::First, Shape::Line(error)),
-            ],
-        ),
-        _ => {
-            let lines = [
-                ("width_m", "width of the interval", Ink::First),
-                ("over_m", "over-read by at most", Ink::Second),
-                ("under_m", "under-read by at most", Ink::Third),
-            ];
-            let layer = |(line, label, ink)| Some(Layer::new(label, ink, Shape::Line(points(form, line)?)));
-            ("distance (m)", lines.into_iter().filter_map(layer).collect())
-        }
-    };
+    let (y, layers) =
+        match (band(form, "confidence_error_low_m", "confidence_error_high_m"), points(form, "error_m")) {
+            (Some(bounds), Some(error)) => (
+                "distance beyond the truth (m)",
+                vec![
+                    Layer::new("bounds", Ink::First, bounds),
+                    Layer::new("estimate", Ink::First, Shape::Line(error)),
+                ],
+            ),
+            _ => {
+                let lines = [
+                    ("width_m", "width of the interval", Ink::First),
+                    ("over_m", "over-read by at most", Ink::Second),
+                    ("under_m", "under-read by at most", Ink::Third),
+                ];
+                let layer =
+                    |(line, label, ink)| Some(Layer::new(label, ink, Shape::Line(points(form, line)?)));
+                ("distance (m)", lines.into_iter().filter_map(layer).collect())
+            }
+        };
     Panel { x, y: y.to_owned(), height: Some(2), from_nought: true, layers }
 }
 

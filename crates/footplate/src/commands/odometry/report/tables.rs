@@ -100,6 +100,9 @@ pub(super) fn introduction(walked: &Walked) -> String {
             )
         }
     };
+    for warning in walked.warnings() {
+        html.push_str(&format!("<p class=\"warning\" role=\"alert\">{}</p>\n", text(&warning)));
+    }
     if let Some(scores) = walked.known_scores() {
         let score = scores.preset(walked.preset);
         html.push_str(&match walked.language {
@@ -282,7 +285,9 @@ fn runs_table(walked: &Walked) -> String {
     for (name, run) in each_run(walked) {
         let summary = run.odometry.summary();
         let RunSummary { modes, top_speed, .. } = summary;
-        let ways = summary.last.map(|last| [last.distance, last.distance_low, last.distance_high]);
+        let ways = summary
+            .last
+            .map(|last| [last.distance, last.guaranteed.distance_low, last.guaranteed.distance_high]);
         let mut cells = vec![name, format!("{:.2}", summary.duration().as_s())];
         match ways {
             Some(ways) => cells.extend(ways.map(|way| decimals(Some(way.as_m()), 2))),

@@ -9,7 +9,7 @@ use super::attributed::Attributed;
 use super::figures::{Figures, both};
 use super::kind::Kind;
 use super::scene::Outcomes;
-use crate::commands::simulate::written_scores::WrittenScores;
+use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # What becomes of trains that something happens to
@@ -34,6 +34,8 @@ pub(super) struct Page<'r> {
 }
 
 impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "disasters";
+
     fn head(&self) -> String {
         format!("{HEAD}\nMade by `footplate simulate disasters {}`.\n\n{LEGEND}", self.asked)
     }
@@ -120,6 +122,19 @@ impl WrittenScores for Page<'_> {
             "runs": runs.collect::<Vec<Value>>(),
         });
         writeln!(output, "{all}")
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let runs = || self.scored.iter().flat_map(|scored| &scored.runs);
+        let happened = || self.figures();
+        let [events, noticed, persons] = happened().fold([0; 3], |[all, noticed, persons], figures| {
+            [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_person]
+        });
+        vec![
+            Rate::grief(runs().filter(|(_, run)| run.mishaps > 0).count(), runs().count()),
+            Rate::new("not noticed", events - noticed, events),
+            Rate::new("needed a person", persons, events),
+        ]
     }
 }
 

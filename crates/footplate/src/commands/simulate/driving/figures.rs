@@ -123,7 +123,7 @@ impl Figures {
 }
 
 /// The interval that holds the true probability with 95 %, from so many of so many (Wilson, 1927).
-pub(super) fn binomial_interval(of: usize, all: usize) -> [f64; 2] {
+pub(in crate::commands::simulate) fn binomial_interval(of: usize, all: usize) -> [f64; 2] {
     if all == 0 {
         return [0.0, 1.0];
     }

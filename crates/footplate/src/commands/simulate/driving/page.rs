@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::figures::{Driven, Figures, ScoredTrain, binomial_interval};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
-use crate::commands::simulate::written_scores::WrittenScores;
+use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How well trains are driven
@@ -38,6 +38,8 @@ pub(super) struct Page<'r> {
 }
 
 impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "driving";
+
     fn head(&self) -> String {
         format!("{HEAD}\nMade by `footplate simulate driving {}`.\n\n{LEGEND}", self.asked)
     }
@@ -74,6 +76,22 @@ impl WrittenScores for Page<'_> {
             "rows": rows.collect::<Vec<Value>>(), "trains": calibrations.collect::<Vec<Value>>(),
         });
         writeln!(output, "{all}")
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let ours = self.figures(None, Driven::Calibrated);
+        let [_, moves] = ours.good_moves;
+        let held: usize = ours.beyond.iter().map(|[_, stops]| *stops).sum();
+        let orders = ours.stops[0] + ours.stops[1] + held + moves + ours.failed as usize;
+        let wrecked = self.trains.iter().filter(|train| train.by.first().is_some_and(|by| by.mishaps > 0));
+        let mut rates = vec![
+            Rate::grief(wrecked.count(), self.trains.len()),
+            Rate::new("orders not carried out", ours.failed as usize, orders),
+        ];
+        for (allowed, [over, stops]) in NOT_BEYOND_PERCENT.iter().zip(ours.beyond) {
+            rates.push(Rate::new(format!("beyond, allowed {allowed} %"), over, stops));
+        }
+        rates
     }
 }
 

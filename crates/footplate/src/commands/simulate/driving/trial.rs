@@ -9,7 +9,7 @@ use super::super::rehearsal::{Calibrated, VirtualLine};
 use super::choice::Choice;
 
 /// The train's address.
-pub(super) const TRAIN: TrainId = TrainId(24);
+pub(in crate::commands::simulate) const TRAIN: TrainId = TrainId(24);
 /// Steps of the decoders that all figures are about.
 const HIGHEST: u8 = 14;
 /// An order that is not carried out by then has failed.
@@ -67,7 +67,7 @@ pub(super) fn world(layout: &Layout, seed: u64, law: LawFamily) -> anyhow::Resul
 }
 
 /// What is asked of a train: the same whoever drives, as long as the train stands at the same places.
-pub(super) struct Plan {
+pub(in crate::commands::simulate) struct Plan {
     choice: Choice,
     /// Steps by their true speeds: a scorer's choice of what to ask, unknown to the driver.
     pub(super) mid: Vec<SpeedStep>,
@@ -75,7 +75,7 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub(super) fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
+    pub(in crate::commands::simulate) fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
         let truth = line.station.world().truth();
         let steps = |range: std::ops::Range<f64>| {
             let speed = |step: SpeedStep| {
@@ -94,7 +94,7 @@ impl Plan {
     }
 
     /// A contact ahead on the way as the turnouts lie, somewhere between it and the next, and one of several steps.
-    pub(super) fn stop(
+    pub(in crate::commands::simulate) fn stop(
         &mut self,
         layout: &Layout,
         line: &VirtualLine<'_>,

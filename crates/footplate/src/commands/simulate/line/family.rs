@@ -85,7 +85,7 @@ impl<'r> Family<'r> {
             speed_rms_m_s: spread(|score| score.speed_rms_m_s),
             speed_max_m_s: spread(|score| score.speed_max_m_s),
             distance_end_pct: spread(|score| score.distance_end_pct.map(f64::abs)),
-            speed_width_mean_m_s: spread(|score| score.speed_width_mean_m_s),
+            speed_width_mean_m_s: spread(|score| score.confidence_speed_width_m_s),
             speed_inside_pct: whole.speed_inside_pct,
             distance_inside_runs: (inside.count() > 0).then_some(held),
             etcs_speed_violation_pct: whole.etcs_speed_violation_pct,

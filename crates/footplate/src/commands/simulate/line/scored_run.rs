@@ -93,7 +93,7 @@ impl FalseFlags {
 /// Walks a run with every odometer.
 pub(super) fn score(run: &LineRun) -> anyhow::Result<(RunScores, FalseFlags)> {
     let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
-    let context = RunContext { vehicle, preset: Preset::Recommended, score: true };
+    let context = RunContext::new(vehicle, Preset::Recommended, true);
     let mut odometry = OdometryRun::new(&context)?;
     let mut flags = FalseFlags::default();
     let mut rolls_since: [Option<Timestamp>; 2] = [None; 2];

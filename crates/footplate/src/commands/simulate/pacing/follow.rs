@@ -29,6 +29,9 @@ const STEPS_BEYOND: f64 = 0.1;
 const AHEAD: f64 = 25.0;
 const BEHIND: f64 = 145.0;
 
+/// What is said of trains that touched, derailed or ran off the track.
+pub(super) const GRIEF: &str = "they came to grief";
+
 /// Who drove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum By {
@@ -201,7 +204,7 @@ impl<'a, 'l> Row<'a, 'l> {
             followed.seconds = lasts;
             followed.commands = self.counted.steps(followed.train) - before[followed.place];
             if grief {
-                followed.trouble.get_or_insert_with(|| "they came to grief".to_owned());
+                followed.trouble.get_or_insert_with(|| GRIEF.to_owned());
             }
             followed.compare(truth, leader, since, &self.odometers);
         }

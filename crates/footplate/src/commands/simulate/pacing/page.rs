@@ -10,7 +10,7 @@ use super::arrive::{self, Arrived};
 use super::figures::{quantile, root_mean_square, shown, within_pct};
 use super::follow::{self, Followed, Kept};
 use super::hold::{By, Course, Held};
-use crate::commands::simulate::written_scores::WrittenScores;
+use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How well trains keep to a pace
@@ -60,6 +60,9 @@ const MEAN_WITHIN: f64 = 0.5;
 /// ... and of a position (mm).
 const PLACE_WITHIN: f64 = 15.0;
 
+/// What is asked of an arrival: so many seconds and millimetres.
+const ARRIVES_WITHIN: [f64; 2] = [0.3, 25.0];
+
 /// Parts of a run that are told apart: on the first round lengths are as good as their survey, or as a calibration elsewhere
 /// left them.
 const MINUTES: [(&str, Range<f64>); 2] = [("first", 0.0..60.0), ("second", 60.0..f64::INFINITY)];
@@ -71,6 +74,8 @@ pub(super) struct Page<'r> {
 }
 
 impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "pacing";
+
     fn head(&self) -> String {
         format!("{HEAD}\nMade by `footplate simulate pacing {}`.\n", self.asked)
     }
@@ -136,6 +141,29 @@ impl WrittenScores for Page<'_> {
             "followed": followed.collect::<Vec<Value>>(),
         });
         writeln!(output, "{all}")
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let griefs = |scored: &&Scored| scored.troubles().any(|(_, trouble)| trouble == follow::GRIEF);
+        let failed = self.scored.iter().filter(|scored| scored.troubles().next().is_some());
+        let arrived: Vec<[f64; 2]> = self
+            .scored
+            .iter()
+            .flat_map(|scored| &scored.arrived)
+            .filter(|arrived| arrived.by == arrive::By::Driver)
+            .filter_map(|arrived| arrived.late_and_beyond)
+            .collect();
+        let is_off =
+            |[late, beyond]: &&[f64; 2]| late.abs() > ARRIVES_WITHIN[0] || beyond.abs() > ARRIVES_WITHIN[1];
+        vec![
+            Rate::grief(self.scored.iter().filter(griefs).count(), self.scored.len()),
+            Rate::new("seeds with an order that failed", failed.count(), self.scored.len()),
+            Rate::new(
+                "arrivals not within 0.3 s and 25 mm",
+                arrived.iter().filter(is_off).count(),
+                arrived.len(),
+            ),
+        ]
     }
 }
 

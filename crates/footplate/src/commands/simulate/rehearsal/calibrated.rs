@@ -17,6 +17,8 @@ const PATIENCE: TimeSpan = TimeSpan::from_s(420.0);
 #[derive(Clone)]
 pub(crate) struct Calibrated {
     pub(crate) model: MotionModel,
+    /// What it follows from, to learn on.
+    pub(crate) fit: MotionFit,
     pub(crate) locator: Locator,
     pub(crate) turnouts: TurnoutStates,
     /// Track time that it took, in s.
@@ -42,11 +44,15 @@ pub(crate) fn calibrate(
     while line.now() < patience && calibrator.ending().is_none() {
         let _ = line.drive(&mut calibrator, patience);
     }
+    let (turnouts, locator) = (calibrator.turnouts().clone(), calibrator.locator().clone());
+    let ending = format!("{:?}", calibrator.ending());
+    let fit = calibrator.into_fit();
     Calibrated {
-        turnouts: calibrator.turnouts().clone(),
-        locator: calibrator.locator().clone(),
+        turnouts,
+        locator,
         seconds: (line.now() - began).as_s(),
-        ending: format!("{:?}", calibrator.ending()),
-        model: calibrator.into_fit().model().clone(),
+        ending,
+        model: fit.model().clone(),
+        fit,
     }
 }

@@ -42,6 +42,21 @@ impl<'l> Rehearsal<'l> {
         switches: &LivingSwitches,
         budget: TimeSpan,
     ) -> anyhow::Result<Self> {
+        Self::prepare_believing(layout, layout, seed, trains, switches, budget)
+    }
+
+    /// The same with trains calibrated on what people believe the layout to be: its lengths may be others.
+    ///
+    /// # Errors
+    /// When no train can run round on the layout.
+    pub(crate) fn prepare_believing(
+        layout: &'l Layout,
+        believed: &Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        budget: TimeSpan,
+    ) -> anyhow::Result<Self> {
         let mut station = VirtualStation::draw(layout, seed, trains, switches)?;
         let stood: Vec<Option<(Position, End)>> = trains
             .iter()
@@ -60,7 +75,7 @@ impl<'l> Rehearsal<'l> {
             for (position, leads) in begins {
                 let mishaps = line.station.world().mishaps().len();
                 line.station.world_mut().place(*train, *position, *leads)?;
-                model = Some(calibrate(layout, &mut line, *train, budget).model);
+                model = Some(calibrate(believed, &mut line, *train, budget).model);
                 line.station.world_mut().lift(*train);
                 if line.station.world().mishaps().len() == mishaps {
                     break;

@@ -6,7 +6,7 @@ use footplate_sim::MishapKind;
 use serde_json::{Value, json};
 
 use super::session::Tally;
-use crate::commands::simulate::written_scores::WrittenScores;
+use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How several trains fare on one layout
@@ -26,6 +26,9 @@ near to the end of a track, for which another was drawn. *By blocks*: the same t
 between contacts is reserved as a whole, with all its turnouts, as block systems do.
 ";
 
+/// No train should come to no destination for longer than this (s).
+const LONGEST_NOWHERE_S: f64 = 900.0;
+
 /// All that was scored.
 pub(super) struct Page<'r> {
     pub(super) tallies: &'r [Tally],
@@ -35,6 +38,8 @@ pub(super) struct Page<'r> {
 }
 
 impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "traffic";
+
     fn head(&self) -> String {
         format!("{HEAD}\nMade by `footplate simulate traffic {}`.\n\n{LEGEND}", self.asked)
     }
@@ -61,6 +66,19 @@ impl WrittenScores for Page<'_> {
 
     fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{}", json!({ "seeds": seeds(self.tallies), "by_blocks": seeds(self.by_blocks) }))
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let mishaps = self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()).count();
+        let sum = |of: fn(&Tally) -> usize| self.tallies.iter().map(of).sum::<usize>();
+        let runs = sum(|tally| tally.routes as usize + tally.turns);
+        let stuck = self.tallies.iter().filter(|tally| tally.starved > LONGEST_NOWHERE_S).count();
+        vec![
+            Rate::grief(mishaps, self.tallies.len()),
+            Rate::new("runs onto track of others", sum(|tally| tally.intrusions.len()), runs),
+            Rate::new("sessions with a train nowhere for more than 900 s", stuck, self.tallies.len()),
+            Rate::new("trains lost that needed a person", sum(|tally| tally.hands as usize), runs),
+        ]
     }
 }
 

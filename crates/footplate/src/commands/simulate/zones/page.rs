@@ -8,7 +8,7 @@ use super::Scored;
 use super::passage::Passage;
 use super::ride::{Ridden, Told};
 use crate::commands::simulate::pacing::figures::{quantile, shown};
-use crate::commands::simulate::written_scores::WrittenScores;
+use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How well trains keep to speed restrictions
@@ -69,6 +69,8 @@ impl Figures {
 }
 
 impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "zones";
+
     fn head(&self) -> String {
         format!("{HEAD}\nMade by `footplate simulate zones {}`.\n", self.asked)
     }
@@ -125,6 +127,17 @@ impl WrittenScores for Page<'_> {
         });
         serde_json::to_writer_pretty(&mut *output, &json!({ "rides": rides.collect::<Vec<_>>() }))?;
         writeln!(output)
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let rides: Vec<&Ridden> = self.scored.iter().flat_map(|scored| &scored.rides).collect();
+        let heeding = rides.iter().filter(|ride| ride.told != Told::Unheeding);
+        let found = Figures::of(heeding.flat_map(|ride| &ride.passages).collect::<Vec<_>>().into_iter());
+        let failed = rides.iter().filter(|ride| ride.trouble.is_some()).count();
+        vec![
+            Rate::new("passages too fast", found.too_fast, found.passages),
+            Rate::new("rides that failed", failed, rides.len()),
+        ]
     }
 }
 

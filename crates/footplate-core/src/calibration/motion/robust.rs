@@ -1,0 +1,55 @@
+//! How much a residual counts that is larger than chance allows: one outlier costs one outlier.
+//!
+//! Squares at first, linear beyond (Huber, 1964), and logarithmic in the end (Cauchy), so that what is wildly off pulls ever
+//! less. Cost and slope are continuous.
+
+/// How large a residual is believed, in standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Belief {
+    /// Beyond this a residual counts linearly.
+    huber: f64,
+    /// Beyond this it is of something else: a train that was pushed, a sensor that another train tripped.
+    wild: f64,
+}
+
+impl Belief {
+    /// Of sensors: their times scatter within a poll, which has no tails.
+    pub(super) const SENSORS: Self = Self { huber: 2.5, wild: 5.0 };
+    /// Of stops and starts: dirt, load and temperature give them tails, and few of them are alike.
+    pub(super) const STOPS: Self = Self { huber: 1.5, wild: 3.0 };
+
+    /// By what part a measurement counts in a least-squares step (iteratively reweighted).
+    pub(super) fn weight(self, size: f64) -> f64 {
+        if size <= self.huber {
+            1.0
+        } else if size <= self.wild {
+            self.huber / size
+        } else {
+            self.huber * self.wild / (size * size)
+        }
+    }
+
+    /// What it costs, where a square would cost its square.
+    pub(super) fn cost(self, size: f64) -> f64 {
+        if size <= self.huber {
+            return size * size;
+        }
+        let linear = self.huber * (2.0 * size.min(self.wild) - self.huber);
+        linear + 2.0 * self.huber * self.wild * libm::log((size / self.wild).max(1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_the_cost_is_twice_weight_times_residual() {
+        for belief in [Belief::SENSORS, Belief::STOPS] {
+            for size in [0.5, 1.4, 1.6, 2.4, 2.6, 2.9, 3.1, 4.9, 5.1, 30.0] {
+                let slope = (belief.cost(size + 1e-6) - belief.cost(size - 1e-6)) / 2e-6;
+                assert!((slope - 2.0 * size * belief.weight(size)).abs() < 1e-6, "{size}");
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! By how much the numbers of a train change from one session to the next, and within one.
+//!
+//! The same engine in another team's session runs at 1 % another speed in the median and 10 % at worst (18 pairs of published
+//! tables); within an hour trains that get warm become some per cent faster. A model that was measured yesterday promises
+//! with what may have changed since.
+
+use super::parameters::{
+    DOWN, FRICTION, HYSTERESIS, NODES, START_DELAY, START_NODES, STOP_NODES, UP, hysteresis_at, node_speed,
+    speed_at,
+};
+
+/// Standard deviations of changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Variation {
+    /// Of ln speed, at all steps alike, and at each by itself.
+    common_speed: f64,
+    own_speed: f64,
+    /// Of hysteresis (m/s).
+    hysteresis: f64,
+    /// Of delays and lags (s), and of the delay of a start.
+    delay: f64,
+    start_delay: f64,
+    /// Of `κ` (s² per m).
+    kappa: f64,
+    /// Of friction (m/s²).
+    friction: f64,
+    /// Of what stops and starts are longer than their law, as part of the speed (m per m/s).
+    residual: f64,
+}
+
+impl Variation {
+    /// From one session to the next: warmth, cleaning, voltage, wear.
+    pub(super) const fn between_sessions() -> Self {
+        Self {
+            common_speed: 0.020,
+            own_speed: 0.012,
+            hysteresis: 0.002,
+            delay: 0.010,
+            start_delay: 0.040,
+            kappa: 0.05,
+            friction: 0.001,
+            residual: 0.010,
+        }
+    }
+
+    /// Within an hour of one session: motors and grease get warm.
+    pub(super) const fn per_hour() -> Self {
+        Self {
+            common_speed: 0.030,
+            own_speed: 0.008,
+            hysteresis: 0.002,
+            delay: 0.008,
+            start_delay: 0.030,
+            kappa: 0.03,
+            friction: 0.001,
+            residual: 0.008,
+        }
+    }
+
+    /// After so many times the time for which it is given, as a random walk goes.
+    pub(super) fn over(self, times: f64) -> Self {
+        let by = libm::sqrt(times.max(0.0));
+        Self {
+            common_speed: by * self.common_speed,
+            own_speed: by * self.own_speed,
+            hysteresis: by * self.hysteresis,
+            delay: by * self.delay,
+            start_delay: by * self.start_delay,
+            kappa: by * self.kappa,
+            friction: by * self.friction,
+            residual: by * self.residual,
+        }
+    }
+
+    /// Calls `add` with each pair of numbers that changes, once, and the covariance of their changes.
+    pub(super) fn each(&self, highest: usize, mut add: impl FnMut(usize, usize, f64)) {
+        let squared = |deviation: f64| deviation * deviation;
+        add(HYSTERESIS, HYSTERESIS, squared(self.hysteresis));
+        for first in [UP, DOWN] {
+            add(first, first, squared(self.delay));
+            add(first + 1, first + 1, squared(self.delay));
+            add(first + 2, first + 2, squared(self.kappa));
+        }
+        add(START_DELAY, START_DELAY, squared(self.start_delay));
+        add(FRICTION, FRICTION, squared(self.friction));
+        for node in 0..NODES {
+            for first in [STOP_NODES, START_NODES] {
+                add(first + node, first + node, squared(self.residual * node_speed(node)));
+            }
+        }
+        for step in 1..=highest {
+            add(speed_at(step), speed_at(step), squared(self.own_speed) + squared(self.common_speed));
+            for other in 1..step {
+                add(speed_at(step), speed_at(other), squared(self.common_speed));
+            }
+            let own = hysteresis_at(step, highest);
+            add(own, own, 0.25 * squared(self.hysteresis));
+        }
+    }
+}

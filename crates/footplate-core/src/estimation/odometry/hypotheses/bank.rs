@@ -1,0 +1,395 @@
+//! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
+
+use super::arrivals::{Arrivals, arrivals};
+use super::evidence::{CREEP, Compared, SILENT, evidence};
+use super::filters::Filters;
+use super::interval::interval;
+use super::lanes::Lanes;
+use super::rates::transitions;
+use super::scene::Scene;
+use crate::wheels::{Range, Wheelset, larger, smaller};
+
+/// Density of the train's jerk while a wheel tells its speed (m²/s⁵): 0.14 m/s² in a second, what a driver's hand does
+/// to a cruising train; while none does, the acceleration is known to 0.3 m/s² after a few seconds.
+const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.1, 0.05, 0.0, 0.02, 0.02]);
+/// Hypotheses that trust a counter: one (or zero) for each.
+const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+/// Hypotheses in which no wheel tells the speed.
+const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+const BOTH_SLIP: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+const BOTH_CREEP: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+/// Variance of what is at rest (m²/s², m²/s⁴): none, but for rounding.
+const AT_REST: f64 = 1e-6;
+const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
+/// A train in which both wheelsets slide decelerates by this much, or as commanded if that is less (m/s²), and within
+/// this deviation (m/s², part of it); adhesion of 0.02 to 0.08 and the brakes of the other wheelsets.
+const SLIDES_BY: f64 = 0.5;
+const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
+/// How long that stays what it is (s).
+const SLIDES_FOR_S: f64 = 2.0;
+/// How closely wheels that creep alike accelerate with the train (m/s²), and for how long (s).
+const CREEPS_WITHIN: f64 = 0.2;
+const CREEPS_FOR_S: f64 = 3.0;
+/// What is felt is within this of the truth, for as long (m/s²).
+const FELT_WITHIN: f64 = 0.06;
+/// Mean and deviation of how much slower the faster of two sliding wheels turns (part of the speed), and for how long
+/// it stays so (s).
+const EXCESS: (f64, f64) = (0.03, 0.06);
+const EXCESS_S: f64 = 2.0;
+/// Wheels further off than this say nothing of the train (m/s, part of the speed).
+const FAR: (f64, f64) = (0.3, 0.12);
+/// How sharp the limits of steady creep are (part of the speed).
+const CREEP_EDGE: f64 = 0.03;
+/// A speed that a wheel shows is within this (m/s), and within this for each m/s² of its acceleration.
+const SHOWN: (f64, f64) = (0.1, 0.08);
+/// A wheel that regains its grip accelerates harder than this (m/s²), one that has reached the train less than this; it is
+/// remembered for so long (s), and tells the speed of the train so well (m/s): in a slide, whose control often stops the
+/// wheel short of the train, and in a spin. Tuned on seeds 301 to 306.
+const REGAINING: f64 = 3.0;
+const LEVEL: f64 = 1.5;
+const REGAINED_FOR_S: f64 = 0.5;
+const REACHED: [f64; 2] = [0.35, 0.15];
+/// Square of the deviations at which half of what is level has not reached the train.
+const REACHES_WITHIN: f64 = 2.0;
+/// How long the error of a followed wheel lasts (s).
+const FOLLOWED_S: f64 = 0.15;
+/// The ratio of the diameters wanders by this much a second (part).
+const RATIO_WANDERS: f64 = 2e-5;
+/// Slower than this it is not learnt (m/s), and creepage under effort disturbs it (part).
+const RATIO_ABOVE: f64 = 3.0;
+const RATIO_CREEPAGE: f64 = 0.008;
+/// How long that keeps its sign: a whole run of a driven wheel beside one that is not (s).
+const CREEPAGE_FOR_S: f64 = 200.0;
+/// Share of a driven wheel in traction beside one that is not: its creepage is a bias, the other has none.
+const CREEPING_SHARE: f64 = 0.05;
+/// Least probability: far below what any interval minds.
+const LEAST: f64 = 1e-30;
+/// Time over which the acceleration is smoothed that tells braking from motoring without a command (s).
+const SIDE_S: f64 = 1.0;
+/// Speed at which half of all slips can begin (m/s), and at which steady creep can be told from rolling.
+const SLIPS_ABOVE: f64 = 0.5;
+const CREEPS_ABOVE: f64 = 5.0;
+/// A train that stops does so from below this speed (m/s).
+const STOPS_BELOW: f64 = 0.15;
+
+/// Filters and probabilities of all hypotheses.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Bank {
+    probability: Lanes,
+    filters: Filters,
+    /// How far each hypothesis puts the train ahead of the estimate (m).
+    ahead: Lanes,
+    /// First over second wheel speed when both roll, less 1, and its variance.
+    ratio: f64,
+    ratio_variance: f64,
+    /// Mean acceleration, smoothed (m/s²).
+    trend: f64,
+    /// 1 while wheels may turn slower than the train, −1 while they may turn faster.
+    side: f64,
+    /// Whether each wheel was lately turned towards the speed of the train (1, fading to 0).
+    regained: [f64; 2],
+    /// What came out of the last period.
+    speed: f64,
+    acceleration: f64,
+    variance: f64,
+}
+
+impl Bank {
+    /// A train met at a speed (m/s) with a variance.
+    pub(in super::super) fn new(speed: f64, variance: f64, wheelsets: &[Wheelset; 2]) -> Self {
+        let mut filters = Filters::new(speed, variance);
+        filters.v *= MOVES;
+        let variances =
+            wheelsets.map(|wheelset| wheelset.diameter_tolerance * wheelset.diameter_tolerance / 3.0);
+        Self {
+            probability: Lanes([0.9, 1e-3, 1e-3, 1e-3, 1e-5, 0.1, LEAST, LEAST]),
+            filters,
+            ahead: Lanes::all(0.0),
+            ratio: 0.0,
+            ratio_variance: variances.iter().sum(),
+            trend: 0.0,
+            side: 1.0,
+            regained: [0.0; 2],
+            speed,
+            acceleration: 0.0,
+            variance,
+        }
+    }
+
+    /// Speed (m/s), acceleration (m/s²) and the variance of the speed, over all hypotheses.
+    pub(in super::super) fn motion(&self) -> (f64, f64, f64) {
+        (self.speed, self.acceleration, self.variance)
+    }
+
+    /// The probability of every hypothesis, in the order of [`HYPOTHESES`](super::HYPOTHESES).
+    pub(in super::super) fn probabilities(&self) -> [f64; 8] {
+        self.probability.0
+    }
+
+    /// Whether wheels may turn slower than the train now, and not faster.
+    pub(in super::super) fn holds_back(&self) -> bool {
+        self.side > 0.0
+    }
+
+    /// The train has turned round.
+    pub(in super::super) fn reverse(&mut self) {
+        self.filters.reverse();
+        self.ahead = -self.ahead;
+        self.speed = -self.speed;
+        self.acceleration = -self.acceleration;
+        self.trend = -self.trend;
+    }
+
+    /// Takes in a period of `t` seconds; how far the train went (m).
+    pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
+        self.side = self.next_side(scene, t);
+        let wheels = self.compared(scene);
+        self.mix(scene, &wheels, t);
+        let (ways, surprise) = self.run(scene, t);
+        self.ahead += ways;
+        self.pull(scene, &wheels, t);
+        let likelihood = evidence(scene, &wheels, &self.filters, surprise, self.side, t);
+        let weights = (self.probability * exp(likelihood)).at_least(LEAST);
+        self.probability = weights * (1.0 / weights.sum());
+        self.learn_ratio(scene, t);
+        self.summed_up(scene.top_speed)
+    }
+
+    /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
+    pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+        interval(&self.probability, &self.filters, scene, risk, t)
+    }
+
+    /// Which way wheels that lose their grip turn.
+    fn next_side(&mut self, scene: &Scene, t: f64) -> f64 {
+        self.trend += (self.acceleration - self.trend) * smaller(t / SIDE_S, 1.0);
+        match scene.commanded {
+            Some(commanded) if commanded < 0.0 => 1.0,
+            Some(commanded) if commanded > 0.0 => -1.0,
+            // What was last commanded may still act.
+            Some(_) => self.side,
+            None if self.trend < 0.0 => 1.0,
+            None => -1.0,
+        }
+    }
+
+    /// The wheels with the ratio of their diameters taken out.
+    fn compared(&self, scene: &Scene) -> [Compared; 2] {
+        let [first, second] = &scene.wheels;
+        let half = 0.5 * self.ratio;
+        let of = |speed: f64, scale: f64, deviation: f64| {
+            let speed = speed * scale;
+            let ratio = 0.25 * self.ratio_variance * speed * speed;
+            Compared { speed, variance: deviation * deviation + ratio }
+        };
+        [
+            of(first.speed, 1.0 - half, first.speed_deviation),
+            of(second.speed, 1.0 + half, second.speed_deviation),
+        ]
+    }
+
+    /// Lets hypotheses end and begin.
+    fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+        let transitions = transitions(scene, t);
+        let [rolling, ..] = self.probability.0;
+        let leaves = self.probability * transitions.ends;
+        let ([leaves_rolling, ..], rest) = (leaves.0, leaves * NOT_ROLLING);
+        let Arrivals { stays_lost, others } =
+            arrivals(scene, wheels, &self.filters, rest, transitions.after_others);
+        let leaves = rest * (Lanes::all(1.0) - stays_lost) + BOTH_ROLL * leaves_rolling;
+        let [first, second] = &scene.wheels;
+        let pitch = larger(first.pitch, second.pitch);
+        let pool = self.filters.pooled(leaves, pitch * pitch);
+        let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
+        let mut arrives = transitions.after_rolling * rolling + transitions.after_others * others;
+        // Nothing slips at rest.
+        let moves = pool.v * pool.v;
+        let moving = |above: f64| moves / (moves + above * above);
+        let [_, first_slips, second_slips, both_slip, both_creep, ..] = &mut arrives.0;
+        for slips in [first_slips, second_slips, both_slip] {
+            *slips *= moving(SLIPS_ABOVE);
+        }
+        *both_creep *= moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE);
+        // A train can only have stopped that is slow enough.
+        let slow = pool.pvv + STOPS_BELOW * STOPS_BELOW;
+        let [_, _, _, _, _, standing, ..] = &mut arrives.0;
+        *standing *= libm::exp(-0.5 * pool.v * pool.v / slow) * STOPS_BELOW / libm::sqrt(slow);
+        let stays = self.probability - leaves;
+        let next = (stays + arrives).at_least(LEAST);
+        let share = arrives * next.inverse();
+        self.filters.mix(&pool, share);
+        self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
+        self.probability = next * (1.0 / next.sum());
+        // A train at rest stays there.
+        let Filters { v, a, pvv, pva, paa, .. } = &mut self.filters;
+        *v *= MOVES;
+        *a *= MOVES;
+        *pva *= MOVES;
+        *pvv = *pvv * MOVES + STANDS * AT_REST;
+        *paa = *paa * MOVES + STANDS * AT_REST;
+    }
+
+    /// Runs every filter on and lets the counters correct those that trust one; how far each went, and how
+    /// surprised it was.
+    fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
+        let [first, second] = &scene.wheels;
+        let half = 0.5 * self.ratio;
+        let (counted_1, counted_2) = (first.counted * (1.0 - half), second.counted * (1.0 + half));
+        let both = self.shares(scene);
+        // A hypothesis that trusts a wheel which is not read is left without.
+        let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
+        let [b1, b2] = both;
+        let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
+        let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
+        let trusted = TRUSTS * (alpha + beta).at_most(1.0);
+        let ways = self.filters.run(t, JERK);
+        self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
+        let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
+        let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
+        let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
+        (ways + moved, surprise)
+    }
+
+    /// The shares of both wheels where both roll.
+    fn shares(&self, scene: &Scene) -> [f64; 2] {
+        let [first, second] = &scene.wheels;
+        let weight = |driven: bool, other: bool, pitch: f64, read: bool| {
+            let creeps = if driven && !other && scene.slip { CREEPING_SHARE } else { 1.0 };
+            if read { creeps / (pitch * pitch) } else { 0.0 }
+        };
+        let a = weight(first.driven, second.driven, first.pitch, first.read);
+        let b = weight(second.driven, first.driven, second.pitch, second.read);
+        if a + b > 0.0 { [a / (a + b), b / (a + b)] } else { [0.0; 2] }
+    }
+
+    /// Lets what is known of sliding trains hold the filters that trust no counter.
+    fn pull(&mut self, scene: &Scene, [first, second]: &[Compared; 2], t: f64) {
+        let side = self.side;
+        let [first_wheel, second_wheel] = &scene.wheels;
+        let (nearest, acceleration) = match (first_wheel.read, second_wheel.read) {
+            (true, true) if side * first.speed >= side * second.speed => {
+                (first.speed, first_wheel.acceleration)
+            }
+            (true, true) | (false, true) => (second.speed, second_wheel.acceleration),
+            (true, false) => (first.speed, first_wheel.acceleration),
+            (false, false) => (0.0, 0.0),
+        };
+        let read = f64::from(u8::from(first_wheel.read || second_wheel.read));
+        // How fast the train can change its speed with both wheelsets slipping.
+        let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
+        let slides = -side * smaller(larger(-side * wanted, 0.0), SLIDES_BY);
+        let lasting = |deviation: f64, seconds: f64| t / (2.0 * seconds * deviation * deviation);
+        self.filters.acceleration(
+            Lanes::all(slides) - self.filters.a,
+            COASTS * lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S),
+        );
+        let wheels = 0.5 * (first_wheel.acceleration + second_wheel.acceleration);
+        let own = first_wheel.acceleration_deviation;
+        let alike = 1.0 / (1.0 / lasting(own, FOLLOWED_S) + 1.0 / lasting(CREEPS_WITHIN, CREEPS_FOR_S));
+        self.filters.acceleration(Lanes::all(wheels) - self.filters.a, BOTH_CREEP * (alike * read));
+        if let Some(felt) = scene.felt {
+            self.filters
+                .acceleration(Lanes::all(felt) - self.filters.a, MOVES * lasting(FELT_WITHIN, SLIDES_FOR_S));
+        }
+        // The wheel that is nearest to the train is no faster than it in a slide: a touch pushes the train up.
+        let (noise, restless) = SHOWN;
+        let b = Lanes::all(acceleration) - self.filters.a;
+        let shown = (b * b * (restless * restless) + noise * noise).inverse() * (t / FOLLOWED_S);
+        let (mean, deviation) = EXCESS;
+        let v = self.filters.v.at_least(1.0);
+        let usual = (v * v).inverse() * (lasting(deviation, EXCESS_S));
+        let y = Lanes::all(nearest) - self.filters.v;
+        let touch = y.with(shown, |y, shown| if side * y > 0.0 { shown } else { 0.0 });
+        let excess = y + v * (mean * side);
+        // Wheels that are far off say nothing.
+        let off = excess * (v * FAR.1 + FAR.0).inverse();
+        let off = off * off;
+        let turning = if nearest.abs() > SILENT { 1.0 } else { 0.0 };
+        let far = usual * (off * off + Lanes::all(1.0)).inverse() * turning;
+        let is_touch = y.with(y, |y, _| if side * y > 0.0 { 1.0 } else { 0.0 });
+        let innovation = y * is_touch + excess * (Lanes::all(1.0) - is_touch);
+        self.filters.speed(innovation, BOTH_SLIP * (touch + far * (Lanes::all(1.0) - is_touch)) * read);
+        self.reach(scene, [first, second], t);
+        // Wheels that creep alike creep by what they can.
+        let [(least, least_part), (most, most_part)] = CREEP;
+        let low = Lanes::all(nearest) + (v * least_part + least) * side;
+        let high = Lanes::all(nearest) + (v * most_part + most) * side;
+        let below = (low - self.filters.v) * side;
+        let above = (high - self.filters.v) * side;
+        let out = below.at_least(0.0) + above.at_most(0.0);
+        let edge = usual * (EXCESS.1 * EXCESS.1 / (CREEP_EDGE * CREEP_EDGE));
+        let pulls = out.with(edge, |out, edge| if out == 0.0 { 0.0 } else { edge });
+        self.filters.speed(out * side, BOTH_CREEP * pulls * read);
+        self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
+        // A train that slides does not run backwards, and accelerates as a train can.
+        let Range { low, high } = scene.acceleration;
+        self.filters.v =
+            self.filters.v.with(COASTS, |v, coasts| if coasts > 0.0 { larger(v, 0.0) } else { v });
+        self.filters.a = self
+            .filters
+            .a
+            .with(COASTS, |a, coasts| if coasts > 0.0 { larger(smaller(a, high), low) } else { a });
+        self.filters.keep_sound();
+    }
+
+    /// A wheel that was turned towards the train's speed hard and then goes on level has reached it: nothing else stops it
+    /// there. That tells the speed of a train whose wheels slip, from above and from below.
+    fn reach(&mut self, scene: &Scene, wheels: [&Compared; 2], t: f64) {
+        let [_, _, _, a, ..] = self.filters.a.0;
+        let [in_a_slide, in_a_spin] = REACHED;
+        let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
+        let reached = reached * reached;
+        for ((regained, wheel), compared) in self.regained.iter_mut().zip(&scene.wheels).zip(wheels) {
+            let towards = self.side * (wheel.acceleration - a);
+            *regained *= larger(1.0 - t / REGAINED_FOR_S, 0.0);
+            if towards > REGAINING {
+                *regained = 1.0;
+            }
+            let level = wheel.read && (wheel.acceleration - a).abs() < LEVEL && compared.speed.abs() > SILENT;
+            let information = if level { *regained * t / (FOLLOWED_S * reached) } else { 0.0 };
+            let y = Lanes::all(compared.speed) - self.filters.v;
+            // What is further off than the train can be was stopped by its slide control.
+            let usual = y * y * ((self.filters.pvv + reached) * REACHES_WITHIN).inverse();
+            let probable = (usual * usual + Lanes::all(1.0)).inverse();
+            self.filters.speed(y, BOTH_SLIP * probable * information);
+        }
+    }
+
+    /// Learns the ratio of the diameters while both roll.
+    fn learn_ratio(&mut self, scene: &Scene, t: f64) {
+        self.ratio_variance += RATIO_WANDERS * RATIO_WANDERS * t;
+        let [first, second] = &scene.wheels;
+        let [rolling, ..] = self.probability.0;
+        let mean = 0.5 * (first.speed + second.speed);
+        if !(first.read && second.read) || mean.abs() < RATIO_ABOVE || rolling < 0.9 {
+            return;
+        }
+        let measured = (first.speed - second.speed) / mean - self.ratio;
+        let noise = (first.speed_deviation + second.speed_deviation) / mean;
+        let creep = RATIO_CREEPAGE * larger(scene.brake, scene.traction);
+        let variance = noise * noise * (2.0 * FOLLOWED_S / t) + creep * creep * (CREEPAGE_FOR_S / t);
+        let gain = self.ratio_variance / (self.ratio_variance + variance);
+        let most = first.tolerance + second.tolerance;
+        self.ratio = larger(smaller(self.ratio + gain * measured, most), -most);
+        self.ratio_variance *= 1.0 - gain;
+    }
+
+    /// What all hypotheses come to; how far the estimate moved.
+    fn summed_up(&mut self, top: f64) -> f64 {
+        let p = self.probability;
+        let (v, a, way) = ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
+        let dv = self.filters.v - Lanes::all(v);
+        self.variance = (p * (self.filters.pvv + dv * dv)).sum();
+        self.speed = larger(smaller(v, top), -top);
+        self.acceleration = a;
+        self.ahead -= Lanes::all(way);
+        way
+    }
+}
+
+fn exp(lanes: Lanes) -> Lanes {
+    Lanes(lanes.0.map(libm::exp))
+}

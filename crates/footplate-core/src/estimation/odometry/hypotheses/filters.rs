@@ -1,0 +1,180 @@
+//! A Kalman filter for each hypothesis, all of them at once.
+//!
+//! Letters: `r` how far the train is ahead of the counter that the hypothesis trusts (m), `v` speed, `a` acceleration,
+//! `pxy` covariances, `q` density of the jerk (m²/s⁵), `k` gain, `y` innovation.
+
+use super::lanes::Lanes;
+
+/// What the diagonal keeps within, so that it stays positive and finite (m², m²/s², m²/s⁴).
+const PLACE: (f64, f64) = (1e-10, 1e2);
+const SPEED: (f64, f64) = (1e-8, 1e4);
+const ACCELERATION: (f64, f64) = (1e-8, 4.0);
+
+/// State and covariance of every hypothesis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Filters {
+    pub(super) r: Lanes,
+    pub(super) v: Lanes,
+    pub(super) a: Lanes,
+    pub(super) prr: Lanes,
+    pub(super) prv: Lanes,
+    pub(super) pra: Lanes,
+    pub(super) pvv: Lanes,
+    pub(super) pva: Lanes,
+    pub(super) paa: Lanes,
+}
+
+impl Filters {
+    /// A speed (m/s) with a variance, for all.
+    pub(super) fn new(speed: f64, variance: f64) -> Self {
+        let zero = Lanes::all(0.0);
+        Self {
+            r: zero,
+            v: Lanes::all(speed),
+            a: zero,
+            prr: Lanes::all(1e-4),
+            prv: zero,
+            pra: zero,
+            pvv: Lanes::all(variance),
+            pva: zero,
+            paa: Lanes::all(0.25),
+        }
+    }
+
+    /// Runs on for `t` seconds with jerk of density `q`; how far.
+    #[inline]
+    pub(super) fn run(&mut self, t: f64, q: Lanes) -> Lanes {
+        let half = 0.5 * t * t;
+        let way = self.v * t + self.a * half;
+        self.v += self.a * t;
+        let prv = self.prv + self.pvv * t + self.pva * half;
+        let pra = self.pra + self.pva * t + self.paa * half;
+        let pva = self.pva + self.paa * t;
+        self.prr += (self.prv + prv) * t + (self.pra + pra) * half + q * (t * t * t * t * t / 20.0);
+        self.prv = prv + pra * t + q * (t * t * t * t * 0.125);
+        self.pra = pra + q * (t * t * t / 6.0);
+        self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
+        self.pva = pva + q * (t * t * 0.5);
+        self.paa += q * t;
+        way
+    }
+
+    /// The counter says that `r` is 0, with variance `variance` where `trusted` is 1; by how much the place moved, and
+    /// the square of the innovation over its variance.
+    #[inline]
+    pub(super) fn place(&mut self, variance: Lanes, trusted: Lanes) -> (Lanes, Lanes) {
+        let per = (self.prr + variance).inverse() * trusted;
+        let surprise = self.r * self.r * per;
+        let (kr, kv, ka) = (self.prr * per, self.prv * per, self.pra * per);
+        let y = -self.r;
+        let moved = kr * y;
+        self.r += moved;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.pvv -= kv * self.prv;
+        self.pva -= kv * self.pra;
+        self.paa -= ka * self.pra;
+        let kept = Lanes::all(1.0) - kr;
+        self.prr *= kept;
+        self.prv *= kept;
+        self.pra *= kept;
+        (moved, surprise)
+    }
+
+    /// The speed is `y` higher than assumed, with this much information (s²/m²), 0 for nothing.
+    #[inline]
+    pub(super) fn speed(&mut self, y: Lanes, information: Lanes) {
+        let per = information * (self.pvv * information + Lanes::all(1.0)).inverse();
+        let (kr, kv, ka) = (self.prv * per, self.pvv * per, self.pva * per);
+        self.r += kr * y;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.prr -= kr * self.prv;
+        self.pra -= kr * self.pva;
+        self.paa -= ka * self.pva;
+        let kept = Lanes::all(1.0) - kv;
+        self.prv *= kept;
+        self.pvv *= kept;
+        self.pva *= kept;
+    }
+
+    /// The acceleration is `y` higher than assumed, with this much information (s⁴/m²).
+    #[inline]
+    pub(super) fn acceleration(&mut self, y: Lanes, information: Lanes) {
+        let per = information * (self.paa * information + Lanes::all(1.0)).inverse();
+        let (kr, kv, ka) = (self.pra * per, self.pva * per, self.paa * per);
+        self.r += kr * y;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.prr -= kr * self.pra;
+        self.prv -= kr * self.pva;
+        self.pvv -= kv * self.pva;
+        let kept = Lanes::all(1.0) - ka;
+        self.pra *= kept;
+        self.pva *= kept;
+        self.paa *= kept;
+    }
+
+    /// Takes a share of each filter from `pool`, a state that others have left.
+    #[inline]
+    pub(super) fn mix(&mut self, pool: &Pool, share: Lanes) {
+        let one = Lanes::all(1.0);
+        let kept = one - share;
+        let (dv, da) = (Lanes::all(pool.v) - self.v, Lanes::all(pool.a) - self.a);
+        let spread = share * kept;
+        self.v += share * dv;
+        self.a += share * da;
+        self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
+        self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
+        self.paa = self.paa * kept + share * pool.paa + spread * da * da;
+        // Where the counter stands, a hypothesis that begins has yet to find out.
+        self.r *= kept;
+        self.prr = self.prr * kept + share * pool.prr;
+        self.prv *= kept;
+        self.pra *= kept;
+    }
+
+    /// Keeps every variance positive and finite.
+    #[inline]
+    pub(super) fn keep_sound(&mut self) {
+        let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
+        self.prr = within(self.prr, PLACE);
+        self.pvv = within(self.pvv, SPEED);
+        self.paa = within(self.paa, ACCELERATION);
+    }
+
+    /// The train has turned round.
+    pub(super) fn reverse(&mut self) {
+        self.r = -self.r;
+        self.v = -self.v;
+        self.a = -self.a;
+    }
+
+    /// What the hypotheses come to with these weights, which need not add up to 1.
+    #[inline]
+    pub(super) fn pooled(&self, weights: Lanes, prr: f64) -> Pool {
+        let total = weights.sum();
+        let share = weights * (1.0 / total);
+        let (v, a) = ((share * self.v).sum(), (share * self.a).sum());
+        let (dv, da) = (self.v - Lanes::all(v), self.a - Lanes::all(a));
+        Pool {
+            v,
+            a,
+            pvv: (share * (self.pvv + dv * dv)).sum(),
+            pva: (share * (self.pva + dv * da)).sum(),
+            paa: (share * (self.paa + da * da)).sum(),
+            prr,
+        }
+    }
+}
+
+/// One state that stands for several.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pool {
+    pub(super) v: f64,
+    pub(super) a: f64,
+    pub(super) pvv: f64,
+    pub(super) pva: f64,
+    pub(super) paa: f64,
+    pub(super) prr: f64,
+}

@@ -1,0 +1,202 @@
+//! Whether reports can come from a layout: a sensor follows another only where rails lead from one to the other.
+//!
+//! Turnouts may lie anyhow, up to [`LOOK_PAST`] sensors in a row may stay silent, sensors report by themselves now and
+//! then, and people lift trains. So single reports that do not fit prove nothing: a layout is contradicted when so many of
+//! them do not fit that the right layout would hardly ever show as many (a one-sided binomial test).
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use crate::event::{Event, EventKind};
+use crate::ids::{NodeId, SensorId};
+use crate::track::{Layout, TurnoutStates};
+
+/// Sensors in a row that may have stayed silent.
+const LOOK_PAST: usize = 2;
+
+/// On the right layout at most this part of the reports does not follow from those before (one in a hundred reports of the
+/// real logs and 0.2 % of those of the simulator do not; chosen for layouts in a worse state).
+const STRAY: f64 = 0.05;
+
+/// A layout is contradicted when chance alone would show as many stray reports once in so many recordings.
+const SIGNIFICANCE: f64 = 1e-4;
+
+/// A report that no train can have caused by running on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StrayReport {
+    /// The sensor that reported.
+    pub seen: SensorId,
+    /// The sensor that a train had passed before; `None` if the layout has no sensor `seen`.
+    pub after: Option<SensorId>,
+    /// How often that was seen.
+    pub times: u32,
+}
+
+/// What the reports say of the layout.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SequenceVerdict {
+    /// They do not contradict it, or there are too few of them to tell.
+    Fits,
+    /// They are not of this layout.
+    Contradicts {
+        /// What does not fit, the most frequent first.
+        stray: Vec<StrayReport>,
+        /// Reports that followed others, stray ones included.
+        reports: u32,
+    },
+}
+
+/// Follows the reports of a recording over a layout.
+#[derive(Debug, Clone, Default)]
+pub struct SequenceTest {
+    /// How many trains may be running, ...
+    trains: usize,
+    /// ... and where they were seen last, the latest first.
+    places: Vec<NodeId>,
+    /// A report that did not fit: a train may be there after all.
+    elsewhere: Option<NodeId>,
+    last: Option<SensorId>,
+    followed: u32,
+    stray: BTreeMap<(Option<SensorId>, SensorId), u32>,
+}
+
+impl SequenceTest {
+    /// A run begins in which so many trains move: nobody knows where they are.
+    pub fn begin_run(&mut self, trains: usize) {
+        self.trains = trains.max(1);
+        self.places.clear();
+        (self.elsewhere, self.last) = (None, None);
+    }
+
+    /// The next entry of the run.
+    pub fn take(&mut self, layout: &Layout, event: &Event) {
+        match event.kind {
+            EventKind::Sensor(report) => self.report(layout, report.sensor),
+            // Which of the places is that of the train nobody says; it goes back from there.
+            EventKind::Reverse { .. } => self.begin_run(self.trains),
+            EventKind::Speed { .. } | EventKind::Turnout { .. } | EventKind::Stopped { .. } => {}
+        }
+    }
+
+    fn report(&mut self, layout: &Layout, sensor: SensorId) {
+        if self.last.replace(sensor) == Some(sensor) {
+            return;
+        }
+        let Some(node) = layout.sensor_node(sensor) else {
+            self.note_stray(None, sensor);
+            return;
+        };
+        let unknown = TurnoutStates::unknown();
+        let leads_here =
+            |from: &NodeId| layout.reaches(*from, &unknown, LOOK_PAST).any(|reach| reach.to == node);
+        if let Some(train) = self.places.iter().position(leads_here) {
+            self.followed += 1;
+            self.places.remove(train);
+        } else if self.elsewhere.as_ref().is_some_and(leads_here) {
+            // It was a train, and it is the one that was seen longest ago.
+            self.followed += 1;
+            self.places.pop();
+        } else if self.places.len() >= self.trains || self.places.contains(&node) {
+            let after = self.places.first().and_then(|place| layout.sensor_at(*place));
+            self.note_stray(after, sensor);
+            self.elsewhere = Some(node);
+            return;
+        }
+        self.elsewhere = None;
+        self.places.insert(0, node);
+    }
+
+    fn note_stray(&mut self, after: Option<SensorId>, seen: SensorId) {
+        *self.stray.entry((after, seen)).or_default() += 1;
+    }
+
+    /// What all runs so far say.
+    #[must_use]
+    pub fn verdict(&self) -> SequenceVerdict {
+        let count: u32 = self.stray.values().sum();
+        let reports = self.followed + count;
+        if chance_of_as_many(count, reports) >= SIGNIFICANCE {
+            return SequenceVerdict::Fits;
+        }
+        let mut stray: Vec<StrayReport> = self
+            .stray
+            .iter()
+            .map(|((after, seen), times)| StrayReport { seen: *seen, after: *after, times: *times })
+            .collect();
+        stray.sort_by_key(|stray| core::cmp::Reverse(stray.times));
+        SequenceVerdict::Contradicts { stray, reports }
+    }
+}
+
+/// The chance that at least `count` of `all` reports are stray on the right layout.
+fn chance_of_as_many(count: u32, all: u32) -> f64 {
+    // From the least count up, each term from the one before: P(k + 1) = P(k) (n − k)/(k + 1) p/(1 − p).
+    let mut term = libm::pow(1.0 - STRAY, f64::from(all));
+    if term == 0.0 {
+        // Too many reports for that: the share decides.
+        return if f64::from(count) > 2.0 * STRAY * f64::from(all) { 0.0 } else { 1.0 };
+    }
+    let mut fewer = 0.0;
+    for k in 0..count {
+        fewer += term;
+        term *= f64::from(all - k) / f64::from(k + 1) * STRAY / (1.0 - STRAY);
+    }
+    1.0 - fewer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Report;
+    use crate::time::Timestamp;
+    use crate::track::example::oval;
+
+    fn walked(trains: usize, names: &[&str]) -> SequenceVerdict {
+        let layout = oval();
+        let mut test = SequenceTest::default();
+        test.begin_run(trains);
+        for (second, name) in names.iter().enumerate() {
+            let sensor = layout.sensor_named(name).unwrap_or(SensorId(90 + second as u16));
+            let kind = EventKind::Sensor(Report { sensor, poll_interval: None });
+            test.take(&layout, &Event { time: Timestamp::from_s(second as f64), kind });
+        }
+        test.verdict()
+    }
+
+    #[test]
+    fn silent_sensors_wrong_turnouts_repetitions_and_a_few_stray_reports_fit() {
+        // Round by B, past a silent D, by C, with two reports of nobody, one sensor that hangs and one train lifted.
+        let names =
+            ["A1", "B1", "D1", "A1", "A1", "E1", "C1", "D1", "A1", "B1", "A1", "C1", "D1", "B2", "A2", "D2"];
+        assert_eq!(walked(1, &names), SequenceVerdict::Fits);
+        assert_eq!(walked(1, &[]), SequenceVerdict::Fits);
+        assert_eq!(walked(1, &["A1", "E1", "B2"]), SequenceVerdict::Fits, "too few to tell");
+    }
+
+    #[test]
+    fn two_trains_are_followed_apart() {
+        let names = ["A1", "A2", "B1", "D2", "D1", "B2", "A1", "A2", "C1", "D2", "D1", "C2"];
+        assert_eq!(walked(2, &names), SequenceVerdict::Fits);
+        assert!(matches!(walked(1, &names), SequenceVerdict::Contradicts { .. }));
+    }
+
+    #[test]
+    fn a_sequence_that_no_rails_make_contradicts_and_names_its_sensors() {
+        let names = ["A1", "E1", "A1", "E1", "B2", "E1", "A1", "E1"];
+        let SequenceVerdict::Contradicts { stray, reports } = walked(1, &names) else { panic!("it fits") };
+        let layout = oval();
+        let sensor = |name| layout.sensor_named(name).unwrap();
+        assert_eq!((stray[0].seen, stray[0].after, stray[0].times), (sensor("E1"), Some(sensor("A1")), 4));
+        assert_eq!(reports, 7);
+        let of_another = walked(1, &["A1", "Z1", "Z2", "Z3", "Z4"]);
+        assert!(matches!(of_another, SequenceVerdict::Contradicts { stray, .. } if stray[0].after.is_none()));
+    }
+
+    #[test]
+    fn the_chance_of_stray_reports_is_that_of_a_binomial_distribution() {
+        assert!((chance_of_as_many(0, 10) - 1.0).abs() < 1e-12);
+        assert!((chance_of_as_many(10, 10) - libm::pow(0.05, 10.0)).abs() < 1e-12);
+        assert!((chance_of_as_many(3, 10) - 0.011_504).abs() < 1e-5);
+        assert!(chance_of_as_many(500, 10_000) > 0.1 && chance_of_as_many(5_000, 1_000_000) > 0.99);
+    }
+}

@@ -1,0 +1,96 @@
+//! A model that learns for long stays true: surprises cost what they are worth, and old trips become a prior.
+
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::MotionFit;
+use footplate_core::{Approach, Command, Event, EventKind, SpeedStep, TimeSpan, TrainId};
+
+use crate::toy_railway::{ToyRailway, step, straight};
+
+const TRAIN: TrainId = TrainId(24);
+
+/// The toy's trains run at 32 mm/s a step and stop at 170 mm/s², 180 ms after the command.
+fn true_stop_mm(number: u8) -> f64 {
+    let v = 32.0 * f64::from(number);
+    0.18 * v + v * v / (2.0 * 170.0)
+}
+
+/// Runs at one step for some seconds and comes to rest; the command to start is noted so much later than it was sent.
+fn trip(world: &mut ToyRailway, fit: &mut MotionFit, number: u8, noted_later: TimeSpan) {
+    for (told, seconds) in [(step(number), 9.0), (SpeedStep::STAND, 5.0)] {
+        world.command(Command::Speed { train: TRAIN, step: told });
+        let end = world.now + TimeSpan::from_s(seconds);
+        while world.now < end {
+            for event in world.tick() {
+                let is_start =
+                    matches!(event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
+                let time = event.time + if is_start { noted_later } else { TimeSpan::ZERO };
+                fit.take(&world.layout, &straight(), &Event { time, ..event });
+            }
+        }
+    }
+}
+
+fn stops_mm(fit: &MotionFit) -> Vec<(u8, f64, f64)> {
+    let of = |number| {
+        let stop = fit.model().stop(step(number), Approach::Below);
+        (number, stop.distance.as_mm(), stop.doubt.as_mm())
+    };
+    [4, 6, 8, 10, 12].into_iter().map(of).collect()
+}
+
+/// An evening of stops in which one start at step 10 is so early.
+fn after_an_evening(early: TimeSpan) -> Vec<(u8, f64, f64)> {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    for (nth, number) in [8, 12, 4, 10, 6, 8, 4, 12, 6, 10, 8, 4, 10, 6, 8, 4, 12, 6].into_iter().enumerate()
+    {
+        trip(&mut world, &mut fit, number, if nth == 12 { early } else { TimeSpan::ZERO });
+        fit.refit(&sections);
+    }
+    stops_mm(&fit)
+}
+
+#[test]
+fn one_start_that_is_45_mm_early_moves_no_stop_by_more_than_a_tenth_of_that() {
+    // At step 10 a train runs 45 mm in 0.14 s.
+    let usual = after_an_evening(TimeSpan::ZERO);
+    for ((number, usual, _), (_, early, claimed)) in
+        usual.into_iter().zip(after_an_evening(TimeSpan::from_ms(140)))
+    {
+        let truth = true_stop_mm(number);
+        assert!(
+            (early - usual).abs() < 4.5,
+            "step {number}: {usual} mm without it, {early} mm with it, true {truth}"
+        );
+        assert!((early - truth).abs() < 2.0 * claimed, "step {number}: {early} ± {claimed} mm, true {truth}");
+    }
+}
+
+#[test]
+fn after_three_hundred_stops_a_model_is_as_true_as_it_says() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    for round in 0..60 {
+        for number in [8, 12, 4, 10, 6] {
+            trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        }
+        if round % 3 == 0 {
+            fit.refit(&sections);
+        }
+        if round == 30 {
+            fit.begin_session(&sections);
+        }
+    }
+    fit.refit(&sections);
+    for (number, distance, doubt) in stops_mm(&fit) {
+        let off = distance - true_stop_mm(number);
+        assert!(off.abs() < 3.0 * doubt + 2.0 && off.abs() < 6.0, "step {number}: off by {off} ± {doubt} mm");
+        assert!(doubt < 6.0, "step {number}: ± {doubt} mm after 300 stops");
+        let speed = fit.model().speed(step(number), Approach::Below);
+        let off = speed.value.as_mm_per_s() / (32.0 * f64::from(number)) - 1.0;
+        assert!(off.abs() < 0.01, "step {number}: {off}");
+        assert!(speed.count >= 60, "all contacts count: {}", speed.count);
+    }
+}

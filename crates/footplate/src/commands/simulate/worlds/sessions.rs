@@ -1,0 +1,266 @@
+//! One train of one world: calibrated once, then driven in several sessions, each stop beside its promise.
+
+use std::time::Duration;
+
+use anyhow::Context;
+use footplate_core::calibration::SectionIndex;
+use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::track::TurnoutStates;
+use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp};
+use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};
+
+use super::Extent;
+use super::timed::Timed;
+use super::world::WorldName;
+use crate::commands::drive::{Conductor, DriveBeginning, Spoken};
+use crate::commands::simulate::driving::trial::{Plan, TRAIN};
+use crate::commands::simulate::rehearsal::{VirtualLine, calibrate};
+use crate::commands::written_layout::WrittenLayout;
+use crate::link::news_of;
+use crate::witness::Input;
+
+/// Stops are asked for from steps whose true speed is at least this, in mm/s (chosen: slower ones may not move at all).
+const SLOWEST_MM_PER_S: f64 = 35.0;
+/// A train is looked for by running it at about this speed, in mm/s ...
+const SEEKS_AT_MM_PER_S: f64 = 250.0;
+/// ... for this long.
+const SEEKS_FOR: TimeSpan = TimeSpan::from_ms(12_000);
+/// A stop that has not ended by then is not carried out.
+const PATIENCE: TimeSpan = TimeSpan::from_ms(150_000);
+/// No train rolls for longer after it was said to have stopped.
+const ROLLS_FOR: TimeSpan = TimeSpan::from_ms(15_000);
+/// Between two sessions.
+const PAUSE: TimeSpan = TimeSpan::from_ms(3_600_000);
+/// How far early the start of the early-start world is, and at which step.
+const EARLY: Length = Length::from_mm(45.0);
+const EARLY_STEP: u8 = 10;
+
+/// One stop that was carried out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScoredStop {
+    pub(super) session: u8,
+    pub(super) step: SpeedStep,
+    /// How far beyond the target the train really came to rest, in mm.
+    pub(super) error: f64,
+    /// What was promised of that.
+    pub(super) promised: [f64; 2],
+}
+
+impl ScoredStop {
+    pub(super) fn is_kept(&self) -> bool {
+        (self.promised[0]..=self.promised[1]).contains(&self.error)
+    }
+
+    pub(super) const fn width(&self) -> f64 {
+        self.promised[1] - self.promised[0]
+    }
+}
+
+/// What came of one world.
+#[derive(Debug)]
+pub(super) struct ScoredWorld {
+    pub(super) name: WorldName,
+    pub(super) seed: u64,
+    pub(super) stops: Vec<ScoredStop>,
+    /// Stops asked for that were refused, or did not end.
+    pub(super) failures: Vec<String>,
+    pub(super) mishaps: usize,
+    /// Track time of the calibration, in s, and why it ended.
+    pub(super) calibration_s: f64,
+    pub(super) ending: String,
+    /// What the program computed for in all sessions, and at most at once.
+    pub(super) taken: Duration,
+    pub(super) longest: Duration,
+}
+
+/// Drives one world.
+pub(super) fn score(
+    written: &WrittenLayout,
+    name: WorldName,
+    seed: u64,
+    extent: Extent,
+) -> anyhow::Result<ScoredWorld> {
+    let layout = &written.layout;
+    let switches = LivingSwitches { physics: name.physics(), ..LivingSwitches::well_kept() };
+    let station = VirtualStation::draw(layout, seed, &[TRAIN], &switches)?;
+    let mut line = VirtualLine::open(station)?;
+    let calibrated = calibrate(layout, &mut line, TRAIN, extent.budget);
+    let mut scored = ScoredWorld {
+        name,
+        seed,
+        stops: Vec::new(),
+        failures: Vec::new(),
+        mishaps: 0,
+        calibration_s: calibrated.seconds,
+        ending: calibrated.ending,
+        taken: Duration::ZERO,
+        longest: Duration::ZERO,
+    };
+    let plan = Plan::new(&line, seed);
+    let mut learnt = (vec![calibrated.model], vec![calibrated.fit]);
+    let mut driven = Driven { written, line, plan, turnouts: calibrated.turnouts, scored: &mut scored };
+    for session in 1..=extent.sessions {
+        learnt = driven.session(session, extent.stops, learnt)?;
+        if !driven.is_sound() {
+            break;
+        }
+    }
+    let mishaps = driven.line.station.world().mishaps().len();
+    scored.mishaps = mishaps;
+    Ok(scored)
+}
+
+struct Driven<'a, 'l> {
+    written: &'l WrittenLayout,
+    line: VirtualLine<'l>,
+    plan: Plan,
+    turnouts: TurnoutStates,
+    scored: &'a mut ScoredWorld,
+}
+
+impl Driven<'_, '_> {
+    /// One session, with what was learnt before; returns what the next one goes on from.
+    fn session(
+        &mut self,
+        session: u8,
+        stops: u16,
+        learnt: (Vec<MotionModel>, Vec<MotionFit>),
+    ) -> anyhow::Result<(Vec<MotionModel>, Vec<MotionFit>)> {
+        self.line.station.world_mut().begin_session(PAUSE);
+        let mut machine = Timed::new(self.begin(learnt)?);
+        let until = self.line.now() + SEEKS_FOR;
+        if let Some(step) = self.nearest_step(SEEKS_AT_MM_PER_S) {
+            self.say(&mut machine, &format!("speed {TRAIN} {step}"));
+        }
+        self.drive(&mut machine, until, |_| false);
+        let early_at = (self.scored.name == WorldName::EarlyStart && session == 1).then_some(stops / 2);
+        for nth in 0..stops {
+            if !self.is_sound() {
+                break;
+            }
+            self.stop(&mut machine, session, early_at == Some(nth));
+        }
+        self.scored.taken += machine.taken;
+        self.scored.longest = self.scored.longest.max(machine.longest);
+        Ok(machine.conductor.handed_over())
+    }
+
+    /// The conductor of a session; what it knows goes through the text that is kept of it.
+    fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<Conductor> {
+        let sections = SectionIndex::of(&self.written.layout);
+        learnt.1.iter_mut().for_each(|fit| fit.begin_session(&sections));
+        learnt.0 = learnt.1.iter().map(|fit| fit.model().clone()).collect();
+        let beginning = DriveBeginning::of_person(self.written, &self.turnouts, learnt);
+        let text = serde_json::to_string(&beginning).context("what was learnt is kept as text")?;
+        let kept: DriveBeginning = serde_json::from_str(&text).context("what was kept is read back")?;
+        kept.conductor()
+    }
+
+    fn stop(&mut self, machine: &mut Timed, session: u8, early: bool) {
+        let layout = &self.written.layout;
+        let steps = if early { SpeedStep::new(EARLY_STEP).into_iter().collect() } else { self.steps() };
+        let asked = self.plan.stop(layout, &self.line, &self.turnouts, &steps);
+        let Some((node, offset, step)) = asked else { return };
+        if early {
+            let by = TimeSpan::from_s(EARLY.as_mm() / self.true_speed(step).max(1.0));
+            self.line.station.world_mut().hasten_next_start(TRAIN, by);
+        }
+        let offset = Length::from_mm(offset.as_mm().round());
+        let order = format!(
+            "stop {TRAIN} at {}+{}mm at step {step} next round",
+            layout.node_name(node),
+            offset.as_mm()
+        );
+        self.say(machine, &order);
+        let until = self.line.now() + PATIENCE;
+        let ended = self.drive(
+            machine,
+            until,
+            |spoken| matches!(spoken, Spoken::Ended(ended) if ended.command == "stop"),
+        );
+        self.until_at_rest(machine);
+        match ended {
+            Some(Spoken::Ended(ended)) => match (ended.refused, ended.promise, self.beyond(node, offset)) {
+                (None, Some(promise), Some(error)) => {
+                    let promised = [promise.low.as_mm(), promise.high.as_mm()];
+                    self.scored.stops.push(ScoredStop { session, step, error, promised });
+                }
+                (refused, ..) => self.failed(&order, refused.as_deref().unwrap_or("no promise")),
+            },
+            _ => {
+                self.failed(&order, "not ended in time");
+                self.say(machine, &format!("speed {TRAIN} 0"));
+                self.until_at_rest(machine);
+            }
+        }
+    }
+
+    fn failed(&mut self, order: &str, why: &str) {
+        let at = self.line.now().as_s();
+        self.scored.failures.push(format!("{at:.1} s: {order}: {why}"));
+    }
+
+    /// How far beyond a place the train really is, in mm.
+    fn beyond(&self, node: NodeId, offset: Length) -> Option<f64> {
+        let sensor = self.written.layout.sensor_at(node)?;
+        let past = self.line.station.world().truth().past(TRAIN, sensor)?;
+        Some((past - offset).as_mm())
+    }
+
+    fn until_at_rest(&mut self, machine: &mut Timed) {
+        let patience = self.line.now() + ROLLS_FOR;
+        while self.line.now() < patience && self.truth().is_some_and(|truth| truth.at_rest_since.is_none()) {
+            let until = patience.min(self.line.now() + TimeSpan::from_ms(200));
+            self.drive(machine, until, |_| false);
+        }
+    }
+
+    fn say(&self, machine: &mut Timed, line: &str) {
+        machine.handle_word(self.line.now(), &Input::Line(line.to_owned()));
+    }
+
+    /// Drives on until something is said that is waited for.
+    fn drive(
+        &mut self,
+        machine: &mut Timed,
+        until: Timestamp,
+        is_waited_for: impl Fn(&Spoken) -> bool,
+    ) -> Option<Spoken> {
+        loop {
+            let spoken = self.line.drive_hearing(machine, until, |machine, now, notice| {
+                if let Some(news) = news_of(notice) {
+                    machine.handle_word(now, &Input::Link(news));
+                }
+            })?;
+            if is_waited_for(&spoken) {
+                return Some(spoken);
+            }
+        }
+    }
+
+    fn truth(&self) -> Option<TrainTruth> {
+        self.line.station.world().truth().train(TRAIN)
+    }
+
+    fn is_sound(&self) -> bool {
+        self.truth().is_some_and(|truth| !truth.is_wrecked)
+    }
+
+    fn true_speed(&self, step: SpeedStep) -> f64 {
+        let engine = self.line.station.world().truth().engine(TRAIN);
+        engine.map_or(0.0, |engine| engine.speeds.speed(step, Approach::Below).as_mm_per_s())
+    }
+
+    /// All steps that stops are asked for from.
+    fn steps(&self) -> Vec<SpeedStep> {
+        let all = (1..=SpeedStep::HIGHEST).filter_map(SpeedStep::new);
+        let engine = self.line.station.world().truth().engine(TRAIN);
+        let highest = engine.map_or(SpeedStep::STAND, |engine| engine.speeds.highest());
+        all.filter(|step| *step <= highest && self.true_speed(*step) >= SLOWEST_MM_PER_S).collect()
+    }
+
+    fn nearest_step(&self, mm_per_s: f64) -> Option<SpeedStep> {
+        let off = |step: &SpeedStep| (self.true_speed(*step) - mm_per_s).abs();
+        self.steps().into_iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+    }
+}

@@ -1,0 +1,226 @@
+//! Recordings beside the layout that a person says they are of: refused if they are of another one.
+
+use anyhow::bail;
+use footplate_core::calibration::{LayoutTest, SectionIndex, SurveyTest};
+use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
+use footplate_core::{Event, Length, SensorId};
+use footplate_store::{BUILT_IN, Run, built_in};
+
+use crate::runtime::Recorder;
+
+/// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
+const EXPLAINED: Length = Length::from_mm(40.0);
+
+/// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
+const FEWEST_EXPLAINED: usize = 2;
+
+/// More contradictions than these tell a person nothing new.
+const MOST_SAID: usize = 4;
+
+/// Checks runs against a layout, and returns how its lengths compare with them.
+///
+/// # Errors
+/// The runs are of another layout: sensors follow each other that no rails join, or the lengths are those of another
+/// built-in layout. The message names the sensors, and what to do.
+pub(crate) fn check_runs<'r>(
+    layout: &Layout,
+    runs: impl Iterator<Item = &'r Run>,
+) -> anyhow::Result<SurveyTest> {
+    let sections = SectionIndex::of(layout);
+    let mut test = LayoutTest::default();
+    for run in runs {
+        test.begin_run(run.moving().len());
+        for raw in &run.events {
+            test.take(layout, &sections, &raw.event);
+        }
+    }
+    if let Some(contradiction) = order_contradicts(layout, &test.sequence()) {
+        bail!(contradiction);
+    }
+    let lengths = test.lengths(&sections);
+    let odd = odd_hops(layout, &sections, &lengths);
+    if let Some(other) = layout_with(layout, &odd) {
+        bail!(
+            "the recordings are not of layout `{}` but of `{other}`: {}; give --layout {other}",
+            layout.name(),
+            lengths_said(layout, &odd)
+        );
+    }
+    if let Some(said) = lengths_doubted(layout, &sections, &lengths) {
+        eprintln!("{said}");
+    }
+    Ok(lengths)
+}
+
+/// Watches a session: ends it if the reports are not of the layout on which trains are driven.
+pub(crate) struct LayoutWatch<'l> {
+    layout: &'l Layout,
+    sections: SectionIndex,
+    test: LayoutTest,
+    /// Who writes the entries down, before they are judged.
+    recorder: Option<&'l mut dyn Recorder>,
+}
+
+impl<'l> LayoutWatch<'l> {
+    /// A session with so many trains begins.
+    pub(crate) fn new(layout: &'l Layout, trains: usize, recorder: Option<&'l mut dyn Recorder>) -> Self {
+        let mut test = LayoutTest::default();
+        test.begin_run(trains);
+        Self { layout, sections: SectionIndex::of(layout), test, recorder }
+    }
+
+    /// What a person is told about lengths when the session is over.
+    pub(crate) fn lengths_doubted(&self) -> Option<String> {
+        lengths_doubted(self.layout, &self.sections, &self.test.lengths(&self.sections))
+    }
+}
+
+impl Recorder for LayoutWatch<'_> {
+    fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.record(events)?;
+        }
+        for event in events {
+            self.test.take(self.layout, &self.sections, event);
+        }
+        match order_contradicts(self.layout, &self.test.sequence()) {
+            Some(contradiction) => bail!(contradiction),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a person is told where sensors follow each other that no rails join.
+fn order_contradicts(layout: &Layout, verdict: &SequenceVerdict) -> Option<String> {
+    let SequenceVerdict::Contradicts { stray, reports } = verdict else { return None };
+    let times: u32 = stray.iter().map(|one| one.times).sum();
+    let said: Vec<String> = stray.iter().take(MOST_SAID).map(|one| stray_said(layout, one)).collect();
+    let more = if stray.len() > MOST_SAID { ", and others" } else { "" };
+    Some(format!(
+        "the reports are not of layout `{}`: {times} of {reports} sensors cannot follow the one before: {}{more}; give the \
+         layout that was recorded with --layout, or correct its edges",
+        layout.name(),
+        said.join(", ")
+    ))
+}
+
+fn stray_said(layout: &Layout, stray: &StrayReport) -> String {
+    let times = if stray.times == 1 { "once".to_owned() } else { format!("{} times", stray.times) };
+    let Some(after) = stray.after else {
+        return format!("sensor {} is not on it ({times})", stray.seen);
+    };
+    let next: Vec<&str> = followers(layout, after);
+    let name = layout.sensor_name(after);
+    let only = if next.is_empty() {
+        "the track ends there".to_owned()
+    } else {
+        format!("next is {}", next.join(" or "))
+    };
+    format!("{} after {name} {times} ({only})", layout.sensor_name(stray.seen))
+}
+
+/// The sensors that may come right after one.
+fn followers(layout: &Layout, sensor: SensorId) -> Vec<&str> {
+    let hops = layout.sensor_node(sensor).into_iter().flat_map(|node| layout.hops_from(node));
+    let mut names: Vec<&str> = hops.filter_map(|hop| Some(layout.sensor_name(hop.sensor?))).collect();
+    names.dedup();
+    names
+}
+
+/// Hops that are not as long as the layout says: the length there, and the one that is felt.
+fn odd_hops(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Vec<(HopId, Length, Length)> {
+    let hop_of = |section| layout.hops().find(|hop| sections.section(hop.id) == Some(section));
+    let odd = lengths.odd.iter();
+    odd.filter_map(|odd| {
+        Some((hop_of(odd.section)?.id, Length::from_m(odd.surveyed), Length::from_m(odd.felt)))
+    })
+    .collect()
+}
+
+/// What a person is told where lengths are not those of the layout, but no other is known that has them.
+fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<String> {
+    if lengths.is_passed() {
+        return None;
+    }
+    let odd = odd_hops(layout, sections, lengths);
+    if odd.is_empty() {
+        return Some(format!(
+            "the lengths of layout `{}` are off by about {:.0} times what it says (length_uncertainty_mm): they are \
+             estimated together with speeds, which may all be off by {:.0} %",
+            layout.name(),
+            lengths.factor,
+            100.0 * lengths.scale
+        ));
+    }
+    let layout_name = layout.name();
+    Some(format!("lengths that are not those of layout `{layout_name}`: {}", lengths_said(layout, &odd)))
+}
+
+fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> String {
+    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, felt)| {
+        let hop = layout.hop(*hop)?;
+        let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
+        let (surveyed, felt) = (surveyed.as_mm(), felt.as_mm());
+        Some(format!("{from} to {to} takes as long as {felt:.0} mm, not {surveyed:.0}"))
+    });
+    said.collect::<Vec<_>>().join(", ")
+}
+
+/// Another built-in layout with the lengths that are felt.
+pub(crate) fn layout_with(layout: &Layout, hops: &[(HopId, Length, Length)]) -> Option<&'static str> {
+    BUILT_IN.iter().copied().filter(|name| *name != layout.name()).find(|name| {
+        let Ok(other) = built_in(name) else { return false };
+        // Early in a session one or the other length is still wrong.
+        let explained = hops.iter().filter(|(hop, surveyed, felt)| {
+            let Some(hop) = layout.hop(*hop) else { return false };
+            let ends = [hop.from, hop.to].map(|node| other.layout.node_named(layout.node_name(node)));
+            let [Some(from), Some(to)] = ends else { return false };
+            let there = other.layout.hops_from(from).find(|other| other.to == to);
+            let is_nearer = |there: Length| (there - *felt).abs() < 0.5 * (*surveyed - *felt).abs();
+            there.is_some_and(|there| (there.length - *felt).abs() <= EXPLAINED && is_nearer(there.length))
+        });
+        explained.count() >= FEWEST_EXPLAINED
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use footplate_store::{LogContext, parse_sensor_log};
+
+    use super::*;
+
+    fn check(log: &str, layout: &str) -> anyhow::Result<SurveyTest> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs").join(log);
+        let layout = built_in(layout)?.layout;
+        let mut input = std::io::BufReader::new(std::fs::File::open(&path)?);
+        let recording = parse_sensor_log(&path, &mut input, LogContext { sensors: &layout, train: None })?;
+        check_runs(&layout, recording.runs.iter())
+    }
+
+    #[test]
+    fn real_logs_of_track_a_are_of_track_a() {
+        for train in ["train1", "train24", "train74", "train78"] {
+            for what in ["run", "stop"] {
+                let log = format!("choochoos_2020_track_a_{train}_{what}.csv");
+                let lengths = check(&log, "track-a").unwrap_or_else(|refusal| panic!("{log}: {refusal}"));
+                assert!(lengths.odd.len() <= 1, "{log}: {lengths:?}");
+            }
+        }
+        assert!(check("eadanila_2020_track_a.csv", "track-a").unwrap().is_passed());
+    }
+
+    #[test]
+    fn a_log_of_track_a_is_refused_on_track_b_by_the_two_lengths_that_differ() {
+        // Track B has the same sensors and turnouts, joined in the same way; two distances of this lap are 87 and 95 mm shorter.
+        let refusal = check("eadanila_2020_track_a.csv", "track-b").unwrap_err().to_string();
+        assert!(
+            refusal.starts_with("the recordings are not of layout `track-b` but of `track-a`"),
+            "{refusal}"
+        );
+        for named in ["C13 to E7", "D9 to E12", "give --layout track-a"] {
+            assert!(refusal.contains(named), "{named}: {refusal}");
+        }
+    }
+}
