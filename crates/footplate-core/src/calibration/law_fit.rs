@@ -8,6 +8,11 @@
 //! Laws are compared by Akaike's criterion with unknown variance (n ln(χ²/n) + 2k, corrected for small n;
 //! Hurvich and Tsai, 1989) and by the error on changes held out of the fit, one at a time. They have to agree:
 //! a law that describes but does not forecast is not reported as best.
+//!
+//! How well that works on simulated trains (40 seeds, 12 to 14 changes up and as many down, `changes` on track A): a lag is named as
+//! one 80 times in 80, a constant rate as a law of a constant rate 74 times in 80. The shape within a change is told apart
+//! less well: of the laws that end within some tenths of a second of each other, an even rate is named for most of the
+//! rounded and eased ones (138 in 160).
 #![expect(clippy::indexing_slicing, reason = "two unknowns, indexed below two")]
 
 use alloc::vec::Vec;

@@ -6,10 +6,11 @@
 
 use alloc::vec::Vec;
 
-use super::motion::MotionModel;
+use super::motion::{MotionModel, TRIP_DEVIATION};
 use super::passage::{Drive, Passage};
 use super::run::RunPassages;
 use super::section_index::SectionIndex;
+use crate::event::Approach;
 use crate::time::TimeSpan;
 use crate::track::{Layout, Reach};
 use crate::units::{Length, Speed};
@@ -105,7 +106,7 @@ impl SettledRunning {
             }
             scatter = scatter_of(&stretches);
         }
-        let run_deviation = run_deviation(model, &stretches);
+        let run_deviation = run_deviation(model, &stretches, scatter);
         Self { stretches, contact_scatter: Length::from_m(scatter), run_deviation }
     }
 
@@ -114,13 +115,24 @@ impl SettledRunning {
         self.stretches.iter().flatten().filter(|passage| passage.suspicious)
     }
 
-    /// The speed of a run at the step of a drive, where it was settled over some contacts.
-    pub(super) fn speed_in_run(&self, run: usize, drive: Drive) -> Option<Speed> {
+    /// The speed of a run at the step of a drive: as the model has it, and as the contacts of the run itself show it as far
+    /// as they can.
+    pub(super) fn speed_in_run(&self, model: &MotionModel, run: usize, drive: Drive) -> Speed {
+        let usual = model.steady_speed(drive.step, drive.approach());
         let is_of_drive = |stretch: &&Vec<SettledPassage>| {
-            stretch.len() >= FEWEST_OF_A_RUN
-                && stretch.first().is_some_and(|first| first.run == run && first.passage.drive == drive)
+            stretch.first().is_some_and(|first| first.run == run && first.passage.drive == drive)
         };
-        speed_of(self.stretches.iter().find(is_of_drive)?).map(|(speed, _)| speed)
+        let longest = self.stretches.iter().filter(is_of_drive).max_by_key(|stretch| stretch.len());
+        let Some((shown, variance)) =
+            longest.and_then(|stretch| speed_of(stretch, self.contact_scatter.as_m()))
+        else {
+            return usual;
+        };
+        let is_above = drive.approach() == Approach::Above;
+        let usual_variance =
+            model.ln_speed_variance(drive.step.get(), is_above) + TRIP_DEVIATION * TRIP_DEVIATION;
+        let gain = usual_variance / (usual_variance + variance);
+        usual * libm::exp(gain * libm::log(shown / usual))
     }
 }
 
@@ -193,10 +205,10 @@ fn scatter_of(stretches: &[Vec<SettledPassage>]) -> f64 {
     libm::sqrt((sum / count).max(LEAST_SCATTER_M * LEAST_SCATTER_M))
 }
 
-fn run_deviation(model: &MotionModel, stretches: &[Vec<SettledPassage>]) -> f64 {
+fn run_deviation(model: &MotionModel, stretches: &[Vec<SettledPassage>], scatter: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for stretch in stretches.iter().filter(|stretch| stretch.len() >= FEWEST_OF_A_RUN) {
-        let Some((speed, variance)) = speed_of(stretch) else { continue };
+        let Some((speed, variance)) = speed_of(stretch, scatter) else { continue };
         let drive = stretch.first().map(|first| first.passage.drive);
         let Some(drive) = drive else { continue };
         let known = model.steady_speed(drive.step, drive.approach()).as_m_per_s();
@@ -207,11 +219,31 @@ fn run_deviation(model: &MotionModel, stretches: &[Vec<SettledPassage>]) -> f64 
     if count > 0.0 { libm::sqrt((sum / count).max(0.0)) } else { 0.0 }
 }
 
-/// The mean speed of a stretch, and the variance of its logarithm from the polls at its ends.
-fn speed_of(stretch: &[SettledPassage]) -> Option<(Speed, f64)> {
+/// The speed of a stretch, and the variance of its logarithm: a straight line through its contacts, each of which counts by
+/// how well it is dated. The first report of a recording may have closed long before.
+fn speed_of(stretch: &[SettledPassage], scatter: f64) -> Option<(Speed, f64)> {
     let (first, last) = (stretch.first()?.passage.window, stretch.last()?.passage.window);
     let length: f64 = stretch.iter().skip(1).map(|passage| passage.length.as_m()).sum();
     let took = (last.middle() - first.middle()).as_s();
-    let variance = (first.variance_s2() + last.variance_s2()) / (took * took);
-    (took > 0.0 && length > 0.0).then(|| (Speed::from_m_per_s(length / took), variance))
+    if took <= 0.0 || length <= 0.0 {
+        return None;
+    }
+    let by_scatter = scatter * took / length;
+    let mut place = 0.0;
+    let contacts = stretch.iter().filter_map(|passage| {
+        place += passage.length.as_m();
+        let window = passage.passage.window;
+        let weight = 1.0 / (window.variance_s2() + by_scatter * by_scatter);
+        (!passage.suspicious).then_some((weight, place, (window.middle() - first.middle()).as_s()))
+    });
+    let contacts: Vec<(f64, f64, f64)> = contacts.collect();
+    let sum = |of: fn(f64, f64) -> f64| -> f64 {
+        contacts.iter().map(|(weight, place, time)| weight * of(*place, *time)).sum()
+    };
+    let all = sum(|_, _| 1.0);
+    let (place, time) = (sum(|place, _| place), sum(|_, time| time));
+    let squares = sum(|place, _| place * place) - place * place / all;
+    let slowness = (sum(|place, time| place * time) - place * time / all) / squares;
+    let speed = 1.0 / slowness;
+    (squares > 0.0 && slowness > 0.0).then(|| (Speed::from_m_per_s(speed), speed * speed / squares))
 }

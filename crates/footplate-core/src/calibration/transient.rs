@@ -105,20 +105,16 @@ impl ChangeReader<'_> {
         let drive = chain.first()?.drive;
         let commanded = drive.commanded?;
         let ends = settles_within(self.model, drive);
-        // The speed of this very run where it was seen, the model's where it was not.
-        let after = self
-            .running
-            .speed_in_run(run.run, drive)
-            .unwrap_or_else(|| self.model.steady_speed(drive.step, drive.approach()));
         let from = match before.filter(|before| before.step == drive.from) {
             _ if drive.from == SpeedStep::STAND => Speed::ZERO,
-            Some(before) => self
-                .running
-                .speed_in_run(run.run, before)
-                .unwrap_or_else(|| self.model.steady_speed(before.step, before.approach())),
+            Some(before) => self.running.speed_in_run(self.model, run.run, before),
             None => self.model.steady_speed(drive.from, crate::event::Approach::Below),
         };
-        let to = if drive.step == SpeedStep::STAND { Speed::ZERO } else { after };
+        let to = if drive.step == SpeedStep::STAND {
+            Speed::ZERO
+        } else {
+            self.running.speed_in_run(self.model, run.run, drive)
+        };
         let mut way = 0.0;
         let mut settled = 0;
         let mut points = Vec::new();

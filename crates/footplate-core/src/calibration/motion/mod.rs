@@ -42,7 +42,7 @@ pub(crate) use follow::{Following, Guess, INTERRUPTED};
 pub use model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;
-pub(crate) use priors::{FELT, section_variance};
+pub(crate) use priors::{FELT, TRIP_DEVIATION, section_variance};
 pub use prospect::Prospect;
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use standing_times::StandingTimes;
