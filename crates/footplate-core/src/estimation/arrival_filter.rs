@@ -66,7 +66,7 @@ impl ArrivalFilter {
             Following::running(model, time, step.get(), anywhere)
         };
         Self {
-            following,
+            following: following.keep_apart(model),
             model: model.clone(),
             sections: [None; SECTIONS],
             longer: [0.0; SECTIONS],
@@ -83,7 +83,7 @@ impl ArrivalFilter {
 
     /// The model was fitted anew. Where the train is and how fast it runs stays as the run has shown it.
     pub(super) fn exchange(&mut self, model: &MotionModel) {
-        self.following.exchange(model);
+        self.following.exchange(&self.model, model);
         self.model = model.clone();
     }
 

@@ -89,10 +89,9 @@ impl<const L: usize> Following<L> {
             && (self.course.segment.is_steady() || self.course.segment.settled() <= time)
     }
 
-    /// The model was exchanged while it ran steadily: `ε` is now what the run deviates from the new one.
-    pub(crate) fn exchange(&mut self, model: &MotionModel) {
-        let ratio = self.course.exchange(model);
-        self.course.x[E] -= libm::log(ratio);
+    /// The model was exchanged while it ran steadily; what is known of each step's speed is counted from the new one.
+    pub(crate) fn exchange(&mut self, before: &MotionModel, after: &MotionModel) {
+        self.course.exchange_apart(before, after);
     }
 
     /// Adds to the variance of ln of its speed.

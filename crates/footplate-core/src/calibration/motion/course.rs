@@ -15,6 +15,7 @@
 //! asked of a copy: cheap enough to look at thousands of ways to go on within a millisecond.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
+use super::apart::Apart;
 use super::model::MotionModel;
 pub(crate) use super::segment::Told;
 use super::segment::{Pace, Segment};
@@ -55,6 +56,9 @@ pub(crate) struct Course {
     later: usize,
     slower: f64,
     pending: [Option<Told>; MOST_PENDING],
+    /// What forecasts keep apart; nothing for a train that is driven.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub(super) apart: Option<Apart>,
 }
 
 impl Course {
@@ -72,6 +76,7 @@ impl Course {
             later: LATER,
             slower: 0.0,
             pending: [None; MOST_PENDING],
+            apart: None,
         }
     }
 
@@ -128,6 +133,7 @@ impl Course {
         self.pending[MOST_PENDING - 1] = None;
         let pace = if told.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
         self.x[B] = way;
+        let apart = self.apart.map(|apart| apart.next(self, &told, begins));
         self.segment = Segment::of(&told, &model.answers(), pace);
         self.segment.begins = begins;
         (self.step, self.is_above) = (told.to, told.above());
@@ -140,13 +146,17 @@ impl Course {
         self.later = LATER + usize::from(told.above());
         self.slower = if self.repeats(&told) { pace.speed - self.segment.to } else { 0.0 };
         if told.to != 0 {
-            self.speed = self.repeats(&told).then(|| self.meet(&told));
+            let is_met = self.repeats(&told) || apart.is_some();
+            let busy = apart.map_or([0; 2], |apart| apart.letters());
+            self.speed = is_met.then(|| self.meet(told.to, told.above(), busy));
         }
+        self.apart = apart;
+        self.linearise(model);
         pace.speed
     }
 
     /// Whether a command is one of many that are alike.
-    pub(super) const fn repeats(&self, told: &Told) -> bool {
+    const fn repeats(&self, told: &Told) -> bool {
         self.is_repeating && told.to != 0 && !told.at_rest
     }
 
@@ -162,26 +172,38 @@ impl Course {
         }
     }
 
-    /// The letter of the step that was told, if it is kept.
-    pub(super) fn kept(&self, told: &Told) -> Option<usize> {
-        let at = self.met.iter().position(|met| *met == (told.to, told.above()))?;
+    /// The letter of a step, reached from above or not, if it is kept.
+    pub(super) fn kept(&self, step: u8, above: bool) -> Option<usize> {
+        let at = self.met.iter().position(|met| *met == (step, above))?;
         Some(STEPS + at)
     }
 
-    /// Runs at the step that was told, of which nothing is known but what the model says unless it is kept.
-    fn meet(&mut self, told: &Told) -> usize {
-        self.kept(told).unwrap_or_else(|| {
+    /// Runs at a step, of which nothing is known but what the model says unless it is kept. Letters that are busy are not
+    /// given away.
+    pub(super) fn meet(&mut self, step: u8, above: bool, busy: [usize; 2]) -> usize {
+        self.kept(step, above).unwrap_or_else(|| {
+            while busy.contains(&(STEPS + self.oldest)) {
+                self.oldest = (self.oldest + 1) % STEPS_KEPT;
+            }
             let at = self.oldest;
             self.oldest = (at + 1) % STEPS_KEPT;
-            self.met[at] = (told.to, told.above());
+            self.met[at] = (step, above);
             self.x[STEPS + at] = 0.0;
             STEPS + at
         })
     }
 
-    /// Its speed over what the model says of it.
+    /// The letters of steps in use, each with its step and whether that was reached from above.
+    pub(super) fn steps_met(&self) -> impl Iterator<Item = (usize, u8, bool)> {
+        let met = self.met.into_iter().enumerate().filter(|(_, (step, _))| *step != 0);
+        met.map(|(at, (step, above))| (STEPS + at, step, above))
+    }
+
+    /// Its speed over what the segment under way says of it.
     pub(super) fn grown(&self) -> f64 {
-        libm::exp(self.x[E] + self.speed.map_or(0.0, |letter| self.x[letter]))
+        // Where steps are apart the segment has the speed of its step already.
+        let by_step = self.speed.filter(|_| self.apart.is_none()).map_or(0.0, |letter| self.x[letter]);
+        libm::exp(self.x[E] + by_step)
     }
 
     /// It has been running steadily for long: ways are counted from here on.
@@ -189,17 +211,9 @@ impl Course {
         self.x[B] = way;
         self.segment = Segment::steady(time, self.segment.to);
         self.slower = 0.0;
-    }
-
-    /// The model was exchanged. Of a steady run the speed is now what the model says; returns by which factor it is faster.
-    pub(super) fn exchange(&mut self, model: &MotionModel) -> f64 {
-        let before = self.segment.to;
-        let after = model.answers().speed(usize::from(self.step), self.is_above);
-        if !self.segment.is_steady() || before <= 0.0 || after <= 0.0 {
-            return 1.0;
+        if let Some(apart) = &mut self.apart {
+            apart.run_on(&self.segment);
         }
-        self.segment = Segment::steady(self.segment.begins, after);
-        after / before
     }
 
     /// By how much way the change under way differs from its law once it is done.
@@ -208,13 +222,15 @@ impl Course {
     }
 
     /// Slopes of `x(t)` from those of `b`, `ε`, `η` and `ζ`.
-    fn slope(&self, own: [f64; 4]) -> [f64; N] {
+    fn slope(&self, own: [f64; 4], time: f64) -> [f64; N] {
         let mut slope = [0.0; N];
         slope[..4].copy_from_slice(&own);
-        if let Some(letter) = self.speed {
+        slope[self.later] = self.slower * own[Z];
+        if let Some(apart) = &self.apart {
+            apart.add_slopes(self, time, &mut slope);
+        } else if let Some(letter) = self.speed {
             slope[letter] = own[E];
         }
-        slope[self.later] = self.slower * own[Z];
         slope
     }
 
@@ -224,13 +240,13 @@ impl Course {
         if time.is_infinite() {
             let way = self.segment.way_to_rest();
             let place = self.x[B] + grown * way + self.displaced();
-            return (place, self.slope([1.0, grown * way, 0.0, 1.0]));
+            return (place, self.slope([1.0, grown * way, 0.0, 1.0], time));
         }
         let late = time - self.x[H];
-        let way = if self.is_still() { 0.0 } else { self.segment.way(late) };
+        let way = if self.is_still() { 0.0 } else { self.segment.way(late) + self.learnt_since(time) };
         let (speed, share) = (self.segment.speed(late), self.segment.share(time));
         let place = self.x[B] + grown * way + self.displaced() * share;
-        (place, self.slope([1.0, grown * way, -grown * speed, share]))
+        (place, self.slope([1.0, grown * way, -grown * speed, share], time))
     }
 
     pub(super) const fn is_still(&self) -> bool {
@@ -244,7 +260,8 @@ impl Course {
         if is_done {
             return self.x[B] + grown * self.segment.way_to_rest() + displaced;
         }
-        let way = if self.is_still() { 0.0 } else { self.segment.way(time - self.x[H]) };
+        let way =
+            if self.is_still() { 0.0 } else { self.segment.way(time - self.x[H]) + self.learnt_since(time) };
         let change = if displaced == 0.0 { 0.0 } else { displaced * self.segment.share(time) };
         self.x[B] + grown * way + change
     }

@@ -5,6 +5,7 @@
 //! late changes are and how fast its step is, `τ` and `s` go on knowing.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
+use super::apart::STEP_AGAIN;
 use super::course::{B, Course, E, H, LATER, N, Told, Z};
 use super::decoder_kind::SHAPE_ERROR;
 use super::model::MotionModel;
@@ -34,14 +35,9 @@ const STEP_WALK: f64 = 0.0005;
 /// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
 /// (3τ² − 2τ³) and an even one are apart by up to 0.096.
 const SHAPE_SPEED_ERROR: f64 = 0.07;
-/// When a step is reached again its ln speed differs by so much: repeats of one run differ by 0.3 to 0.8 %. Only forecasts count
-/// it, which are held to their intervals; who drives learns such differences ([`Following::repeat`]).
-const STEP_AGAIN: f64 = 0.006;
 /// By how much more than it is thought to a single change differs from its law in forecasts: shapes of decoders that the law
 /// does not have (chosen on simulated decoders of six laws, so that nine in ten intervals of 90 % hold).
 const OTHER_SHAPES: f64 = 2.0;
-/// Bounds of what one run may differ from all others: beyond, the model is wrong.
-const FARTHEST_DEVIATION: f64 = 1.5;
 
 /// A mean and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +125,7 @@ impl<const L: usize> Following<L> {
         let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
         let unsettled = self.course.unsettled(begins);
         self.transform(slope);
-        let kept = self.course.kept(&told);
+        let kept = self.course.kept(told.to, told.above());
         let speed = self.course.begin(model, told, begins, way);
         for letter in [H, Z] {
             self.forget(letter);
@@ -154,7 +150,7 @@ impl<const L: usize> Following<L> {
         let error = if told.to == 0 || from_rest {
             0.0
         } else {
-            let part = if L > N { OTHER_SHAPES } else { 1.0 };
+            let part = if self.course.apart.is_some() { OTHER_SHAPES } else { 1.0 };
             part * libm::hypot(change_error(to - speed), INTERRUPTED * unsettled)
         };
         // Who begins faster than was thought is farther by so much once the change is done.
@@ -169,13 +165,17 @@ impl<const L: usize> Following<L> {
     /// A step was told whose ln speed the model knows to a variance, and which may have been met before.
     fn doubt_step(&mut self, variance: f64, is_kept: bool) {
         let Some(letter) = self.course.speed else {
-            self.p[E][E] += variance + if L > N { STEP_AGAIN * STEP_AGAIN } else { 0.0 };
+            self.p[E][E] += variance;
             self.local = 0.0;
             return;
         };
         if !is_kept {
             self.forget(letter);
             self.p[letter][letter] = variance;
+        }
+        if self.course.apart.is_some() {
+            self.p[letter][letter] += STEP_AGAIN * STEP_AGAIN;
+            return;
         }
         self.local = variance;
         self.p[letter][letter] += STEP_WALK * STEP_WALK;
@@ -360,7 +360,8 @@ impl<const L: usize> Following<L> {
             for i in 0..N {
                 self.course.x[i] = mean[i] + with[i] / s * off;
             }
-            self.course.x[E] = self.course.x[E].clamp(-FARTHEST_DEVIATION, FARTHEST_DEVIATION);
+            self.course.hold_deviations();
+            self.course.linearise(model);
             if look == LOOKS {
                 for i in 0..L {
                     for j in 0..L {
@@ -385,7 +386,7 @@ impl<const L: usize> Following<L> {
     fn count_from(&mut self, time: f64) {
         let segment = self.course.segment;
         // What companions share with the way so far, their covariance tells apart.
-        let long = if L > N { 0.0 } else { LONG_RUN };
+        let long = if self.course.apart.is_some() { 0.0 } else { LONG_RUN };
         let is_steady = segment.share(time) >= STEADY && time - segment.begins > long;
         if self.course.step == 0 || !is_steady {
             return;
@@ -454,7 +455,7 @@ impl<const L: usize> Following<L> {
 
 /// Variance of ln of a speed by which a run differs from all others. A speed that is known for certain is that of the run: an
 /// oracle was told it.
-fn run_variance(of_step: f64) -> f64 {
+pub(super) fn run_variance(of_step: f64) -> f64 {
     if of_step > 0.0 { TRIP_DEVIATION * TRIP_DEVIATION } else { 0.0 }
 }
 

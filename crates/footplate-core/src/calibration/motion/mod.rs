@@ -4,6 +4,7 @@
 //! experiments are planned and stops are promised. It is made by [`MotionFit`] from everything the train did so far:
 //! not from experiments of a set form, but from the one chain of commands and contacts that any driving is.
 
+mod apart;
 mod arrival;
 #[cfg(feature = "serde")]
 mod bits;
