@@ -217,3 +217,43 @@ impl Course {
         ((way(&apart.toward) - here) * learnt[0] + (way(&apart.away) - here) * before) / STEP
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::calibration::motion::Guess;
+    use crate::ids::{SpeedStep, TrainId};
+
+    #[test]
+    fn what_a_step_is_off_by_is_not_taken_along_to_the_next() {
+        // Given a train of which nothing is known, and which runs 13 % faster at step 9 than such trains do,
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let exact = |mean: f64| Guess { mean, variance: 1e-6 };
+        let running = || Following::<N>::running(&model, 0.0, 14, exact(0.0)).keep_apart(&model);
+        let (mut train, mut believed) = (running(), running());
+        // when it is seen every second at step 14, at 9 and at 14 again,
+        let mut found = Vec::new();
+        for second in 1..30_u8 {
+            let now = f64::from(second);
+            if let Some(step) =
+                [(5, 9), (20, 14)].into_iter().find_map(|(at, step)| (at == second).then_some(step))
+            {
+                train.tell(&model, now, step);
+                believed.tell(&model, now, step);
+            }
+            train = train.at(&model, now);
+            if let Some(letter) = train.course.speed.filter(|_| train.course.step == 9) {
+                train.course.x[letter] = 0.13;
+                train.course.linearise(&model);
+            }
+            believed.pass(&model, now, 0.0, exact(train.place(&model, now).mean));
+            found.push(believed.settled_speed().mean / train.settled_speed().mean);
+        }
+        // then it is found out how fast it is at 9, and that has nothing to do with 14.
+        let at = |second: usize| (found[second - 1] - 1.0).abs();
+        assert!(at(4) < 0.01 && at(19) < 0.01, "{} {}", at(4), at(19));
+        assert!(at(21) < 0.02 && at(22) < 0.02, "{} {}", at(21), at(22));
+    }
+}
