@@ -1,17 +1,24 @@
 //! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
 
 use super::arrivals::{Arrivals, arrivals};
-use super::evidence::{CREEP, Compared, SILENT, evidence};
+use super::evidence::{CREEP, Compared, SILENT, STEADY_S, evidence};
 use super::filters::Filters;
 use super::interval::interval;
 use super::lanes::Lanes;
-use super::rates::transitions;
+use super::rates::{Transitions, transitions};
 use super::scene::Scene;
+use super::touch::Touch;
 use crate::wheels::{Range, Wheelset, larger, smaller};
 
 /// Density of the train's jerk while a wheel tells its speed (m²/s⁵): 0.14 m/s² in a second, what a driver's hand does
 /// to a cruising train; while none does, the acceleration is known to 0.3 m/s² after a few seconds.
-const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.1, 0.05, 0.0, 0.02, 0.02]);
+const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
+/// How long brakes and motors take to do what is commanded (s), and how much of it a train whose wheels roll can be expected
+/// to do: the rest is left to gradients, resistance and the state of the brakes.
+const BUILD_UP_S: f64 = 1.5;
+const EXPECTED: f64 = 0.5;
+/// By how much the acceleration changes when wheels that slipped have their grip again (m/s²).
+const REGAINS: f64 = 0.4;
 /// Hypotheses that trust a counter: one (or zero) for each.
 const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 /// Hypotheses in which no wheel tells the speed.
@@ -31,27 +38,16 @@ const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
 /// How long that stays what it is (s).
 const SLIDES_FOR_S: f64 = 2.0;
 /// How closely wheels that creep alike accelerate with the train (m/s²), and for how long (s).
-const CREEPS_WITHIN: f64 = 0.2;
+const CREEPS_WITHIN: f64 = 0.5;
 const CREEPS_FOR_S: f64 = 3.0;
 /// What is felt is within this of the truth, for as long (m/s²).
 const FELT_WITHIN: f64 = 0.06;
-/// Mean and deviation of how much slower the faster of two sliding wheels turns (part of the speed), and for how long
-/// it stays so (s).
-const EXCESS: (f64, f64) = (0.03, 0.06);
-const EXCESS_S: f64 = 2.0;
-/// Wheels further off than this say nothing of the train (m/s, part of the speed).
-const FAR: (f64, f64) = (0.3, 0.12);
 /// How sharp the limits of steady creep are (part of the speed).
 const CREEP_EDGE: f64 = 0.03;
-/// A speed that a wheel shows is within this (m/s), and within this for each m/s² of its acceleration.
-const SHOWN: (f64, f64) = (0.1, 0.08);
-/// A wheel that regains its grip accelerates harder than this (m/s²), one that has reached the train less than this; it is
-/// remembered for so long (s), and tells the speed of the train so well (m/s): in a slide, whose control often stops the
-/// wheel short of the train, and in a spin. Tuned on seeds 301 to 306.
-const REGAINING: f64 = 3.0;
-const LEVEL: f64 = 1.5;
-const REGAINED_FOR_S: f64 = 0.5;
-const REACHED: [f64; 2] = [0.35, 0.15];
+/// A wheel faster than the train in a slide pushes it up within this (m/s).
+const PUSHES: f64 = 0.2;
+/// How well a wheel that has reached the speed of the train tells it (m/s): in a slide and in a spin.
+const REACHED: [f64; 2] = [0.35, 0.1];
 /// Square of the deviations at which half of what is level has not reached the train.
 const REACHES_WITHIN: f64 = 2.0;
 /// How long the error of a followed wheel lasts (s).
@@ -85,12 +81,15 @@ pub(in super::super) struct Bank {
     /// First over second wheel speed when both roll, less 1, and its variance.
     ratio: f64,
     ratio_variance: f64,
-    /// Mean acceleration, smoothed (m/s²).
+    /// Mean acceleration, smoothed (m/s²), and that of the wheels.
     trend: f64,
+    wheels_a: f64,
+    /// The commanded acceleration as far as brakes and motors follow it (m/s²).
+    acted: f64,
     /// 1 while wheels may turn slower than the train, −1 while they may turn faster.
     side: f64,
-    /// Whether each wheel was lately turned towards the speed of the train (1, fading to 0).
-    regained: [f64; 2],
+    /// Whether each wheel has been turned up to the speed of the train.
+    touches: [Touch; 2],
     /// What came out of the last period.
     speed: f64,
     acceleration: f64,
@@ -111,8 +110,10 @@ impl Bank {
             ratio: 0.0,
             ratio_variance: variances.iter().sum(),
             trend: 0.0,
+            wheels_a: 0.0,
+            acted: 0.0,
             side: 1.0,
-            regained: [0.0; 2],
+            touches: [Touch::new(); 2],
             speed,
             acceleration: 0.0,
             variance,
@@ -141,17 +142,21 @@ impl Bank {
         self.speed = -self.speed;
         self.acceleration = -self.acceleration;
         self.trend = -self.trend;
+        self.wheels_a = -self.wheels_a;
     }
 
     /// Takes in a period of `t` seconds; how far the train went (m).
     pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
         self.side = self.next_side(scene, t);
+        let [first, second] = &scene.wheels;
+        let wheels_a = 0.5 * (first.acceleration + second.acceleration);
+        self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
         self.mix(scene, &wheels, t);
         let (ways, surprise) = self.run(scene, t);
         self.ahead += ways;
         self.pull(scene, &wheels, t);
-        let likelihood = evidence(scene, &wheels, &self.filters, surprise, self.side, t);
+        let likelihood = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
         let weights = (self.probability * exp(likelihood)).at_least(LEAST);
         self.probability = weights * (1.0 / weights.sum());
         self.learn_ratio(scene, t);
@@ -193,30 +198,21 @@ impl Bank {
 
     /// Lets hypotheses end and begin.
     fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
-        let transitions = transitions(scene, t);
+        let Transitions { ends, after_rolling, after_others } = transitions(scene, t);
+        // What cannot begin now leaves its probability where it is.
+        let may = self.may_begin();
+        let (after_rolling, after_others) = (after_rolling * may, after_others * may);
         let [rolling, ..] = self.probability.0;
-        let leaves = self.probability * transitions.ends;
-        let ([leaves_rolling, ..], rest) = (leaves.0, leaves * NOT_ROLLING);
-        let Arrivals { stays_lost, others } =
-            arrivals(scene, wheels, &self.filters, rest, transitions.after_others);
-        let leaves = rest * (Lanes::all(1.0) - stays_lost) + BOTH_ROLL * leaves_rolling;
+        let rest = self.probability * ends * NOT_ROLLING;
+        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, rest, after_others);
+        let leaves = rest * (Lanes::all(after_others.sum()) - stays_lost)
+            + BOTH_ROLL * (rolling * after_rolling.sum());
         let [first, second] = &scene.wheels;
         let pitch = larger(first.pitch, second.pitch);
-        let pool = self.filters.pooled(leaves, pitch * pitch);
+        let mut pool = self.filters.pooled(leaves, pitch * pitch);
+        pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
         let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
-        let mut arrives = transitions.after_rolling * rolling + transitions.after_others * others;
-        // Nothing slips at rest.
-        let moves = pool.v * pool.v;
-        let moving = |above: f64| moves / (moves + above * above);
-        let [_, first_slips, second_slips, both_slip, both_creep, ..] = &mut arrives.0;
-        for slips in [first_slips, second_slips, both_slip] {
-            *slips *= moving(SLIPS_ABOVE);
-        }
-        *both_creep *= moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE);
-        // A train can only have stopped that is slow enough.
-        let slow = pool.pvv + STOPS_BELOW * STOPS_BELOW;
-        let [_, _, _, _, _, standing, ..] = &mut arrives.0;
-        *standing *= libm::exp(-0.5 * pool.v * pool.v / slow) * STOPS_BELOW / libm::sqrt(slow);
+        let arrives = after_rolling * rolling + after_others * others;
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
@@ -232,6 +228,17 @@ impl Bank {
         *paa = *paa * MOVES + STANDS * AT_REST;
     }
 
+    /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have
+    /// stopped that is slow enough.
+    fn may_begin(&self) -> Lanes {
+        let moves = self.speed * self.speed;
+        let moving = |above: f64| moves / (moves + above * above);
+        let (slips, creeps) = (moving(SLIPS_ABOVE), moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE));
+        let slow = self.variance + STOPS_BELOW * STOPS_BELOW;
+        let stops = libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow);
+        Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
+    }
+
     /// Runs every filter on and lets the counters correct those that trust one; how far each went, and how
     /// surprised it was.
     fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
@@ -245,6 +252,10 @@ impl Bank {
         let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
         let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
         let trusted = TRUSTS * (alpha + beta).at_most(1.0);
+        let rest = scene.commanded.map_or(0.0, |commanded| commanded - self.acted);
+        let acts = rest * smaller(t / BUILD_UP_S, 1.0);
+        self.acted += acts;
+        self.filters.a += TRUSTS * (EXPECTED * acts);
         let ways = self.filters.run(t, JERK);
         self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
         let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
@@ -269,13 +280,11 @@ impl Bank {
     fn pull(&mut self, scene: &Scene, [first, second]: &[Compared; 2], t: f64) {
         let side = self.side;
         let [first_wheel, second_wheel] = &scene.wheels;
-        let (nearest, acceleration) = match (first_wheel.read, second_wheel.read) {
-            (true, true) if side * first.speed >= side * second.speed => {
-                (first.speed, first_wheel.acceleration)
-            }
-            (true, true) | (false, true) => (second.speed, second_wheel.acceleration),
-            (true, false) => (first.speed, first_wheel.acceleration),
-            (false, false) => (0.0, 0.0),
+        let nearest = match (first_wheel.read, second_wheel.read) {
+            (true, true) => side * larger(side * first.speed, side * second.speed),
+            (false, true) => second.speed,
+            (true, false) => first.speed,
+            (false, false) => 0.0,
         };
         let read = f64::from(u8::from(first_wheel.read || second_wheel.read));
         // How fast the train can change its speed with both wheelsets slipping.
@@ -294,33 +303,16 @@ impl Bank {
             self.filters
                 .acceleration(Lanes::all(felt) - self.filters.a, MOVES * lasting(FELT_WITHIN, SLIDES_FOR_S));
         }
-        // The wheel that is nearest to the train is no faster than it in a slide: a touch pushes the train up.
-        let (noise, restless) = SHOWN;
-        let b = Lanes::all(acceleration) - self.filters.a;
-        let shown = (b * b * (restless * restless) + noise * noise).inverse() * (t / FOLLOWED_S);
-        let (mean, deviation) = EXCESS;
-        let v = self.filters.v.at_least(1.0);
-        let usual = (v * v).inverse() * (lasting(deviation, EXCESS_S));
-        let y = Lanes::all(nearest) - self.filters.v;
-        let touch = y.with(shown, |y, shown| if side * y > 0.0 { shown } else { 0.0 });
-        let excess = y + v * (mean * side);
-        // Wheels that are far off say nothing.
-        let off = excess * (v * FAR.1 + FAR.0).inverse();
-        let off = off * off;
-        let turning = if nearest.abs() > SILENT { 1.0 } else { 0.0 };
-        let far = usual * (off * off + Lanes::all(1.0)).inverse() * turning;
-        let is_touch = y.with(y, |y, _| if side * y > 0.0 { 1.0 } else { 0.0 });
-        let innovation = y * is_touch + excess * (Lanes::all(1.0) - is_touch);
-        self.filters.speed(innovation, BOTH_SLIP * (touch + far * (Lanes::all(1.0) - is_touch)) * read);
-        self.reach(scene, [first, second], t);
+        self.touch(scene, t);
         // Wheels that creep alike creep by what they can.
+        let v = self.filters.v.at_least(1.0);
         let [(least, least_part), (most, most_part)] = CREEP;
         let low = Lanes::all(nearest) + (v * least_part + least) * side;
         let high = Lanes::all(nearest) + (v * most_part + most) * side;
         let below = (low - self.filters.v) * side;
         let above = (high - self.filters.v) * side;
         let out = below.at_least(0.0) + above.at_most(0.0);
-        let edge = usual * (EXCESS.1 * EXCESS.1 / (CREEP_EDGE * CREEP_EDGE));
+        let edge = (v * v).inverse() * lasting(CREEP_EDGE, CREEPS_FOR_S);
         let pulls = out.with(edge, |out, edge| if out == 0.0 { 0.0 } else { edge });
         self.filters.speed(out * side, BOTH_CREEP * pulls * read);
         self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
@@ -335,26 +327,34 @@ impl Bank {
         self.filters.keep_sound();
     }
 
-    /// A wheel that was turned towards the train's speed hard and then goes on level has reached it: nothing else stops it
-    /// there. That tells the speed of a train whose wheels slip, from above and from below.
-    fn reach(&mut self, scene: &Scene, wheels: [&Compared; 2], t: f64) {
+    /// Lets wheels that touch the speed of the train tell it to a train whose wheels slip.
+    ///
+    /// The wheel that is nearest to the train is no faster than it in a slide: it pushes the train up. A wheel that was
+    /// turned towards the train's speed hard and then goes on level has reached it, as nothing else stops it there but its
+    /// slide control: that tells the speed from above and from below.
+    fn touch(&mut self, scene: &Scene, t: f64) {
         let [_, _, _, a, ..] = self.filters.a.0;
         let [in_a_slide, in_a_spin] = REACHED;
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
-        for ((regained, wheel), compared) in self.regained.iter_mut().zip(&scene.wheels).zip(wheels) {
-            let towards = self.side * (wheel.acceleration - a);
-            *regained *= larger(1.0 - t / REGAINED_FOR_S, 0.0);
-            if towards > REGAINING {
-                *regained = 1.0;
+        let half = 0.5 * self.ratio;
+        for ((touch, wheel), scale) in
+            self.touches.iter_mut().zip(&scene.wheels).zip([1.0 - half, 1.0 + half])
+        {
+            let speed = touch.follow(wheel.counted * scale / t, a, t);
+            let beyond = self.side * (wheel.acceleration - a);
+            let has_reached = touch.reached(beyond, t);
+            if !wheel.read || speed.abs() < SILENT {
+                continue;
             }
-            let level = wheel.read && (wheel.acceleration - a).abs() < LEVEL && compared.speed.abs() > SILENT;
-            let information = if level { *regained * t / (FOLLOWED_S * reached) } else { 0.0 };
-            let y = Lanes::all(compared.speed) - self.filters.v;
+            let y = Lanes::all(speed) - self.filters.v;
+            let pushes = t / (FOLLOWED_S * PUSHES * PUSHES);
+            let pushed = y.with(y, |y, _| if self.side * y > 0.0 { pushes } else { 0.0 });
             // What is further off than the train can be was stopped by its slide control.
             let usual = y * y * ((self.filters.pvv + reached) * REACHES_WITHIN).inverse();
             let probable = (usual * usual + Lanes::all(1.0)).inverse();
-            self.filters.speed(y, BOTH_SLIP * probable * information);
+            let told = if has_reached { 1.0 / reached } else { 0.0 };
+            self.filters.speed(y, BOTH_SLIP * (pushed + probable * told));
         }
     }
 

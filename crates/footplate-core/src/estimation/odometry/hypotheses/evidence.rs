@@ -19,7 +19,7 @@ const FARTHEST: f64 = 1.5;
 /// Slower wheels are silent (m/s).
 pub(super) const SILENT: f64 = 0.1;
 /// Creepage of wheels that roll under full effort (m/s for each m/s).
-const ROLLING_CREEPAGE: f64 = 0.008;
+const ROLLING_CREEPAGE: f64 = 0.003;
 /// Deviation of the creepage of rolling wheels for which nothing is to blame, as part of the speed.
 const RESTLESS: f64 = 0.0015;
 /// Mean excess of a wheel that slips (m/s, part of the speed).
@@ -29,18 +29,22 @@ const SLIP_ACCELERATION: f64 = 5.0;
 /// Least and largest creepage of wheels that creep alike (m/s, part of the speed), and by how much they differ.
 pub(super) const CREEP: [(f64, f64); 2] = [(0.2, 0.02), (1.0, 0.2)];
 const CREEP_APART: f64 = 0.02;
+/// How closely they accelerate with the train (m/s²), over so long (s).
+const STEADY: f64 = 0.1;
+pub(super) const STEADY_S: f64 = 1.0;
 /// Squares of deviations over their variance up to this say nothing: no hypothesis gains by explaining noise.
 const USUAL: f64 = 1.0;
-/// What a dead sensor costs a second if it is silent, as most are, and if it counts: it may say anything, so it explains
-/// nothing.
-const DEAD_SILENT: f64 = 1.0;
+/// What a dead sensor costs a second if it counts: it may say anything, so it explains nothing; most are silent.
 const DEAD_COUNTS: f64 = 10.0;
+/// What a silent wheel costs a second as a locked one: it may come free. A train slower than this has none (m/s).
+const LOCKED: f64 = 0.1;
+const NEARLY_STANDING: f64 = 0.15;
 /// What it costs a second to say that a count which stands still is that of a wheel.
 const STUCK: f64 = 10.0;
 /// What a hypothesis costs a second that the command or the axle rules out.
 const IMPOSSIBLE: f64 = 15.0;
 /// Deviation of the train's acceleration beyond what it can be (m/s²).
-const BEYOND: f64 = 0.08;
+const BEYOND: f64 = 0.06;
 /// Pulses of a standing train that is shaken, and what each beyond costs.
 const SHAKEN: f64 = 1.5;
 const TURNS: f64 = 3.0;
@@ -70,12 +74,14 @@ pub(super) struct Compared {
 }
 
 /// The logarithm of the likelihood of every hypothesis, less that of the best. `surprise` is the square of the innovation
-/// of the place over its variance, `side` is 1 where wheels that slip turn slower than the train and −1 where faster.
+/// of the place over its variance, `wheels_a` the smoothed acceleration of the wheels; `side` is 1 where wheels that slip
+/// turn slower than the train and −1 where faster.
 pub(super) fn evidence(
     scene: &Scene,
     wheels: &[Compared; 2],
     filters: &Filters,
     surprise: Lanes,
+    wheels_a: f64,
     side: f64,
     t: f64,
 ) -> Lanes {
@@ -94,8 +100,8 @@ pub(super) fn evidence(
         let own = wheel.acceleration_deviation * wheel.acceleration_deviation;
         let acceleration_variance = filters.paa + (own + 0.04);
         let per_speed = speed_variance.inverse();
-        let steady = (b * b * acceleration_variance.inverse() - Lanes::all(USUAL)).at_least(0.0);
-        let roll = ((y * y * per_speed - Lanes::all(USUAL)).at_least(0.0) + steady) * (-0.5 * followed);
+        let smooth = (b * b * acceleration_variance.inverse() - Lanes::all(USUAL)).at_least(0.0);
+        let roll = ((y * y * per_speed - Lanes::all(USUAL)).at_least(0.0) + smooth) * (-0.5 * followed);
 
         // Silence says nothing of how a wheel slips: a locked one keeps to its speed.
         let turns = f64::from(u8::from(wheel.speed.abs() > SILENT));
@@ -104,15 +110,19 @@ pub(super) fn evidence(
         let (least, part) = SLIPS;
         let mean = (filters.v * part).at_least(0.0) + least;
         let wide = acceleration_variance + (SLIP_ACCELERATION * SLIP_ACCELERATION);
+        let still =
+            (filters.v * filters.v * (1.0 / (NEARLY_STANDING * NEARLY_STANDING)) + Lanes::all(1.0)).inverse();
+        let locked = (still * still * IMPOSSIBLE + Lanes::all(LOCKED)) * (1.0 - turns);
         let slip = (ahead * ahead * per_speed + b * b * wide.inverse()) * (-0.5 * followed)
             - ((u.at_least(0.0) * mean.inverse()).at_most(FARTHEST) * (1.0 / SLIP_SPEED_S)
                 + log(mean * mean * per_speed).at_least(0.0) * (0.5 / SLIP_SPEED_S)
                 + log(wide * acceleration_variance.inverse()) * (0.5 / SLIP_ACCELERATION_S))
                 * (t * turns);
         let stuck = if wheel.stuck { STUCK } else { 0.0 };
-        let dead_costs = if wheel.stuck || turns == 0.0 { DEAD_SILENT } else { DEAD_COUNTS };
+        let dead_costs = if wheel.stuck || turns == 0.0 { 0.0 } else { DEAD_COUNTS };
         let ruled_out = rule_out(scene, wheel, side) + stuck;
-        let of_wheel = rolls * (roll - Lanes::all(stuck * t)) + slips * (slip - Lanes::all(ruled_out * t));
+        let of_wheel =
+            rolls * (roll - Lanes::all(stuck * t)) + slips * (slip - (locked + Lanes::all(ruled_out)) * t);
         total += (of_wheel - dead * (dead_costs * t)) * read;
     }
     let [first, second] = &scene.wheels;
@@ -133,7 +143,9 @@ pub(super) fn evidence(
         let own = wheel.acceleration_deviation * wheel.acceleration_deviation;
         alike += (b * b * (filters.paa + (own + 0.04)).inverse() - Lanes::all(USUAL)).at_least(0.0);
     }
-    let alike = alike * (-0.5 * followed);
+    let b = (Lanes::all(wheels_a) - filters.a) * (1.0 / STEADY);
+    let steady = (b * b - Lanes::all(USUAL)).at_least(0.0);
+    let alike = alike * (-0.5 * followed) + steady * (-0.5 * smaller(t / STEADY_S, 1.0));
     // Wheels that do not turn do not creep.
     let silent = if first.speed.abs() < SILENT || second.speed.abs() < SILENT { IMPOSSIBLE } else { 0.0 };
     let stuck = if first.stuck || second.stuck { STUCK } else { 0.0 };
@@ -157,7 +169,7 @@ pub(super) fn evidence(
     };
     let low = low + ONE_SLIPS * larger(halfway, 0.0);
     let beyond = (filters.a - high).at_least(0.0) + (filters.a - low).at_most(0.0);
-    total += beyond * beyond * (filters.paa + BEYOND * BEYOND).inverse() * (-0.5 * followed);
+    total += beyond * beyond * (-0.5 * followed / (BEYOND * BEYOND));
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)
 }

@@ -37,8 +37,8 @@ pub const HYPOTHESES: [Hypothesis; 8] = [
 ];
 
 /// Slips and slides of one wheelset that begin in a second with no effort, and that full effort adds (1/s): one in
-/// two hundred seconds of hard braking on the rails of autumn.
-const ONE_SLIPS: (f64, f64) = (1e-4, 5e-3);
+/// a hundred seconds of hard braking on the rails of autumn.
+const ONE_SLIPS: (f64, f64) = (1e-4, 1e-2);
 /// The same of both at once.
 const BOTH_SLIP: (f64, f64) = (5e-5, 3e-3);
 /// The same of both alike, without a slide before that shows it.
@@ -56,7 +56,8 @@ const STOPS: f64 = 0.5;
 /// Effort that counts where none is recorded.
 const UNKNOWN_EFFORT: f64 = 0.4;
 
-/// Probability that hypotheses end within the period, and that each begins after "both roll" or after another.
+/// Probability that hypotheses other than "both roll" end within the period, and that each begins after "both roll" or
+/// after another that ends.
 pub(super) struct Transitions {
     pub(super) ends: Lanes,
     pub(super) after_rolling: Lanes,
@@ -72,8 +73,5 @@ pub(super) fn transitions(scene: &Scene, t: f64) -> Transitions {
     let alike = rate(BOTH_CREEP) * if scene.independent { INDEPENDENT } else { 1.0 };
     let dead = SENSOR_FAILS * t;
     let begins = [0.0, one, one, rate(BOTH_SLIP), alike, STOPS * t, dead, dead];
-    let mut ends = ENDS * t;
-    let [rolling, ..] = &mut ends.0;
-    *rolling = begins.iter().sum();
-    Transitions { ends, after_rolling: Lanes(begins), after_others: FOLLOWS }
+    Transitions { ends: ENDS * t, after_rolling: Lanes(begins), after_others: FOLLOWS }
 }
