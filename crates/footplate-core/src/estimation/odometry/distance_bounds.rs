@@ -7,9 +7,9 @@
 use super::vote::Vote;
 use crate::wheels::{Range, larger, smaller};
 
-/// Pulses by which a way by counts can be off: one for the phase at the start and end, half for pitch errors and a row
-/// that was read a little late.
-const PULSES_OFF: f64 = 1.5;
+/// Pulses by which a way by counts can be off: one for the phase at the start and end, and one and a half for a row that
+/// was read so little late that its count surprises nobody.
+const PULSES_OFF: f64 = 2.5;
 
 /// A wheel's counts since it was last known to bound the distance from one side.
 #[derive(Debug, Clone, Copy)]

@@ -151,6 +151,9 @@ impl Odometer {
         self.bank = Bank::new(speed, FIRST_SPEED * FIRST_SPEED, &self.vehicle.wheelsets);
         (self.speed, self.acceleration, self.variance) = (speed, 0.0, FIRST_SPEED * FIRST_SPEED);
         self.probable_speed = bounds;
+        // Where within a pulse the wheels stand nothing tells.
+        let Range { low, high } = self.probable_distance;
+        self.probable_distance = Range { low: low - pulse * t, high: high + pulse * t };
         if let Some(published) = &mut self.published {
             published.begin(speed);
         }

@@ -60,7 +60,9 @@ impl Odometer {
             }
         };
         let guaranteed = bounds(self.bounds.speed(), self.ways.distance());
-        let confidence = bounds(self.probable_speed, self.probable_distance);
+        // Where a run begins the distance is guaranteed to be zero.
+        let probable = self.probable_distance.and(self.ways.distance());
+        let confidence = bounds(self.probable_speed, probable);
         let [over, under] = self.amounts;
         let over = (estimate.distance - guaranteed.distance_low + Length::from_m(over)).max(last.over);
         let under = (guaranteed.distance_high - estimate.distance + Length::from_m(under)).max(last.under);

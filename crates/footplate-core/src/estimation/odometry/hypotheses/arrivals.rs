@@ -58,5 +58,5 @@ fn meets(read: bool, wheel: &Compared, filters: &Filters) -> Lanes {
     let variance = filters.pvv + (wheel.variance + MEETS * MEETS);
     let most = if wheel.speed.abs() > SILENT { MEETS_NOT.0 } else { MEETS_NOT.1 };
     let off = (y * y * variance.inverse() - Lanes::all(1.0)).at_least(0.0).at_most(most);
-    Lanes((off * -0.5).0.map(libm::exp))
+    (off * -0.5).likelihoods()
 }

@@ -1,18 +1,20 @@
 //! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
 
 use super::arrivals::{Arrivals, arrivals};
-use super::evidence::{CREEP, Compared, SILENT, STEADY_S, evidence};
+use super::evidence::{Compared, STEADY_S, evidence};
 use super::filters::Filters;
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
-use super::scene::Scene;
+use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
 use crate::wheels::{Range, Wheelset, larger, smaller};
 
 /// Density of the train's jerk while a wheel tells its speed (m²/s⁵): 0.14 m/s² in a second, what a driver's hand does
 /// to a cruising train; while none does, the acceleration is known to 0.3 m/s² after a few seconds.
 const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
+/// The same beyond that where no command is recorded that would announce it.
+const UNANNOUNCED: f64 = 0.06;
 /// How long brakes and motors take to do what is commanded (s), and how much of it a train whose wheels roll can be expected
 /// to do: the rest is left to gradients, resistance and the state of the brakes.
 const BUILD_UP_S: f64 = 1.5;
@@ -23,33 +25,12 @@ const REGAINS: f64 = 0.4;
 const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 /// Hypotheses in which no wheel tells the speed.
 const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-const BOTH_SLIP: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
-const BOTH_CREEP: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
 const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
 const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
 /// Variance of what is at rest (m²/s², m²/s⁴): none, but for rounding.
 const AT_REST: f64 = 1e-6;
 const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
-/// A train in which both wheelsets slide decelerates by this much, or as commanded if that is less (m/s²), and within
-/// this deviation (m/s², part of it); adhesion of 0.02 to 0.08 and the brakes of the other wheelsets.
-const SLIDES_BY: f64 = 0.5;
-const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
-/// How long that stays what it is (s).
-const SLIDES_FOR_S: f64 = 2.0;
-/// How closely wheels that creep alike accelerate with the train (m/s²), and for how long (s).
-const CREEPS_WITHIN: f64 = 0.5;
-const CREEPS_FOR_S: f64 = 3.0;
-/// What is felt is within this of the truth, for as long (m/s²).
-const FELT_WITHIN: f64 = 0.06;
-/// How sharp the limits of steady creep are (part of the speed).
-const CREEP_EDGE: f64 = 0.03;
-/// A wheel faster than the train in a slide pushes it up within this (m/s).
-const PUSHES: f64 = 0.2;
-/// How well a wheel that has reached the speed of the train tells it (m/s): in a slide and in a spin.
-const REACHED: [f64; 2] = [0.35, 0.1];
-/// Square of the deviations at which half of what is level has not reached the train.
-const REACHES_WITHIN: f64 = 2.0;
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 /// The ratio of the diameters wanders by this much a second (part).
@@ -75,11 +56,13 @@ const STOPS_BELOW: f64 = 0.15;
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Bank {
     probability: Lanes,
-    filters: Filters,
+    pub(super) filters: Filters,
     /// How far each hypothesis puts the train ahead of the estimate (m).
     ahead: Lanes,
+    /// How far the train ran in the last period by each hypothesis (m).
+    ways: Lanes,
     /// First over second wheel speed when both roll, less 1, and its variance.
-    ratio: f64,
+    pub(super) ratio: f64,
     ratio_variance: f64,
     /// Mean acceleration, smoothed (m/s²), and that of the wheels.
     trend: f64,
@@ -87,9 +70,9 @@ pub(in super::super) struct Bank {
     /// The commanded acceleration as far as brakes and motors follow it (m/s²).
     acted: f64,
     /// 1 while wheels may turn slower than the train, −1 while they may turn faster.
-    side: f64,
+    pub(super) side: f64,
     /// Whether each wheel has been turned up to the speed of the train.
-    touches: [Touch; 2],
+    pub(super) touches: [Touch; 2],
     /// What came out of the last period.
     speed: f64,
     acceleration: f64,
@@ -104,9 +87,10 @@ impl Bank {
         let variances =
             wheelsets.map(|wheelset| wheelset.diameter_tolerance * wheelset.diameter_tolerance / 3.0);
         Self {
-            probability: Lanes([0.9, 1e-3, 1e-3, 1e-3, 1e-5, 0.1, LEAST, LEAST]),
+            probability: Lanes([0.9, 1e-3, 1e-3, 1e-6, 1e-9, 0.1, LEAST, LEAST]),
             filters,
             ahead: Lanes::all(0.0),
+            ways: Lanes::all(0.0),
             ratio: 0.0,
             ratio_variance: variances.iter().sum(),
             trend: 0.0,
@@ -155,9 +139,10 @@ impl Bank {
         self.mix(scene, &wheels, t);
         let (ways, surprise) = self.run(scene, t);
         self.ahead += ways;
+        self.ways = ways;
         self.pull(scene, &wheels, t);
-        let likelihood = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
-        let weights = (self.probability * exp(likelihood)).at_least(LEAST);
+        let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
+        let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
         self.probability = weights * (1.0 / weights.sum());
         self.learn_ratio(scene, t);
         self.summed_up(scene.top_speed)
@@ -165,7 +150,7 @@ impl Bank {
 
     /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
     pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        interval(&self.probability, &self.filters, scene, risk, t)
+        interval(&self.probability, &self.filters, &self.ways, scene, risk, t)
     }
 
     /// Which way wheels that lose their grip turn.
@@ -184,16 +169,13 @@ impl Bank {
     /// The wheels with the ratio of their diameters taken out.
     fn compared(&self, scene: &Scene) -> [Compared; 2] {
         let [first, second] = &scene.wheels;
-        let half = 0.5 * self.ratio;
-        let of = |speed: f64, scale: f64, deviation: f64| {
-            let speed = speed * scale;
+        let of = |wheel: &WheelScene, scale: f64| {
+            let speed = wheel.speed * scale;
             let ratio = 0.25 * self.ratio_variance * speed * speed;
-            Compared { speed, variance: deviation * deviation + ratio }
+            Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio }
         };
-        [
-            of(first.speed, 1.0 - half, first.speed_deviation),
-            of(second.speed, 1.0 + half, second.speed_deviation),
-        ]
+        let [one, other] = self.scales(scene);
+        [of(first, one), of(second, other)]
     }
 
     /// Lets hypotheses end and begin.
@@ -243,9 +225,9 @@ impl Bank {
     /// surprised it was.
     fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
         let [first, second] = &scene.wheels;
-        let half = 0.5 * self.ratio;
-        let (counted_1, counted_2) = (first.counted * (1.0 - half), second.counted * (1.0 + half));
-        let both = self.shares(scene);
+        let [one, other] = self.scales(scene);
+        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
+        let both = shares(scene);
         // A hypothesis that trusts a wheel which is not read is left without.
         let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
         let [b1, b2] = both;
@@ -256,7 +238,8 @@ impl Bank {
         let acts = rest * smaller(t / BUILD_UP_S, 1.0);
         self.acted += acts;
         self.filters.a += TRUSTS * (EXPECTED * acts);
-        let ways = self.filters.run(t, JERK);
+        let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
+        let ways = self.filters.run(t, JERK + TRUSTS * unannounced);
         self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
         let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
         let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
@@ -264,98 +247,10 @@ impl Bank {
         (ways + moved, surprise)
     }
 
-    /// The shares of both wheels where both roll.
-    fn shares(&self, scene: &Scene) -> [f64; 2] {
-        let [first, second] = &scene.wheels;
-        let weight = |driven: bool, other: bool, pitch: f64, read: bool| {
-            let creeps = if driven && !other && scene.slip { CREEPING_SHARE } else { 1.0 };
-            if read { creeps / (pitch * pitch) } else { 0.0 }
-        };
-        let a = weight(first.driven, second.driven, first.pitch, first.read);
-        let b = weight(second.driven, first.driven, second.pitch, second.read);
-        if a + b > 0.0 { [a / (a + b), b / (a + b)] } else { [0.0; 2] }
-    }
-
-    /// Lets what is known of sliding trains hold the filters that trust no counter.
-    fn pull(&mut self, scene: &Scene, [first, second]: &[Compared; 2], t: f64) {
-        let side = self.side;
-        let [first_wheel, second_wheel] = &scene.wheels;
-        let nearest = match (first_wheel.read, second_wheel.read) {
-            (true, true) => side * larger(side * first.speed, side * second.speed),
-            (false, true) => second.speed,
-            (true, false) => first.speed,
-            (false, false) => 0.0,
-        };
-        let read = f64::from(u8::from(first_wheel.read || second_wheel.read));
-        // How fast the train can change its speed with both wheelsets slipping.
-        let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
-        let slides = -side * smaller(larger(-side * wanted, 0.0), SLIDES_BY);
-        let lasting = |deviation: f64, seconds: f64| t / (2.0 * seconds * deviation * deviation);
-        self.filters.acceleration(
-            Lanes::all(slides) - self.filters.a,
-            COASTS * lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S),
-        );
-        let wheels = 0.5 * (first_wheel.acceleration + second_wheel.acceleration);
-        let own = first_wheel.acceleration_deviation;
-        let alike = 1.0 / (1.0 / lasting(own, FOLLOWED_S) + 1.0 / lasting(CREEPS_WITHIN, CREEPS_FOR_S));
-        self.filters.acceleration(Lanes::all(wheels) - self.filters.a, BOTH_CREEP * (alike * read));
-        if let Some(felt) = scene.felt {
-            self.filters
-                .acceleration(Lanes::all(felt) - self.filters.a, MOVES * lasting(FELT_WITHIN, SLIDES_FOR_S));
-        }
-        self.touch(scene, t);
-        // Wheels that creep alike creep by what they can.
-        let v = self.filters.v.at_least(1.0);
-        let [(least, least_part), (most, most_part)] = CREEP;
-        let low = Lanes::all(nearest) + (v * least_part + least) * side;
-        let high = Lanes::all(nearest) + (v * most_part + most) * side;
-        let below = (low - self.filters.v) * side;
-        let above = (high - self.filters.v) * side;
-        let out = below.at_least(0.0) + above.at_most(0.0);
-        let edge = (v * v).inverse() * lasting(CREEP_EDGE, CREEPS_FOR_S);
-        let pulls = out.with(edge, |out, edge| if out == 0.0 { 0.0 } else { edge });
-        self.filters.speed(out * side, BOTH_CREEP * pulls * read);
-        self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
-        // A train that slides does not run backwards, and accelerates as a train can.
-        let Range { low, high } = scene.acceleration;
-        self.filters.v =
-            self.filters.v.with(COASTS, |v, coasts| if coasts > 0.0 { larger(v, 0.0) } else { v });
-        self.filters.a = self
-            .filters
-            .a
-            .with(COASTS, |a, coasts| if coasts > 0.0 { larger(smaller(a, high), low) } else { a });
-        self.filters.keep_sound();
-    }
-
-    /// Lets wheels that touch the speed of the train tell it to a train whose wheels slip.
-    ///
-    /// The wheel that is nearest to the train is no faster than it in a slide: it pushes the train up. A wheel that was
-    /// turned towards the train's speed hard and then goes on level has reached it, as nothing else stops it there but its
-    /// slide control: that tells the speed from above and from below.
-    fn touch(&mut self, scene: &Scene, t: f64) {
-        let [_, _, _, a, ..] = self.filters.a.0;
-        let [in_a_slide, in_a_spin] = REACHED;
-        let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
-        let reached = reached * reached;
-        let half = 0.5 * self.ratio;
-        for ((touch, wheel), scale) in
-            self.touches.iter_mut().zip(&scene.wheels).zip([1.0 - half, 1.0 + half])
-        {
-            let speed = touch.follow(wheel.counted * scale / t, a, t);
-            let beyond = self.side * (wheel.acceleration - a);
-            let has_reached = touch.reached(beyond, t);
-            if !wheel.read || speed.abs() < SILENT {
-                continue;
-            }
-            let y = Lanes::all(speed) - self.filters.v;
-            let pushes = t / (FOLLOWED_S * PUSHES * PUSHES);
-            let pushed = y.with(y, |y, _| if self.side * y > 0.0 { pushes } else { 0.0 });
-            // What is further off than the train can be was stopped by its slide control.
-            let usual = y * y * ((self.filters.pvv + reached) * REACHES_WITHIN).inverse();
-            let probable = (usual * usual + Lanes::all(1.0)).inverse();
-            let told = if has_reached { 1.0 / reached } else { 0.0 };
-            self.filters.speed(y, BOTH_SLIP * (pushed + probable * told));
-        }
+    /// What the counts of each wheel are multiplied by so that both say the same while both roll.
+    pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
+        let [one, other] = shares(scene);
+        [1.0 - other * self.ratio, 1.0 + one * self.ratio]
     }
 
     /// Learns the ratio of the diameters while both roll.
@@ -390,6 +285,14 @@ impl Bank {
     }
 }
 
-fn exp(lanes: Lanes) -> Lanes {
-    Lanes(lanes.0.map(libm::exp))
+/// The shares of both wheels where both roll.
+fn shares(scene: &Scene) -> [f64; 2] {
+    let [first, second] = &scene.wheels;
+    let weight = |driven: bool, other: bool, pitch: f64, read: bool| {
+        let creeps = if driven && !other && scene.slip { CREEPING_SHARE } else { 1.0 };
+        if read { creeps / (pitch * pitch) } else { 0.0 }
+    };
+    let a = weight(first.driven, second.driven, first.pitch, first.read);
+    let b = weight(second.driven, first.driven, second.pitch, second.read);
+    if a + b > 0.0 { [a / (a + b), b / (a + b)] } else { [0.0; 2] }
 }

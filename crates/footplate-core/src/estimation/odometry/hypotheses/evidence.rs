@@ -1,19 +1,20 @@
 //! How well each hypothesis explains what the wheels show: logarithms of likelihoods.
 //!
 //! Letters: `y` wheel speed less train speed, `b` wheel acceleration less train acceleration, `u` how much slower (in a
-//! spin: faster) a wheel turns than the train moves. Speeds of wheels are followed, so that their errors last; evidence
+//! spin: faster) a wheel turns than the train moves, `v`, `a`, `pvv`, `paa` the train as in `filters`. Speeds of wheels are followed, so that their errors last; evidence
 //! counts once in the time over which it lasts, not once a period.
 
-use super::filters::Filters;
+use core::array;
+
+use super::filters::{Filters, State};
 use super::lanes::Lanes;
 use super::scene::{Scene, WheelScene};
 use crate::wheels::{Range, larger, smaller};
 
 /// How long the error of a followed wheel speed lasts (s).
 const FOLLOWED_S: f64 = 0.15;
-/// How long a wheel that slips keeps to a speed (s), and to an acceleration.
-const SLIP_SPEED_S: f64 = 0.6;
-const SLIP_ACCELERATION_S: f64 = 1.2;
+/// How long a wheel that slips keeps to a speed and an acceleration (s).
+const SLIP_S: f64 = 0.85;
 /// A wheel that slips further than this many means is not less probable for it.
 const FARTHEST: f64 = 1.5;
 /// Slower wheels are silent (m/s).
@@ -32,8 +33,10 @@ const CREEP_APART: f64 = 0.02;
 /// How closely they accelerate with the train (m/s²), over so long (s).
 const STEADY: f64 = 0.1;
 pub(super) const STEADY_S: f64 = 1.0;
-/// Squares of deviations over their variance up to this say nothing: no hypothesis gains by explaining noise.
+/// Squares of deviations over their variance up to this say nothing.
 const USUAL: f64 = 1.0;
+/// Variance of the acceleration of rolling wheels about that of the train (m²/s⁴).
+const RESTLESS_ACCELERATION: f64 = 0.04;
 /// What a dead sensor costs a second if it counts: it may say anything, so it explains nothing; most are silent.
 const DEAD_COUNTS: f64 = 10.0;
 /// What a silent wheel costs a second as a locked one: it may come free. A train slower than this has none (m/s).
@@ -45,6 +48,8 @@ const STUCK: f64 = 10.0;
 const IMPOSSIBLE: f64 = 15.0;
 /// Deviation of the train's acceleration beyond what it can be (m/s²).
 const BEYOND: f64 = 0.06;
+/// Variance of an acceleration that is known no better because a run or a hypothesis has just begun (m²/s⁴).
+const UNKNOWN: f64 = 0.15;
 /// Pulses of a standing train that is shaken, and what each beyond costs.
 const SHAKEN: f64 = 1.5;
 const TURNS: f64 = 3.0;
@@ -53,17 +58,9 @@ const SURPRISING: f64 = 7.0;
 /// No period says more than this for or against a hypothesis: what one row says may be a fault of that row.
 const MOST: f64 = 25.0;
 
-/// Which hypotheses say that a wheel rolls, slips in its own manner, or has a dead sensor: first wheel, second wheel.
-const ROLLS: [Lanes; 2] =
-    [Lanes([1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0]), Lanes([1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0])];
-const OWN_SLIP: [Lanes; 2] =
-    [Lanes([0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), Lanes([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])];
-const DEAD: [Lanes; 2] =
-    [Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]), Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])];
-const CREEPS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+/// Hypotheses by which the rail carries the whole brake, and by which one wheelset finds that it does not.
 const GRIPS: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 const ONE_SLIPS: Lanes = Lanes([0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
 
 /// A wheel as hypotheses compare it with their train.
 #[derive(Debug, Clone, Copy)]
@@ -86,76 +83,24 @@ pub(super) fn evidence(
     t: f64,
 ) -> Lanes {
     let followed = smaller(t / FOLLOWED_S, 1.0);
-    let mut total = (surprise - Lanes::all(SURPRISING)).at_least(0.0) * -0.5;
-    for (((wheel, compared), rolls), (slips, dead)) in
-        scene.wheels.iter().zip(wheels).zip(ROLLS).zip(OWN_SLIP.into_iter().zip(DEAD))
-    {
-        let read = f64::from(u8::from(wheel.read));
-        let effort = scene.brake * f64::from(u8::from(wheel.braked))
-            + scene.traction * f64::from(u8::from(wheel.driven));
-        let creep = (ROLLING_CREEPAGE * effort + RESTLESS) * filters.v.0[0].abs();
-        let y = Lanes::all(compared.speed) - filters.v;
-        let b = Lanes::all(wheel.acceleration) - filters.a;
-        let speed_variance = filters.pvv + (compared.variance + creep * creep);
-        let own = wheel.acceleration_deviation * wheel.acceleration_deviation;
-        let acceleration_variance = filters.paa + (own + 0.04);
-        let per_speed = speed_variance.inverse();
-        let smooth = (b * b * acceleration_variance.inverse() - Lanes::all(USUAL)).at_least(0.0);
-        let roll = ((y * y * per_speed - Lanes::all(USUAL)).at_least(0.0) + smooth) * (-0.5 * followed);
-
-        // Silence says nothing of how a wheel slips: a locked one keeps to its speed.
-        let turns = f64::from(u8::from(wheel.speed.abs() > SILENT));
-        let u = -y * side;
-        let ahead = u.at_most(0.0);
-        let (least, part) = SLIPS;
-        let mean = (filters.v * part).at_least(0.0) + least;
-        let wide = acceleration_variance + (SLIP_ACCELERATION * SLIP_ACCELERATION);
-        let still =
-            (filters.v * filters.v * (1.0 / (NEARLY_STANDING * NEARLY_STANDING)) + Lanes::all(1.0)).inverse();
-        let locked = (still * still * IMPOSSIBLE + Lanes::all(LOCKED)) * (1.0 - turns);
-        let slip = (ahead * ahead * per_speed + b * b * wide.inverse()) * (-0.5 * followed)
-            - ((u.at_least(0.0) * mean.inverse()).at_most(FARTHEST) * (1.0 / SLIP_SPEED_S)
-                + log(mean * mean * per_speed).at_least(0.0) * (0.5 / SLIP_SPEED_S)
-                + log(wide * acceleration_variance.inverse()) * (0.5 / SLIP_ACCELERATION_S))
-                * (t * turns);
-        let stuck = if wheel.stuck { STUCK } else { 0.0 };
-        let dead_costs = if wheel.stuck || turns == 0.0 { 0.0 } else { DEAD_COUNTS };
-        let ruled_out = rule_out(scene, wheel, side) + stuck;
-        let of_wheel =
-            rolls * (roll - Lanes::all(stuck * t)) + slips * (slip - (locked + Lanes::all(ruled_out)) * t);
-        total += (of_wheel - dead * (dead_costs * t)) * read;
-    }
     let [first, second] = &scene.wheels;
     let [a, b] = wheels;
-    let both = f64::from(u8::from(first.read && second.read));
-    let fastest = side * larger(side * a.speed, side * b.speed);
-    let apart = a.speed - b.speed;
-    let v = filters.v.at_least(0.0);
-    let variance = a.variance + b.variance;
-    let apart_variance = v * v * (CREEP_APART * CREEP_APART) + variance;
-    let u = (filters.v - Lanes::all(fastest)) * side;
-    let [(least, least_part), (most, most_part)] = CREEP;
-    let outside = (u - (v * least_part + least)).at_most(0.0) + (u - (v * most_part + most)).at_least(0.0);
-    let mut alike = (apart_variance.inverse() * (apart * apart) - Lanes::all(USUAL)).at_least(0.0)
-        + outside * outside * (filters.pvv + 0.5 * variance).inverse();
-    for wheel in &scene.wheels {
-        let b = Lanes::all(wheel.acceleration) - filters.a;
-        let own = wheel.acceleration_deviation * wheel.acceleration_deviation;
-        alike += (b * b * (filters.paa + (own + 0.04)).inverse() - Lanes::all(USUAL)).at_least(0.0);
-    }
-    let b = (Lanes::all(wheels_a) - filters.a) * (1.0 / STEADY);
-    let steady = (b * b - Lanes::all(USUAL)).at_least(0.0);
-    let alike = alike * (-0.5 * followed) + steady * (-0.5 * smaller(t / STEADY_S, 1.0));
-    // Wheels that do not turn do not creep.
-    let silent = if first.speed.abs() < SILENT || second.speed.abs() < SILENT { IMPOSSIBLE } else { 0.0 };
-    let stuck = if first.stuck || second.stuck { STUCK } else { 0.0 };
-    let ruled_out =
-        larger(larger(rule_out(scene, first, side), rule_out(scene, second, side)), silent) + stuck;
-    total += CREEPS * (alike * both - Lanes::all(ruled_out * t));
-
+    let of = |wheel, compared| Shown { scene, wheel, compared, side, followed, t };
+    let (one, other) = (of(first, a), of(second, b));
+    let [both, first_slips, second_slips, slip, creep, stands, first_dead, second_dead] =
+        array::from_fn(|lane| filters.state(lane));
     let turned = larger(first.counted.abs() / first.pitch, second.counted.abs() / second.pitch);
-    let standing = larger(turned - SHAKEN, 0.0) * TURNS;
-    total -= STANDS * standing;
+    let shaken = larger(turned - SHAKEN, 0.0) * TURNS;
+    let of_wheels = Lanes([
+        one.rolls(&both) + other.rolls(&both),
+        one.slips(&first_slips) + other.rolls(&first_slips),
+        one.rolls(&second_slips) + other.slips(&second_slips),
+        one.slips(&slip) + other.slips(&slip),
+        alike(&one, &other, &creep, wheels_a),
+        one.rolls(&stands) + other.rolls(&stands) - shaken,
+        one.dead() + other.rolls(&first_dead),
+        one.rolls(&second_dead) + other.dead(),
+    ]);
 
     // Brakes do what is claimed of them where the rail carries it.
     let range = |of: fn(&Range) -> f64| {
@@ -169,17 +114,117 @@ pub(super) fn evidence(
     };
     let low = low + ONE_SLIPS * larger(halfway, 0.0);
     let beyond = (filters.a - high).at_least(0.0) + (filters.a - low).at_most(0.0);
-    total += beyond * beyond * (-0.5 * followed / (BEYOND * BEYOND));
+    let surprising = (surprise - Lanes::all(SURPRISING)).at_least(0.0) * -0.5;
+    let known = (filters.paa - Lanes::all(UNKNOWN)).at_least(0.0) + Lanes::all(BEYOND * BEYOND);
+    let total = of_wheels + surprising - beyond * beyond * known.inverse() * (0.5 * followed);
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)
 }
 
-/// What it costs a second to say that this wheel slips.
-fn rule_out(scene: &Scene, wheel: &WheelScene, side: f64) -> f64 {
-    let possible = if side > 0.0 { scene.slide && wheel.braked } else { scene.slip && wheel.driven };
-    if possible { 0.0 } else { IMPOSSIBLE }
+/// One wheel as hypotheses have to explain it.
+struct Shown<'a> {
+    scene: &'a Scene,
+    wheel: &'a WheelScene,
+    compared: &'a Compared,
+    side: f64,
+    /// Part of its evidence that is new since the last period.
+    followed: f64,
+    t: f64,
 }
 
-fn log(lanes: Lanes) -> Lanes {
-    Lanes(lanes.0.map(|value| libm::log(larger(value, 1e-12))))
+impl Shown<'_> {
+    /// It rolls.
+    fn rolls(&self, train: &State) -> f64 {
+        let Self { scene, wheel, compared, .. } = self;
+        if !wheel.read {
+            return 0.0;
+        }
+        let effort =
+            if wheel.braked { scene.brake } else { 0.0 } + if wheel.driven { scene.traction } else { 0.0 };
+        let creep = (ROLLING_CREEPAGE * effort + RESTLESS) * train.v;
+        let y = compared.speed - train.v;
+        let speed = unusual(y * y / (train.pvv + compared.variance + creep * creep));
+        let stuck = if wheel.stuck { STUCK } else { 0.0 };
+        -0.5 * self.followed * (speed + self.unsteady(train)) - stuck * self.t
+    }
+
+    /// By how much its acceleration is unlike that of the train.
+    fn unsteady(&self, train: &State) -> f64 {
+        let b = self.wheel.acceleration - train.a;
+        unusual(b * b / self.acceleration_variance(train))
+    }
+
+    fn acceleration_variance(&self, train: &State) -> f64 {
+        let own = self.wheel.acceleration_deviation;
+        train.paa + own * own + RESTLESS_ACCELERATION
+    }
+
+    /// It slips in its own manner.
+    fn slips(&self, train: &State) -> f64 {
+        let Self { wheel, compared, followed, t, .. } = self;
+        if !wheel.read {
+            return 0.0;
+        }
+        let ruled_out = self.ruled_out();
+        if wheel.speed.abs() <= SILENT {
+            // Silence says nothing of how a wheel slips: a locked one keeps to its speed.
+            let still = 1.0 / (1.0 + train.v * train.v / (NEARLY_STANDING * NEARLY_STANDING));
+            return -t * (ruled_out + LOCKED + still * still * IMPOSSIBLE);
+        }
+        let u = (train.v - compared.speed) * self.side;
+        let ahead = smaller(u, 0.0);
+        let b = wheel.acceleration - train.a;
+        let (least, part) = SLIPS;
+        let mean = least + larger(part * train.v, 0.0);
+        let variance = train.pvv + compared.variance;
+        let steady = self.acceleration_variance(train);
+        let wide = steady + SLIP_ACCELERATION * SLIP_ACCELERATION;
+        let spread = larger(mean * mean / variance, 1.0) * wide / steady;
+        let further = smaller(larger(u, 0.0) / mean, FARTHEST);
+        -0.5 * followed * (ahead * ahead / variance + b * b / wide)
+            - t * (ruled_out + (further + 0.5 * libm::log(spread)) / SLIP_S)
+    }
+
+    /// Its sensor is dead.
+    fn dead(&self) -> f64 {
+        let counts = self.wheel.read && !self.wheel.stuck && self.wheel.speed.abs() > SILENT;
+        if counts { -DEAD_COUNTS * self.t } else { 0.0 }
+    }
+
+    /// What it costs a second to say that it slips.
+    fn ruled_out(&self) -> f64 {
+        let Self { scene, wheel, side, .. } = self;
+        let possible = if *side > 0.0 { scene.slide && wheel.braked } else { scene.slip && wheel.driven };
+        let stuck = if wheel.stuck { STUCK } else { 0.0 };
+        if possible { stuck } else { IMPOSSIBLE + stuck }
+    }
+}
+
+/// Both wheels creep alike.
+fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
+    let ruled_out = larger(one.ruled_out(), other.ruled_out());
+    if !(one.wheel.read && other.wheel.read) {
+        return -ruled_out * one.t;
+    }
+    // Wheels that do not turn do not creep.
+    let silent = one.wheel.speed.abs() < SILENT || other.wheel.speed.abs() < SILENT;
+    let silent = if silent { IMPOSSIBLE } else { 0.0 };
+    let (a, b) = (one.compared, other.compared);
+    let fastest = one.side * larger(one.side * a.speed, one.side * b.speed);
+    let apart = a.speed - b.speed;
+    let v = larger(train.v, 0.0);
+    let variance = a.variance + b.variance;
+    let differs = unusual(apart * apart / (v * v * (CREEP_APART * CREEP_APART) + variance));
+    let u = (train.v - fastest) * one.side;
+    let [(least, least_part), (most, most_part)] = CREEP;
+    let outside = smaller(u - least_part * v - least, 0.0) + larger(u - most_part * v - most, 0.0);
+    let outside = outside * outside / (train.pvv + 0.5 * variance);
+    let b = (wheels_a - train.a) / STEADY;
+    -0.5 * one.followed * (differs + outside + one.unsteady(train) + other.unsteady(train))
+        - one.t * (ruled_out + silent + 0.5 / STEADY_S * unusual(b * b))
+}
+
+/// No hypothesis gains by explaining noise.
+fn unusual(square: f64) -> f64 {
+    larger(square - USUAL, 0.0)
 }

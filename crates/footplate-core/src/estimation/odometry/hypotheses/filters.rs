@@ -24,7 +24,93 @@ pub(super) struct Filters {
     pub(super) paa: Lanes,
 }
 
+/// State and covariance of one hypothesis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    pub(super) r: f64,
+    pub(super) v: f64,
+    pub(super) a: f64,
+    prr: f64,
+    prv: f64,
+    pra: f64,
+    pub(super) pvv: f64,
+    pva: f64,
+    pub(super) paa: f64,
+}
+
+impl State {
+    /// The speed is `y` higher than assumed, with this much information (s²/m²), 0 for nothing.
+    pub(super) fn speed(&mut self, y: f64, information: f64) {
+        let per = information / (self.pvv * information + 1.0);
+        let (kr, kv, ka) = (self.prv * per, self.pvv * per, self.pva * per);
+        self.r += kr * y;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.prr -= kr * self.prv;
+        self.pra -= kr * self.pva;
+        self.paa -= ka * self.pva;
+        let kept = 1.0 - kv;
+        self.prv *= kept;
+        self.pvv *= kept;
+        self.pva *= kept;
+    }
+
+    /// The acceleration is `y` higher than assumed, with this much information (s⁴/m²).
+    pub(super) fn acceleration(&mut self, y: f64, information: f64) {
+        let per = information / (self.paa * information + 1.0);
+        let (kr, kv, ka) = (self.pra * per, self.pva * per, self.paa * per);
+        self.r += kr * y;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.prr -= kr * self.pra;
+        self.prv -= kr * self.pva;
+        self.pvv -= kv * self.pva;
+        let kept = 1.0 - ka;
+        self.pra *= kept;
+        self.pva *= kept;
+        self.paa *= kept;
+    }
+}
+
 impl Filters {
+    /// The state of one hypothesis.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below the width of all")]
+    pub(super) fn state(&self, lane: usize) -> State {
+        let of = |lanes: &Lanes| lanes.0[lane];
+        State {
+            r: of(&self.r),
+            v: of(&self.v),
+            a: of(&self.a),
+            prr: of(&self.prr),
+            prv: of(&self.prv),
+            pra: of(&self.pra),
+            pvv: of(&self.pvv),
+            pva: of(&self.pva),
+            paa: of(&self.paa),
+        }
+    }
+
+    /// Sets the state of one hypothesis.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below the width of all")]
+    pub(super) fn set(&mut self, lane: usize, state: State) {
+        let State { r, v, a, prr, prv, pra, pvv, pva, paa } = state;
+        for (lanes, value) in [
+            (&mut self.r, r),
+            (&mut self.v, v),
+            (&mut self.a, a),
+            (&mut self.prr, prr),
+            (&mut self.prv, prv),
+            (&mut self.pra, pra),
+            (&mut self.pvv, pvv),
+            (&mut self.pva, pva),
+            (&mut self.paa, paa),
+        ] {
+            lanes.0[lane] = value;
+        }
+    }
+
     /// A speed (m/s) with a variance, for all.
     pub(super) fn new(speed: f64, variance: f64) -> Self {
         let zero = Lanes::all(0.0);
@@ -79,40 +165,6 @@ impl Filters {
         self.prv *= kept;
         self.pra *= kept;
         (moved, surprise)
-    }
-
-    /// The speed is `y` higher than assumed, with this much information (s²/m²), 0 for nothing.
-    #[inline]
-    pub(super) fn speed(&mut self, y: Lanes, information: Lanes) {
-        let per = information * (self.pvv * information + Lanes::all(1.0)).inverse();
-        let (kr, kv, ka) = (self.prv * per, self.pvv * per, self.pva * per);
-        self.r += kr * y;
-        self.v += kv * y;
-        self.a += ka * y;
-        self.prr -= kr * self.prv;
-        self.pra -= kr * self.pva;
-        self.paa -= ka * self.pva;
-        let kept = Lanes::all(1.0) - kv;
-        self.prv *= kept;
-        self.pvv *= kept;
-        self.pva *= kept;
-    }
-
-    /// The acceleration is `y` higher than assumed, with this much information (s⁴/m²).
-    #[inline]
-    pub(super) fn acceleration(&mut self, y: Lanes, information: Lanes) {
-        let per = information * (self.paa * information + Lanes::all(1.0)).inverse();
-        let (kr, kv, ka) = (self.pra * per, self.pva * per, self.paa * per);
-        self.r += kr * y;
-        self.v += kv * y;
-        self.a += ka * y;
-        self.prr -= kr * self.pra;
-        self.prv -= kr * self.pva;
-        self.pvv -= kv * self.pva;
-        let kept = Lanes::all(1.0) - ka;
-        self.pra *= kept;
-        self.pva *= kept;
-        self.paa *= kept;
     }
 
     /// Takes a share of each filter from `pool`, a state that others have left.

@@ -16,7 +16,14 @@ const CREEPAGE: f64 = 0.012;
 const COASTS: [bool; 8] = [false, false, false, true, true, false, false, false];
 
 /// Speed (m/s) and way of the period (m).
-pub(super) fn interval(p: &Lanes, filters: &Filters, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+pub(super) fn interval(
+    p: &Lanes,
+    filters: &Filters,
+    ways: &Lanes,
+    scene: &Scene,
+    risk: f64,
+    t: f64,
+) -> [Range; 2] {
     let part = risk / 8.0;
     let mut speed = Range { low: f64::INFINITY, high: f64::NEG_INFINITY };
     let mut way = speed;
@@ -25,8 +32,8 @@ pub(super) fn interval(p: &Lanes, filters: &Filters, scene: &Scene, risk: f64, t
     let wider = larger(first.tolerance, second.tolerance);
     let effort = scene.brake + scene.traction;
     for (lane, coasts) in COASTS.into_iter().enumerate() {
-        let (Some(&w), Some(&v), Some(&pvv)) =
-            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane))
+        let (Some(&w), Some(&v), Some(&pvv), Some(&ran)) =
+            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane), ways.0.get(lane))
         else {
             continue;
         };
@@ -39,7 +46,7 @@ pub(super) fn interval(p: &Lanes, filters: &Filters, scene: &Scene, risk: f64, t
         let off = k * libm::sqrt(pvv) + scale;
         speed = speed.or(Range { low: v - off, high: v + off });
         let drift = if coasts { off } else { scale };
-        way = way.or(Range { low: (v - drift) * t, high: (v + drift) * t });
+        way = way.or(Range { low: ran - drift * t, high: ran + drift * t });
     }
     let top = scene.top_speed;
     speed = Range { low: larger(speed.low, -top), high: smaller(speed.high, top) };

@@ -12,6 +12,7 @@ mod interval;
 mod lanes;
 mod rates;
 mod scene;
+mod slides;
 mod touch;
 
 pub(super) use bank::Bank;
