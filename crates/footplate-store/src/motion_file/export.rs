@@ -59,6 +59,7 @@ impl MotionFile {
                 .map(|[c, s, above_c, above_s]| [(*c, *s), (*above_c, *above_s)])
                 .collect(),
             scatter_scale: exact.scatter_scale,
+            scatter_floor: exact.scatter_floor,
             start_scale: exact.start_scale,
             scale: exact.scale.clone(),
             date: exact.measured_at_s.map_or(Timestamp::ZERO, Timestamp::from_s),
@@ -123,6 +124,7 @@ fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
     ExactForm {
         measured_at_s,
         scatter_scale: numbers.scatter_scale,
+        scatter_floor: numbers.scatter_floor,
         start_scale: numbers.start_scale,
         scale: numbers.scale.clone(),
         counts: counts.collect(),

@@ -42,6 +42,9 @@ pub struct ExactForm {
     pub measured_at_s: Option<f64>,
     /// How far stops scatter against what trains usually do.
     pub scatter_scale: f64,
+    /// What they scatter by besides (m), whatever their speed.
+    #[serde(default)]
+    pub scatter_floor: f64,
     /// How late or early starts from rest are against what trains usually do.
     pub start_scale: f64,
     /// What each of `values` is off by for one standard deviation of the scale of the survey.

@@ -17,9 +17,9 @@ use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
 use super::model::{MotionModel, StepUse};
 use super::parameters::SPEEDS;
-use super::priors::{LATE_START, TRIP_DEVIATION, section_variance};
+use super::priors::{TRIP_DEVIATION, section_variance};
 use super::rows::{Point, Source, TripAt};
-use super::scatter::{ScatterSums, usual_scatter};
+use super::scatter::{Scatter, ScatterSums};
 use super::trip::{Own, Trip};
 use super::unknowns::Columns;
 use crate::calibration::SectionIndex;
@@ -29,6 +29,9 @@ use crate::linalg::{Eliminated, NormalEquations};
 use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
 
+/// Promises are watched once so many stops are known: those of a train that is hardly known yet are broken because numbers
+/// that are far off do not change evenly, which says nothing of how its stops scatter.
+const WATCHED_FROM: u32 = 12;
 /// Steps after which an iteration that has not settled is taken as it is.
 const MOST_ITERATIONS: usize = 15;
 /// A step is shortened by half so often before the point counts as the best.
@@ -172,8 +175,7 @@ impl MotionFit {
             columns,
             lasting,
             highest: self.highest(),
-            stop_scale: self.model.scatter_scale,
-            start_scale: self.model.start_scale,
+            scatter: self.model.scatter,
             stop_shape_error: self.model.stop_shape_error(),
         }
     }
@@ -320,6 +322,10 @@ impl MotionFit {
 
     /// Compares the first sensor after each stop that is new with what was foreseen of it before the fit.
     fn compare_promises(&mut self, columns: &Columns, values: &Values) {
+        let stops: u32 = self.model.counts.iter().flatten().map(|counts| counts.stops).sum();
+        if stops < WATCHED_FROM {
+            return;
+        }
         let point = self.point(columns, &values.lasting);
         let mut scatter = self.prior.scatter;
         for (place, pair) in self.chain.trips.windows(2).enumerate() {
@@ -331,13 +337,20 @@ impl MotionFit {
             let Some(first) = rows.iter().find(|row| row.source == Source::Sensor) else { continue };
             let stop_speed = before.told.iter().rev().nth(1).map_or(0.0, |told| point.speed(told.to));
             let start_speed = after.told.first().map_or(0.0, |told| point.speed(told.to));
-            let [stop, start] = [usual_scatter(stop_speed), start_speed * LATE_START];
-            let known = [self.model.stop_doubt(stop_speed), self.model.start_doubt(start_speed)];
+            // Residuals of a young fit scatter too little: it has much to explain them by.
+            let Scatter { stops, starts, .. } = self.model.scatter;
+            let usual = Scatter { stops: stops.max(1.0), starts: starts.max(1.0), floor: 0.0 };
+            let known = [
+                usual.of_stop(stop_speed),
+                start_speed * usual.of_start(),
+                self.model.stop_doubt(stop_speed),
+                self.model.start_doubt(start_speed),
+            ];
             let delay = start_speed * start_speed * self.model.start_delay_variance();
             let run = TRIP_DEVIATION * after.contacts.first().map_or(0.0, |contact| contact.way);
-            let unknown =
+            let explained =
                 known.iter().map(|known| known * known).sum::<f64>() + delay + run * run + first.variance;
-            scatter.take_promise(first.residual * first.residual, stop * stop + start * start, unknown);
+            scatter.take_promise(first.residual * first.residual, explained);
         }
         self.prior.scatter = scatter;
     }
@@ -354,9 +367,9 @@ impl MotionFit {
             for row in point.rows(at, false) {
                 let square = row.residual * row.residual / row.variance;
                 match row.source {
-                    Source::Stop => sums.stops.take(square * point.stop_scale * point.stop_scale),
+                    Source::Stop => sums.stops.take(square * point.scatter.stops * point.scatter.stops),
                     Source::Start if at.trip.continues && !at.trip.contacts.is_empty() => {
-                        sums.starts.take(square * point.start_scale * point.start_scale);
+                        sums.starts.take(square * point.scatter.starts * point.scatter.starts);
                     }
                     _ => {}
                 }

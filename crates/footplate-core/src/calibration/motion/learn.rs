@@ -39,7 +39,7 @@ impl MotionModel {
             (longer, (solution.variance(column) - by_total).max(0.0))
         };
         self.sections = columns.sections.iter().map(|(section, column)| (*section, known(*column))).collect();
-        (self.scatter_scale, self.start_scale) = scatter.scales();
+        self.scatter = scatter.scatter();
         self.date = date;
     }
 

@@ -5,8 +5,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
-use super::priors::{LATE_START, section_variance};
-use super::scatter::usual_scatter;
+use super::priors::section_variance;
+use super::scatter::Scatter;
 use super::segment::{Pace, Segment, Told};
 use super::spread::Spread;
 use super::variation::Variation;
@@ -61,9 +61,8 @@ pub struct MotionModel {
     uses: Vec<StepUse>,
     /// Contacts passed and stops made at each step, from below and from above.
     pub(super) counts: Vec<[Counts; 2]>,
-    /// How far stops scatter against what trains usually do, and how late or early starts are.
-    pub(super) scatter_scale: f64,
-    pub(super) start_scale: f64,
+    /// How far stops and starts scatter.
+    pub(super) scatter: Scatter,
     /// What each number is off by for one standard deviation of the survey's scale.
     pub(super) scale: Vec<f64>,
     pub(super) date: Timestamp,
@@ -93,8 +92,7 @@ impl MotionModel {
             sections: BTreeMap::new(),
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
-            scatter_scale: 1.0,
-            start_scale: 1.0,
+            scatter: Scatter::USUAL,
             scale: vec![0.0; super::parameters::count(steps)],
             date: Timestamp::ZERO,
         }
@@ -169,7 +167,7 @@ impl MotionModel {
 
     /// One standard deviation (s) by which starts from rest are late or early.
     pub(crate) fn start_scatter(&self) -> f64 {
-        self.start_scale * LATE_START
+        self.scatter.of_start()
     }
 
     /// What experience says of a step.
@@ -208,7 +206,7 @@ impl MotionModel {
 
     /// One standard deviation (m) of stops from a speed (m/s).
     pub(crate) fn scatter(&self, speed: f64) -> f64 {
-        self.scatter_scale * usual_scatter(speed)
+        self.scatter.of_stop(speed)
     }
 
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use super::model::{Counts, MotionModel, StepUse};
+use super::scatter::Scatter;
 use super::spread::Spread;
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::Timestamp;
@@ -28,6 +29,8 @@ pub struct MotionNumbers {
     pub counts: Vec<[(u32, u32); 2]>,
     /// How far stops scatter against what trains usually do.
     pub scatter_scale: f64,
+    /// What stops scatter by besides, whatever their speed (m): slopes, loads, shapes of laws that are none of ours.
+    pub scatter_floor: f64,
     /// How late or early starts are against what trains usually do.
     pub start_scale: f64,
     /// What each number is off by for one standard deviation of the survey's scale.
@@ -85,8 +88,9 @@ impl MotionModel {
             sections: sections.collect(),
             uses: steps.map(|step| self.uses(step)).collect(),
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
-            scatter_scale: self.scatter_scale,
-            start_scale: self.start_scale,
+            scatter_scale: self.scatter.stops,
+            scatter_floor: self.scatter.floor,
+            start_scale: self.scatter.starts,
             scale: self.scale.clone(),
             date: self.date,
         }
@@ -130,8 +134,8 @@ impl MotionModel {
         if !sections().all(is_section) {
             return wrong("sections");
         }
-        if [numbers.scatter_scale, numbers.start_scale].iter().any(|scale| !scale.is_finite() || *scale < 0.0)
-        {
+        let scatters = [numbers.scatter_scale, numbers.scatter_floor, numbers.start_scale];
+        if scatters.iter().any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
             return wrong("scatters");
         }
         model.values.clone_from(&numbers.values);
@@ -147,8 +151,11 @@ impl MotionModel {
             .iter()
             .map(|both| both.map(|(contacts, stops)| Counts { contacts, stops }))
             .collect();
-        model.scatter_scale = numbers.scatter_scale;
-        model.start_scale = numbers.start_scale;
+        model.scatter = Scatter {
+            stops: numbers.scatter_scale,
+            floor: numbers.scatter_floor,
+            starts: numbers.start_scale,
+        };
         model.scale.clone_from(&numbers.scale);
         model.date = numbers.date;
         Ok(model)
@@ -166,7 +173,7 @@ mod tests {
         model.note_use(SpeedStep::new(9).unwrap(), StepUse::Moves);
         model.sections.insert(3, (0.012, 1e-6));
         model.counts[9][1] = Counts { contacts: 41, stops: 7 };
-        model.scatter_scale = 1.25;
+        model.scatter = Scatter { stops: 1.25, floor: 0.002, ..Scatter::USUAL };
         model.date = Timestamp::from_ns(5);
         model
     }

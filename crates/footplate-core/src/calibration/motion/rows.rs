@@ -8,9 +8,9 @@ use super::decoder_kind::SHAPE_ERROR;
 use super::parameters::{
     Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
 };
-use super::priors::{FELT, LATE_START, TRIP_DEVIATION, WANDER, change_error};
+use super::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use super::robust::Belief;
-use super::scatter::usual_scatter;
+use super::scatter::Scatter;
 use super::segment::Segment;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
@@ -99,9 +99,8 @@ pub(super) struct Point<'p> {
     /// The numbers that last.
     pub(super) lasting: &'p [f64],
     pub(super) highest: usize,
-    /// How far stops and starts scatter against what trains usually do.
-    pub(super) stop_scale: f64,
-    pub(super) start_scale: f64,
+    /// How far stops and starts scatter.
+    pub(super) scatter: Scatter,
     /// Part of a stop's displacement by which its shape is not true in its middle.
     pub(super) stop_shape_error: f64,
 }
@@ -176,7 +175,7 @@ impl Point<'_> {
         }
         let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
         let beyond_last = own.place + here.rest - surveyed - longer;
-        let scatter = self.stop_scale * usual_scatter(stop_speed);
+        let scatter = self.scatter.of_stop(stop_speed);
         let scatter = scatter * scatter + REST_SCATTER * REST_SCATTER;
         let next_place = next_place.filter(|_| trip.came_to_rest);
         if let Some(next_place) = next_place {
@@ -229,7 +228,7 @@ impl Point<'_> {
         if !trip.continues {
             add(vec![(columns.place(), 1.0)], own.place, ANYWHERE, Source::Usual);
         }
-        let late = self.start_scale * LATE_START;
+        let late = self.scatter.of_start();
         add(vec![(columns.late_start(), 1.0)], own.late_start, late, Source::Start);
         for (piece, deviation) in own.deviations.iter().enumerate() {
             match piece.checked_sub(1) {

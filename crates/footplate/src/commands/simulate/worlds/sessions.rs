@@ -128,11 +128,7 @@ impl Driven<'_, '_> {
     ) -> anyhow::Result<(Vec<MotionModel>, Vec<MotionFit>)> {
         self.line.station.world_mut().begin_session(PAUSE);
         let mut machine = Timed::new(self.begin(learnt)?);
-        let until = self.line.now() + SEEKS_FOR;
-        if let Some(step) = self.nearest_step(SEEKS_AT_MM_PER_S) {
-            self.say(&mut machine, &format!("speed {TRAIN} {step}"));
-        }
-        self.drive(&mut machine, until, |_| false);
+        self.seek(&mut machine);
         let early_at = (self.scored.name == WorldName::EarlyStart && session == 1).then_some(stops / 2);
         for nth in 0..stops {
             if !self.is_sound() {
@@ -185,14 +181,27 @@ impl Driven<'_, '_> {
                     let promised = [promise.low.as_mm(), promise.high.as_mm()];
                     self.scored.stops.push(ScoredStop { session, step, error, promised });
                 }
-                (refused, ..) => self.failed(&order, refused.as_deref().unwrap_or("no promise")),
+                (refused, ..) => {
+                    self.failed(&order, refused.as_deref().unwrap_or("no promise"));
+                    self.seek(machine);
+                }
             },
             _ => {
                 self.failed(&order, "not ended in time");
-                self.say(machine, &format!("speed {TRAIN} 0"));
-                self.until_at_rest(machine);
+                self.seek(machine);
             }
         }
+    }
+
+    /// A person does what is said to one: lets the train stand, and then run over a contact.
+    fn seek(&mut self, machine: &mut Timed) {
+        self.say(machine, &format!("speed {TRAIN} 0"));
+        self.until_at_rest(machine);
+        if let Some(step) = self.nearest_step(SEEKS_AT_MM_PER_S) {
+            self.say(machine, &format!("speed {TRAIN} {step}"));
+        }
+        let until = self.line.now() + SEEKS_FOR;
+        self.drive(machine, until, |_| false);
     }
 
     fn failed(&mut self, order: &str, why: &str) {

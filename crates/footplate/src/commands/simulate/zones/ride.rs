@@ -228,7 +228,8 @@ impl Ride<'_, '_> {
             Told::Follow => {
                 let leader = self.leader;
                 let leads_at = choice.between(MEANS[0], MEANS[1]);
-                let leading = self.stage.models.get(&leader).ok_or(Refusal::UnknownTrain { train: leader })?;
+                let leading =
+                    self.stage.models.get(&leader).ok_or(Refusal::UnknownTrain { train: leader })?;
                 let step = nearest(leading, leads_at);
                 self.driver.order(now, Order::Speed { train: leader, step })?;
                 let follow = |gap| Order::Follow { train, leader, gap };
