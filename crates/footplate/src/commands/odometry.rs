@@ -147,7 +147,7 @@ impl Arguments {
         }
         let outcome = if walked.falls_short() { Outcome::FallsShort } else { Outcome::Done };
         if to_standard {
-            for warning in walked.warnings() {
+            for warning in walked.warnings(Language::English) {
                 eprintln!("{warning}");
             }
             return Ok(outcome);

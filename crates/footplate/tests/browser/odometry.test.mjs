@@ -12,7 +12,7 @@ import { pathToFileURL } from "node:url";
 import { AT, colours, launch, openPage, width } from "./browser.mjs";
 
 const PERIOD_S = 0.05;
-/** Way of a pulse of the vehicle that is taken where none is given. */
+/** Way of a pulse of the vehicle below. */
 const PITCH_M = (Math.PI * 0.86) / 80;
 const KINDS = ["speed", "wheels", "shares", "distance", "acceleration"];
 
@@ -42,6 +42,19 @@ function rows(name, wet) {
 }
 
 const HEADER = "run_id,t_s,pulses_1,pulses_2,effort,accel_m_s2,true_speed_m_s,true_distance_m";
+/** What is known of the vehicle: without it, every page warns. */
+const VEHICLE = `name = "wet train"
+period_s = ${PERIOD_S}
+max_speed_m_s = 50.0
+max_traction_m_s2 = 1.5
+max_brake_m_s2 = 1.5
+${["powered", "trailing"].map((axle) => `
+[[wheelset]]
+teeth = 80
+diameter_m = 0.86
+diameter_tolerance = 0.001
+axle = "${axle}"
+`).join("")}`;
 let browser;
 let address;
 
@@ -50,8 +63,10 @@ before(async () => {
   mkdirSync(AT, { recursive: true });
   const write = (name, lines) => {
     writeFileSync(join(folder, `${name}.csv`), `${lines.join("\n")}\n`);
-    execFileSync(process.env.FOOTPLATE, ["odometry", join(folder, `${name}.csv`), "--report", join(folder, `${name}.html`)], { stdio: "pipe" });
+    const files = [join(folder, `${name}.csv`), "--vehicle", join(folder, "vehicle.toml"), "--report", join(folder, `${name}.html`)];
+    execFileSync(process.env.FOOTPLATE, ["odometry", ...files], { stdio: "pipe" });
   };
+  writeFileSync(join(folder, "vehicle.toml"), VEHICLE);
   // This name would run if it were taken for markup.
   write("runs", [HEADER, ...rows("<img src=x onerror=document.title='taken-over'>", true), ...rows("dry", false)]);
   // Nothing but counts is known, and time is that of a clock.

@@ -110,7 +110,7 @@ test("without scripts the numbers are there", async () => {
   const page = await browser.newPage({ javaScriptEnabled: false });
   await page.goto(address("report.html"));
   const text = await page.locator("#train-24").innerText();
-  for (const said of ["This chart needs JavaScript", "Speed by throttle step", "Stops, counted from the command", "to add"]) {
+  for (const said of ["This chart needs JavaScript", "Speed by throttle step", "Stops measured with a tape, counted from the command", "to add"]) {
     assert.ok(text.includes(said), said);
   }
   await page.close();

@@ -5,13 +5,14 @@ use serde_json::{Map, Value, json};
 
 use super::recording::{WalkedRecording, WalkedRun};
 use super::walked::Walked;
+use crate::commands::web_page::Language;
 
 /// Everything, as docs/formats/odometry-result.md describes it.
 pub(super) fn walked(walked: &Walked) -> Value {
     let mut whole = Map::new();
     whole.insert("preset".into(), json!(walked.preset.key()));
     whole.insert("vehicle".into(), json!(walked.vehicle));
-    whole.insert("warnings".into(), json!(walked.warnings()));
+    whole.insert("warnings".into(), json!(walked.warnings(Language::English)));
     if let Some(scores) = walked.scores() {
         let mut overall = Map::new();
         insert_scores(&mut overall, &scores, walked.preset);

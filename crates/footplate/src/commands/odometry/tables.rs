@@ -6,11 +6,12 @@ use footplate_store::odometry::{OdometryScore, RunScores, RunSummary};
 
 use super::recording::WalkedRun;
 use super::walked::Walked;
+use crate::commands::web_page::Language;
 use crate::counted::counted;
 
 /// Writes a line a run, and the scores if that was asked for.
 pub(super) fn write(output: &mut dyn Write, walked: &Walked) -> io::Result<()> {
-    for warning in walked.warnings() {
+    for warning in walked.warnings(Language::English) {
         writeln!(output, "WARNING: {warning}\n")?;
     }
     for recording in &walked.recordings {

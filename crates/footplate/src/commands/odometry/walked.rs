@@ -13,9 +13,20 @@ const SPEED_INSIDE_PCT: f64 = 99.99;
 /// Share of periods in which claims may be contradicted before they do not hold: rows that were read late.
 const CONTRADICTED: f64 = 1e-3;
 /// What is said without a vehicle file.
-const NO_VEHICLE: &str = "no vehicle file: teeth, diameters and limits are those of a built-in example, so every speed and \
-                          distance is wrong by the ratio of the pulse pitches and no bound is guaranteed; describe the train \
-                          with --vehicle FILE (docs/formats/vehicle.md)";
+const fn no_vehicle(language: Language) -> &'static str {
+    match language {
+        Language::English => {
+            "no vehicle file: teeth, diameters and limits are those of a built-in example, so every speed and distance is \
+             wrong by the ratio of the pulse pitches and no bound is guaranteed; describe the train with --vehicle FILE \
+             (docs/formats/vehicle.md)"
+        }
+        Language::German => {
+            "keine Fahrzeugdatei: Zähne, Durchmesser und Grenzen sind die eines eingebauten Beispiels; alle \
+             Geschwindigkeiten und Wege sind daher im Verhältnis der Wege je Impuls falsch, und keine Grenze ist \
+             garantiert; der Zug wird mit --vehicle DATEI beschrieben (docs/formats/vehicle.md)"
+        }
+    }
+}
 
 /// What all recordings of one call come to.
 pub(super) struct Walked {
@@ -51,43 +62,69 @@ impl Walked {
     /// Whether the truth left the guaranteed bounds, or what they rest on is missing or does not hold.
     pub(super) fn falls_short(&self) -> bool {
         self.scores().is_some_and(|scores| leaves_bounds(&scores.preset(self.preset)))
-            || !self.warnings().is_empty()
+            || !self.warnings(Language::English).is_empty()
     }
 
     /// What makes every figure doubtful: no vehicle file, or claims of it that a run contradicts.
-    pub(super) fn warnings(&self) -> Vec<String> {
+    pub(super) fn warnings(&self, language: Language) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_vehicle {
-            warnings.push(NO_VEHICLE.to_owned());
+            warnings.push(no_vehicle(language).to_owned());
         }
         for recording in &self.recordings {
             for run in &recording.runs {
                 let claims = run.odometry.doubtful_claims();
                 let periods = run.odometry.summary().periods;
-                let name = run.id.as_deref().map_or_else(String::new, |id| format!(", run {id}"));
+                let name = match (run.id.as_deref(), language) {
+                    (None, _) => String::new(),
+                    (Some(id), Language::English) => format!(", run {id}"),
+                    (Some(id), Language::German) => format!(", Fahrt {id}"),
+                };
                 let file = &recording.file;
-                let mut warn = |what: String| warnings.push(format!("{file}{name}: {what}"));
+                let mut warn = |english: String, german: String| {
+                    let what = if language == Language::German { german } else { english };
+                    warnings.push(format!("{file}{name}: {what}"));
+                };
                 if claims.contradicted as f64 > CONTRADICTED * periods as f64 {
-                    warn(format!(
-                        "in {} no speed agrees with both the counts and the vehicle file: the guaranteed bounds do not \
-                         hold; check max_traction_m_s2, max_brake_m_s2 and [brake_command]",
-                        counted(claims.contradicted, "period")
-                    ));
+                    warn(
+                        format!(
+                            "in {} no speed agrees with both the counts and the vehicle file: the guaranteed bounds do \
+                             not hold; check max_traction_m_s2, max_brake_m_s2 and [brake_command]",
+                            counted(claims.contradicted, "period")
+                        ),
+                        format!(
+                            "in {} Takten passt keine Geschwindigkeit zu Impulsen und Fahrzeugdatei: die garantierten \
+                             Grenzen gelten nicht; max_traction_m_s2, max_brake_m_s2 und [brake_command] prüfen",
+                            claims.contradicted
+                        ),
+                    );
                 }
                 if claims.above_top > 0 {
-                    warn(format!(
-                        "both wheelsets turn faster than max_speed_m_s in {}; check it, teeth and diameter_m",
-                        counted(claims.above_top, "period")
-                    ));
+                    warn(
+                        format!(
+                            "both wheelsets turn faster than max_speed_m_s in {}; check it, teeth and diameter_m",
+                            counted(claims.above_top, "period")
+                        ),
+                        format!(
+                            "in {} Takten drehen beide Radsätze schneller als max_speed_m_s; diesen Wert, teeth und \
+                             diameter_m prüfen",
+                            claims.above_top
+                        ),
+                    );
                 }
                 for (wheelset, scale) in claims.diameters.into_iter().enumerate() {
-                    if let Some(scale) = scale {
-                        warn(format!(
-                            "by the known places, wheelset {} is {scale:.4} times as large as diameter_m says, beyond \
-                             diameter_tolerance; measure it",
-                            wheelset + 1
-                        ));
-                    }
+                    let Some(scale) = scale else { continue };
+                    let wheelset = wheelset + 1;
+                    warn(
+                        format!(
+                            "by the known places, wheelset {wheelset} is {scale:.4} times as large as diameter_m says, \
+                             beyond diameter_tolerance; measure it"
+                        ),
+                        format!(
+                            "nach den bekannten Orten ist Radsatz {wheelset} {scale:.4} mal so groß, wie diameter_m sagt, \
+                             mehr als diameter_tolerance erlaubt; nachmessen"
+                        ),
+                    );
                 }
             }
         }

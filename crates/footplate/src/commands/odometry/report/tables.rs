@@ -100,7 +100,7 @@ pub(super) fn introduction(walked: &Walked) -> String {
             )
         }
     };
-    for warning in walked.warnings() {
+    for warning in walked.warnings(walked.language) {
         html.push_str(&format!("<p class=\"warning\" role=\"alert\">{}</p>\n", text(&warning)));
     }
     if let Some(scores) = walked.known_scores() {
