@@ -81,50 +81,47 @@ impl Walked {
                     (Some(id), Language::German) => format!(", Fahrt {id}"),
                 };
                 let file = &recording.file;
-                let mut warn = |english: String, german: String| {
-                    let what = if language == Language::German { german } else { english };
-                    warnings.push(format!("{file}{name}: {what}"));
-                };
+                let mut warn = |what: String| warnings.push(format!("{file}{name}: {what}"));
                 if claims.contradicted as f64 > CONTRADICTED * periods as f64 {
-                    warn(
-                        format!(
+                    warn(match language {
+                        Language::English => format!(
                             "in {} no speed agrees with both the counts and the vehicle file: the guaranteed bounds do \
                              not hold; check max_traction_m_s2, max_brake_m_s2 and [brake_command]",
                             counted(claims.contradicted, "period")
                         ),
-                        format!(
-                            "in {} Takten passt keine Geschwindigkeit zu Impulsen und Fahrzeugdatei: die garantierten \
+                        Language::German => format!(
+                            "in {} Perioden passt keine Geschwindigkeit zu Impulsen und Fahrzeugdatei: die garantierten \
                              Grenzen gelten nicht; max_traction_m_s2, max_brake_m_s2 und [brake_command] prüfen",
                             claims.contradicted
                         ),
-                    );
+                    });
                 }
                 if claims.above_top > 0 {
-                    warn(
-                        format!(
+                    warn(match language {
+                        Language::English => format!(
                             "both wheelsets turn faster than max_speed_m_s in {}; check it, teeth and diameter_m",
                             counted(claims.above_top, "period")
                         ),
-                        format!(
-                            "in {} Takten drehen beide Radsätze schneller als max_speed_m_s; diesen Wert, teeth und \
+                        Language::German => format!(
+                            "in {} Perioden drehen beide Radsätze schneller als max_speed_m_s; diesen Wert, teeth und \
                              diameter_m prüfen",
                             claims.above_top
                         ),
-                    );
+                    });
                 }
                 for (wheelset, scale) in claims.diameters.into_iter().enumerate() {
                     let Some(scale) = scale else { continue };
                     let wheelset = wheelset + 1;
-                    warn(
-                        format!(
+                    warn(match language {
+                        Language::English => format!(
                             "by the known places, wheelset {wheelset} is {scale:.4} times as large as diameter_m says, \
                              beyond diameter_tolerance; measure it"
                         ),
-                        format!(
+                        Language::German => format!(
                             "nach den bekannten Orten ist Radsatz {wheelset} {scale:.4} mal so groß, wie diameter_m sagt, \
                              mehr als diameter_tolerance erlaubt; nachmessen"
                         ),
-                    );
+                    });
                 }
             }
         }
