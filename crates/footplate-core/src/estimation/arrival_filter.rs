@@ -1,6 +1,6 @@
 //! Where a train is in the run under way, how fast it runs and how long the hops are that it runs over, known together.
 //!
-//! A Kalman filter over the letters of [`Following`] and, beside them, `δ`: by how much each section run over is longer than
+//! A Kalman filter over the letters of [`MotionFilter`] and, beside them, `δ`: by how much each section run over is longer than
 //! surveyed. A train that passes a sensor at `t` measures all of them at once:
 //!
 //! ```text
@@ -11,7 +11,7 @@
 //! covariance is kept, so that the next sensors tell them apart. See `docs/theory/forecasting.md`.
 
 use crate::calibration::SectionIndex;
-use crate::calibration::motion::{Arrival, Following, Guess, MOTION_LETTERS, MotionModel};
+use crate::calibration::motion::{Arrival, Gaussian, MOTION_LETTERS, MotionFilter, MotionModel};
 use crate::ids::SpeedStep;
 use crate::track::Reach;
 
@@ -28,7 +28,7 @@ const SHORTEST_M: f64 = 0.01;
 /// The run under way.
 #[derive(Debug, Clone)]
 pub(super) struct ArrivalFilter {
-    following: Following<LETTERS>,
+    following: MotionFilter<LETTERS>,
     /// The model of the train when the run began.
     model: MotionModel,
     /// Which section each companion is of, and when it was met last.
@@ -59,11 +59,11 @@ impl Ahead {
 impl ArrivalFilter {
     /// A run begins at a time (s): the train runs steadily at a step for long, or stands at step 0.
     pub(super) fn begin(model: &MotionModel, time: f64, step: SpeedStep) -> Self {
-        let anywhere = Guess { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
+        let anywhere = Gaussian { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
         let following = if step == SpeedStep::STAND {
-            Following::at_rest(time, anywhere)
+            MotionFilter::at_rest(time, anywhere)
         } else {
-            Following::running(model, time, step.get(), anywhere)
+            MotionFilter::running(model, time, step.get(), anywhere)
         };
         Self {
             following: following.keep_apart(model),
@@ -93,7 +93,7 @@ impl ArrivalFilter {
     }
 
     /// The speed (m/s) at which it runs, or to which the change under way leads.
-    pub(super) fn settled_speed(&self) -> Guess {
+    pub(super) fn settled_speed(&self) -> Gaussian {
         self.following.settled_speed()
     }
 
@@ -107,7 +107,7 @@ impl ArrivalFilter {
         &mut self,
         sections: &SectionIndex,
         way: &Reach,
-        prior: impl Fn(usize) -> Guess,
+        prior: impl Fn(usize) -> Gaussian,
     ) -> Ahead {
         let mut ahead = Ahead { length: way.length.as_m(), slopes: [(0, 0.0); MOST_HOPS], count: 0 };
         for section in way.hops().iter().filter_map(|hop| sections.section(*hop)) {
@@ -123,7 +123,7 @@ impl ArrivalFilter {
     }
 
     /// The place of a section among the companions; the one met longest ago makes room for a new one.
-    fn companion(&mut self, section: usize, prior: &impl Fn(usize) -> Guess) -> usize {
+    fn companion(&mut self, section: usize, prior: &impl Fn(usize) -> Gaussian) -> usize {
         let known = self.sections.iter().position(|slot| slot.is_some_and(|(of, _)| of == section));
         let place = known.unwrap_or_else(|| {
             let oldest = self.sections.iter().enumerate().min_by_key(|(_, slot)| slot.map(|(_, met)| met));
@@ -144,13 +144,13 @@ impl ArrivalFilter {
     /// When it passes the sensor at the end of a path; the sensor trips at its place to a variance (m²). `None` if the train
     /// comes to rest before.
     pub(super) fn arrival(&self, ahead: &Ahead, scatter: f64) -> Option<Arrival> {
-        let place = Guess { mean: ahead.length, variance: scatter };
+        let place = Gaussian { mean: ahead.length, variance: scatter };
         self.following.arrives(&self.model, place, ahead.slopes(), self.passed)
     }
 
     /// It passed that sensor at a mean time (s, with its variance).
     pub(super) fn pass(&mut self, ahead: &Ahead, time: f64, variance: f64, scatter: f64) {
-        let place = Guess { mean: ahead.length, variance: scatter };
+        let place = Gaussian { mean: ahead.length, variance: scatter };
         let length = |longer: &[f64; SECTIONS]| -> f64 {
             ahead.slopes().iter().filter_map(|(companion, _)| longer.get(*companion)).sum()
         };
@@ -170,7 +170,7 @@ impl ArrivalFilter {
         if self.is_placed {
             self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
         }
-        let place = Guess { mean: 0.0, variance: scatter };
+        let place = Gaussian { mean: 0.0, variance: scatter };
         self.following.pass_beside(&self.model, time, variance, place, &[], &mut self.longer);
         self.is_placed = true;
         self.passages += 1;

@@ -6,9 +6,9 @@
 //! wheels would not be followed for long enough to notice that it has.
 
 use super::felt_way::{LOG_CHANCE_OF_SILENCE, felt_reaches};
-use super::ground::Ground;
 use super::locator::{CONTACT_SCATTER_M, LEAST_SPEED_M_PER_S, Locator, log_density};
-use crate::calibration::motion::{Guess, MotionModel};
+use super::track_context::TrackContext;
+use crate::calibration::motion::{Gaussian, MotionModel};
 use crate::ids::SensorId;
 use crate::latency::ContactWindow;
 
@@ -25,7 +25,7 @@ impl Locator {
     #[must_use]
     pub fn claim(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
@@ -34,10 +34,10 @@ impl Locator {
         let speed = speed.max(LEAST_SPEED_M_PER_S);
         let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
         let off = CHANGED_PART * place.mean;
-        let density = felt_reaches(ground, model, node, sensor).map(|reach| {
+        let density = felt_reaches(context, model, node, sensor).map(|reach| {
             let variance = place.variance + reach.length.variance + noise;
-            let short = Guess { mean: reach.length.mean - place.mean, variance };
-            let changed = Guess { variance: variance + off * off, ..short };
+            let short = Gaussian { mean: reach.length.mean - place.mean, variance };
+            let changed = Gaussian { variance: variance + off * off, ..short };
             let silent = LOG_CHANCE_OF_SILENCE * reach.missed as f64;
             libm::exp(log_density(short) + silent) + libm::exp(log_density(changed) + LOG_CHANGED + silent)
         });

@@ -5,10 +5,10 @@
 //! tape, which a train feels a little longer or shorter.
 
 use super::felt_way::{FeltReach, felt_reach, felt_reaches, taping_doubt};
-use super::foresight::Foresight;
-use super::ground::Ground;
-use super::outlook::Outlook;
-use crate::calibration::motion::{Following, Guess, MotionModel};
+use super::reachable_set::ReachableSet;
+use super::rollout::Rollout;
+use super::track_context::TrackContext;
+use crate::calibration::motion::{Gaussian, MotionFilter, MotionModel};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::latency::{ContactWindow, TruncatedNormal};
@@ -107,15 +107,15 @@ pub struct Locator {
     epoch: Timestamp,
     /// The contact from which ways are counted; `None` while the train is lost.
     node: Option<NodeId>,
-    following: Following,
+    following: MotionFilter,
 }
 
 impl Locator {
     /// A train that stands nobody knows where.
     #[must_use]
     pub fn new(train: TrainId) -> Self {
-        let nowhere = Guess { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
-        Self { train, epoch: Timestamp::ZERO, node: None, following: Following::at_rest(0.0, nowhere) }
+        let nowhere = Gaussian { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
+        Self { train, epoch: Timestamp::ZERO, node: None, following: MotionFilter::at_rest(0.0, nowhere) }
     }
 
     /// The train.
@@ -146,8 +146,8 @@ impl Locator {
     /// The train stands here, within one standard deviation: a person put it there or read it off a tape.
     pub fn place(&mut self, now: Timestamp, at: WayPoint, uncertainty: Length) {
         let sd = uncertainty.as_m();
-        let place = Guess { mean: at.way.as_m(), variance: sd * sd };
-        self.following = Following::at_rest(self.seconds(now), place);
+        let place = Gaussian { mean: at.way.as_m(), variance: sd * sd };
+        self.following = MotionFilter::at_rest(self.seconds(now), place);
         self.node = Some(at.node);
     }
 
@@ -163,8 +163,8 @@ impl Locator {
     }
 
     /// A command to the train has left the line. Other entries say nothing here.
-    pub fn handle_command(&mut self, ground: Ground<'_>, model: &MotionModel, event: &Event) {
-        let _ = ground;
+    pub fn handle_command(&mut self, context: TrackContext<'_>, model: &MotionModel, event: &Event) {
+        let _ = context;
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
                 self.following.tell(model, self.seconds(event.time), step.get());
@@ -177,7 +177,7 @@ impl Locator {
 
     /// The node from which its way is counted, where it is from there (m) and how fast it runs (m/s); `None` while it is
     /// lost.
-    pub(super) fn motion_at(&self, model: &MotionModel, at: Timestamp) -> Option<(NodeId, Guess, f64)> {
+    pub(super) fn motion_at(&self, model: &MotionModel, at: Timestamp) -> Option<(NodeId, Gaussian, f64)> {
         let time = self.seconds(at);
         Some((self.node?, self.following.place(model, time), self.following.speed(model, time).mean))
     }
@@ -185,20 +185,20 @@ impl Locator {
     /// The way to a contact that fits best, and how far the train was short of it when it reported.
     pub(super) fn best_reach(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
-    ) -> Option<(FeltReach, Guess, f64)> {
+    ) -> Option<(FeltReach, Gaussian, f64)> {
         let time = self.seconds(window.middle());
         let place = self.following.place(model, time);
         let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
-        let short = |reach: &FeltReach| Guess {
+        let short = |reach: &FeltReach| Gaussian {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
         };
-        felt_reaches(ground, model, self.node?, sensor)
+        felt_reaches(context, model, self.node?, sensor)
             .map(|reach| {
                 let short = short(&reach);
                 (reach, short, log_density(short) + libm::log(speed) + reach.log_chance())
@@ -211,7 +211,7 @@ impl Locator {
     #[must_use]
     pub fn likelihood(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
@@ -219,26 +219,26 @@ impl Locator {
         if self.node.is_none() {
             return Some(0.0);
         }
-        let (_, _, likelihood) = self.best_reach(ground, model, sensor, window)?;
+        let (_, _, likelihood) = self.best_reach(context, model, sensor, window)?;
         Some(likelihood).filter(|likelihood| *likelihood > LEAST_LIKELIHOOD)
     }
 
     /// The train passed a contact: it is judged to have been this train.
     pub fn pass(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
     ) -> PassedContact {
         let time = self.seconds(window.middle());
         let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
-        let Some(node) = ground.node_of(sensor) else { return known };
-        let Some((reach, short, _)) = self.best_reach(ground, model, sensor, window) else {
+        let Some(node) = context.node_of(sensor) else { return known };
+        let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
             // Lost until now, or no way leads here: it is here all the same, as fast as it was.
             self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
             self.following.shift(-self.following.place(model, time).mean, 0.0);
-            let here = Guess { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+            let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
             self.following.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
             return known;
@@ -253,17 +253,17 @@ impl Locator {
             // What was believed is off by more than it said of itself; a change of speed under way will go on to be.
             // The contact says where the train is past it, however little is known of the way there.
             self.following.shift(-reach.length.mean, reach.length.variance);
-            let here = Guess { mean: 0.0, variance: scatter };
+            let here = Gaussian { mean: 0.0, variance: scatter };
             self.following.pass(model, time, window.variance_s2(), here);
         } else {
             // Something is not as it is believed to be. What the way may be wrong by is not laid to the train's speed, so
             // that the next contacts go on saying it.
-            let place = Guess { variance: reach.length.variance + scatter, ..reach.length };
+            let place = Gaussian { variance: reach.length.variance + scatter, ..reach.length };
             self.following.pass(model, time, window.variance_s2(), place);
             self.following.shift(-reach.length.mean, 0.0);
             // Where it is the contact says all the same: what was believed is off by more than it said of itself.
             self.following.doubt_place(short.mean * short.mean);
-            let here = Guess { mean: 0.0, variance: scatter };
+            let here = Gaussian { mean: 0.0, variance: scatter };
             self.following.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
@@ -294,19 +294,19 @@ impl Locator {
         };
         let (measured, variance) = short.as_measurement();
         self.following.shift(-reach.length.mean, reach.length.variance);
-        let here = Guess { mean: -measured, variance: scatter + variance };
+        let here = Gaussian { mean: -measured, variance: scatter + variance };
         self.following.pass(model, time, 0.0, here);
         self.timestamp(time + short.moments().0 / speed)
     }
 
     /// Where it is at a time that is not before the last entry; `None` while it is lost.
     #[must_use]
-    pub fn locate(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
+    pub fn locate(&self, context: TrackContext<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
         let node = self.node?;
         let time = self.seconds(at);
         let place = self.following.place(model, time);
         let here = WayPoint { node, way: Length::from_m(place.mean) };
-        let taping = taping_doubt(ground, model, here);
+        let taping = taping_doubt(context, model, here);
         let speed = self.following.speed(model, time);
         let at_rest = self.following.at(model, time).rests_at(time);
         Some(Located {
@@ -323,17 +323,17 @@ impl Locator {
     #[must_use]
     pub fn next_contact(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         now: Timestamp,
     ) -> Option<DueContact> {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.following.place(model, time);
-        let mut way = Guess { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
-        for hop in ground.hops_ahead(node).take(MOST_HOPS) {
-            let reach = felt_reach(ground, model, &hop);
-            way = Guess { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
+        let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+        for hop in context.hops_ahead(node).take(MOST_HOPS) {
+            let reach = felt_reach(context, model, &hop);
+            way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
             let beyond = here.mean - way.mean;
             if beyond > MISSED_BEYOND * libm::sqrt(here.variance + way.variance) {
                 continue;
@@ -352,29 +352,34 @@ impl Locator {
     }
 
     /// Where it most likely goes from here; `None` while it is lost.
-    pub(crate) fn outlook(&self) -> Option<Outlook> {
-        Some(Outlook::new(self.node?, self.epoch, self.following.course()))
+    pub(crate) fn rollout(&self) -> Option<Rollout> {
+        Some(Rollout::new(self.node?, self.epoch, self.following.course()))
     }
 
     /// What is to be reckoned with from here.
-    pub(crate) const fn foresight(&self) -> Foresight {
-        Foresight::new(self.node, self.epoch, self.following)
+    pub(crate) const fn reachable_set(&self) -> ReachableSet {
+        ReachableSet::new(self.node, self.epoch, self.following)
     }
 
     /// Where it would come to rest if step 0 left the line at a time (not before the last entry), after any commands
     /// that were sent. For a train that was told to stop already, where it comes to rest anyway.
     #[must_use]
-    pub fn rest_if_stopped(&self, ground: Ground<'_>, model: &MotionModel, at: Timestamp) -> Option<Rest> {
+    pub fn rest_if_stopped(
+        &self,
+        context: TrackContext<'_>,
+        model: &MotionModel,
+        at: Timestamp,
+    ) -> Option<Rest> {
         let mut stopped = self.following;
         stopped.tell(model, self.seconds(at), 0);
-        self.rest_of(ground, &stopped, model)
+        self.rest_of(context, &stopped, model)
     }
 
     /// The same for a train at rest that is first told a step at `start`: what a short move is made of.
     #[must_use]
     pub fn rest_after_move(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         start: Timestamp,
         step: SpeedStep,
@@ -383,14 +388,19 @@ impl Locator {
         let mut moved = self.following;
         moved.tell(model, self.seconds(start), step.get());
         moved.tell(model, self.seconds(stop.max(start)), 0);
-        self.rest_of(ground, &moved, model)
+        self.rest_of(context, &moved, model)
     }
 
-    fn rest_of(&self, ground: Ground<'_>, following: &Following, model: &MotionModel) -> Option<Rest> {
+    fn rest_of(
+        &self,
+        context: TrackContext<'_>,
+        following: &MotionFilter,
+        model: &MotionModel,
+    ) -> Option<Rest> {
         let node = self.node?;
         let (place, scatter, time) = following.rest(model)?;
         let at = WayPoint { node, way: Length::from_m(place.mean) };
-        let taping = taping_doubt(ground, model, at);
+        let taping = taping_doubt(context, model, at);
         Some(Rest {
             at,
             doubt: Length::from_m(libm::sqrt(place.variance + taping * taping)),
@@ -404,7 +414,7 @@ impl Locator {
 const MOST_HOPS: usize = 8;
 
 /// ln of the density of a normal distribution at zero.
-pub(super) fn log_density(of: Guess) -> f64 {
+pub(super) fn log_density(of: Gaussian) -> f64 {
     let variance = of.variance.max(f64::MIN_POSITIVE);
     -0.5 * (of.mean * of.mean / variance + libm::log(2.0 * core::f64::consts::PI * variance))
 }

@@ -12,9 +12,9 @@
 //! a second goes over the same hop otherwise each time, and what a hop then seems to be differs by more: σ never counts for
 //! less than [`BEST_KNOWN`].
 
-use super::ground::Ground;
 use super::locator::{BELIEVED, Locator};
-use crate::calibration::motion::{Guess, MotionModel};
+use super::track_context::TrackContext;
+use crate::calibration::motion::{Gaussian, MotionModel};
 use crate::ids::SensorId;
 use crate::latency::ContactWindow;
 
@@ -27,14 +27,14 @@ impl Locator {
     /// and by how much that is longer than surveyed (m). `None` unless it is the next one.
     pub(crate) fn shown_length(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
-    ) -> Option<(usize, Guess)> {
-        let hop = ground.hop_from(self.node()?).filter(|hop| hop.sensor == Some(sensor))?;
-        let section = ground.sections.section(hop.id)?;
-        let (reach, short, _) = self.best_reach(ground, model, sensor, window)?;
+    ) -> Option<(usize, Gaussian)> {
+        let hop = context.hop_from(self.node()?).filter(|hop| hop.sensor == Some(sensor))?;
+        let section = context.sections.section(hop.id)?;
+        let (reach, short, _) = self.best_reach(context, model, sensor, window)?;
         if reach.missed > 0 || short.mean * short.mean > BELIEVED * BELIEVED * short.variance {
             return None;
         }
@@ -42,6 +42,6 @@ impl Locator {
         let part = unknown / (short.variance - reach.length.variance + unknown);
         let longer = reach.length.mean - hop.length.as_m() - part * short.mean;
         let variance = unknown * (1.0 - part);
-        Some((section, Guess { mean: longer, variance }))
+        Some((section, Gaussian { mean: longer, variance }))
     }
 }

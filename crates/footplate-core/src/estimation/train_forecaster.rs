@@ -6,7 +6,7 @@ use super::polls::Polls;
 use super::predictor::{Hit, Verdict};
 use super::route_memory::RouteMemory;
 use super::sensor_scatter::SensorScatter;
-use crate::calibration::motion::{Arrival, FELT, Guess, MotionFit, MotionModel};
+use crate::calibration::motion::{Arrival, FELT, Gaussian, MotionFit, MotionModel};
 use crate::calibration::{DriftTest, Drive, Passage, PassageTracker, SectionIndex};
 use crate::estimate::Estimate;
 use crate::event::{Event, EventKind, Report};
@@ -182,7 +182,7 @@ impl TrainForecaster {
         turnouts: &TurnoutStates,
         passage: Passage,
         polls: Polls,
-        prior: impl Fn(&MotionModel, usize) -> Guess,
+        prior: impl Fn(&MotionModel, usize) -> Gaussian,
     ) -> Hit {
         self.date = passage.window.until;
         self.passages = self.passages.saturating_add(1);
@@ -292,7 +292,7 @@ impl TrainForecaster {
         layout: &Layout,
         sections: &SectionIndex,
         tracker: &PassageTracker,
-        prior: impl Fn(&MotionModel, usize) -> Guess,
+        prior: impl Fn(&MotionModel, usize) -> Gaussian,
     ) -> Option<Forecast> {
         let from = tracker.at().filter(|_| self.filter.is_placed())?;
         let way = self.routes.likely_way(layout, from, tracker.turnouts())?;
@@ -319,9 +319,9 @@ pub(super) fn expected_length<'t>(
     others: impl Iterator<Item = &'t TrainForecaster>,
     sections: &SectionIndex,
     section: usize,
-) -> Guess {
+) -> Gaussian {
     if let Some((mean, variance)) = model.section(section) {
-        return Guess { mean, variance };
+        return Gaussian { mean, variance };
     }
     let felt = FELT * sections.surveyed_length(section);
     let survey = sections.survey_variance(section) + felt * felt;
@@ -332,5 +332,5 @@ pub(super) fn expected_length<'t>(
         sum += by / (variance + own);
         alike = own;
     }
-    Guess { mean: sum / weight, variance: 1.0 / weight + alike }
+    Gaussian { mean: sum / weight, variance: 1.0 / weight + alike }
 }

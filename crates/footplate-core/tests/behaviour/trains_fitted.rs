@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::MotionModel;
-use footplate_core::estimation::{Ground, Locator, WayPoint};
+use footplate_core::estimation::{Locator, TrackContext, WayPoint};
 use footplate_core::latency::ContactWindow;
 use footplate_core::{Approach, Command, EventKind, Length, Speed, TimeSpan, TrainId};
 
@@ -64,7 +64,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let (sections, turnouts) = (SectionIndex::of(&world.layout), straight());
     let layout = world.layout.clone();
-    let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+    let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
     let mut locator = Locator::new(TRAIN);
     let node = layout.node_named("D1").unwrap();
     locator.place(world.now, WayPoint { node, way: Length::from_mm(300.0) }, Length::from_mm(3.0));
@@ -78,15 +78,15 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
                     EventKind::Sensor(report) => {
                         let after = event.time - report.poll_interval.unwrap();
                         let window = ContactWindow { after, until: event.time };
-                        assert!(locator.likelihood(ground, model(), report.sensor, window).is_some());
-                        locator.pass(ground, model(), report.sensor, window);
+                        assert!(locator.likelihood(context, model(), report.sensor, window).is_some());
+                        locator.pass(context, model(), report.sensor, window);
                     }
-                    _ => locator.handle_command(ground, model(), &event),
+                    _ => locator.handle_command(context, model(), &event),
                 }
             }
-            let located = locator.locate(ground, model(), world.now).unwrap();
+            let located = locator.locate(context, model(), world.now).unwrap();
             // The toy's contacts are where the layout says, so that its ways are the layout's.
-            let here = footplate_core::estimation::place_of(ground, model(), located.at).unwrap();
+            let here = footplate_core::estimation::place_of(context, model(), located.at).unwrap();
             let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
             let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
             let off = ahead.min(behind);
@@ -99,8 +99,8 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     assert!(follow(&mut world, &mut locator, 14.0) > 0.95);
     // and when it is told to stop,
     let before = world.train().travelled_mm;
-    let rest = locator.rest_if_stopped(ground, model(), world.now).unwrap();
-    let here = locator.locate(ground, model(), world.now).unwrap();
+    let rest = locator.rest_if_stopped(context, model(), world.now).unwrap();
+    let here = locator.locate(context, model(), world.now).unwrap();
     world.command(Command::Speed { train: TRAIN, step: step(0) });
     assert!(follow(&mut world, &mut locator, 6.0) > 0.95);
     // it runs as far as was foreseen, within what was said.
@@ -109,7 +109,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     let doubt = rest.doubt.as_mm().hypot(rest.scatter.as_mm());
     assert!((ran - foreseen).abs() < 3.0 * doubt, "ran {ran}, foreseen {foreseen} with {doubt} mm");
     assert!(doubt < 25.0);
-    assert!(locator.locate(ground, model(), world.now).unwrap().at_rest);
+    assert!(locator.locate(context, model(), world.now).unwrap().at_rest);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         let (sections, turnouts) = (SectionIndex::of(&world.layout), straight());
         let layout = world.layout.clone();
-        let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         let mut locators = [Locator::new(TRAIN), Locator::new(TRAIN)];
         let at = WayPoint { node: layout.node_named("D1").unwrap(), way: Length::from_mm(300.0) };
         for locator in &mut locators {
@@ -132,7 +132,7 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
         while reports < last {
             for event in world.tick() {
                 let EventKind::Sensor(report) = event.kind else {
-                    locators.iter_mut().for_each(|locator| locator.handle_command(ground, model(), &event));
+                    locators.iter_mut().for_each(|locator| locator.handle_command(context, model(), &event));
                     continue;
                 };
                 reports += 1;
@@ -142,13 +142,13 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
                 let wide = ContactWindow { after: event.time - TimeSpan::from_ms(730), until: event.time };
                 let windows = if reports == last { [usual, wide] } else { [usual, usual] };
                 for (locator, window) in locators.iter_mut().zip(windows) {
-                    locator.pass(ground, model(), report.sensor, window);
+                    locator.pass(context, model(), report.sensor, window);
                 }
             }
         }
         let error = |locator: &Locator| {
-            let located = locator.locate(ground, model(), world.now).unwrap();
-            let here = footplate_core::estimation::place_of(ground, model(), located.at).unwrap();
+            let located = locator.locate(context, model(), world.now).unwrap();
+            let here = footplate_core::estimation::place_of(context, model(), located.at).unwrap();
             let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
             let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
             let inside = ahead.min(behind) < 1.96 * located.uncertainty;

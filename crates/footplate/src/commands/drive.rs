@@ -1,13 +1,13 @@
 //! `footplate drive`: trains told what to do, line by line, and what comes of it.
 
 mod beginning;
-mod conductor;
 mod instruction;
 mod learning;
 mod parse;
 mod reader;
 mod result_line;
 mod script;
+mod script_runner;
 mod spoken;
 mod stage;
 mod terminal;
@@ -29,12 +29,12 @@ use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
 use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::DriveBeginning;
-pub(crate) use self::conductor::Conductor;
-use self::conductor::Giver;
 use self::instruction::HELP;
 use self::reader::Known;
 use self::result_line::ResultLine;
 use self::script::read_script;
+use self::script_runner::Giver;
+pub(crate) use self::script_runner::ScriptRunner;
 pub(crate) use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::terminal::Terminal;
@@ -262,17 +262,17 @@ impl Arguments {
         let mut journal = self.journal(layout, link.now(), &beginning)?;
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let trains = beginning.models.len();
-        let conductor = beginning.conductor()?;
-        if conductor.listens_to_a_person() && !self.json {
+        let script_runner = beginning.script_runner()?;
+        if script_runner.listens_to_a_person() && !self.json {
             stage.say(HELP, "");
         }
-        let mut conductor = Witnessed::new(conductor, scribe);
+        let mut script_runner = Witnessed::new(script_runner, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut watch = LayoutWatch::new(layout, trains, recorder);
         let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
         let mut beginnings = Beginnings::default();
         let ending = loop {
-            let ending = runtime.run(&mut conductor, &mut stage)?;
+            let ending = runtime.run(&mut script_runner, &mut stage)?;
             for spoken in std::mem::take(&mut stage.for_referee) {
                 if let Spoken::Begun(train) = spoken {
                     beginnings.note(runtime.link(), train);
@@ -302,17 +302,17 @@ impl Arguments {
         if let Some(said) = watch.lengths_doubted() {
             eprintln!("{said}");
         }
-        let mut conductor = conductor.end(at);
+        let mut script_runner = script_runner.end(at);
         if !closing.is_complete() {
             eprintln!("{closing}");
         }
         if let Some(store) = &self.railway.store {
             // What still waits is written down before what follows from it.
             drop(journal);
-            KnownTrains::keep(store, layout, &conductor.learnt())?;
+            KnownTrains::keep(store, layout, &script_runner.learnt())?;
         }
         match ending {
-            Ended::Finished if conductor.fell_short() => Ok(Outcome::FallsShort),
+            Ended::Finished if script_runner.fell_short() => Ok(Outcome::FallsShort),
             Ended::Finished => Ok(Outcome::Done),
             Ended::Interrupted => {
                 eprintln!("interrupted; {closing}");

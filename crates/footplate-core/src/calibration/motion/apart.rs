@@ -1,6 +1,6 @@
 //! How fast a run is and how fast each of its steps, kept apart: what forecasts of a train hardly known begin with.
 //!
-//! A [`Following`] of a train that is driven knows its steps well, and has one letter for what its speed is off by: `ε`.
+//! A [`MotionFilter`] of a train that is driven knows its steps well, and has one letter for what its speed is off by: `ε`.
 //! Before a train is known a step may be off by a tenth or by half, which says nothing of the next one, and of a change of
 //! speed only what the new speed has made of the way so far. So each step has a letter of its own, `s`, and a change from
 //! one to another goes
@@ -15,14 +15,14 @@
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::course::{Course, E, H, N};
-use super::follow::{Following, run_variance};
 use super::model::MotionModel;
+use super::motion_filter::{MotionFilter, run_variance};
 use super::segment::{Pace, Segment, Told};
 
 /// By so much, as ln, speeds differ between which slopes are taken.
 const STEP: f64 = 1e-3;
 /// When a step is reached again its ln speed differs by so much: repeats of one run differ by 0.3 to 0.8 %. Only forecasts
-/// count it, which are held to their intervals; who drives learns such differences ([`Following::repeat`]).
+/// count it, which are held to their intervals; who drives learns such differences ([`MotionFilter::repeat`]).
 pub(super) const STEP_AGAIN: f64 = 0.006;
 /// Bounds of what a run, or a step, may differ from what is known, as ln: beyond, the model is wrong.
 const FARTHEST_DEVIATION: f64 = 1.5;
@@ -114,7 +114,7 @@ impl Apart {
     }
 }
 
-impl<const L: usize> Following<L> {
+impl<const L: usize> MotionFilter<L> {
     /// From now on what is learnt of its run and of each step's speed is kept apart: for forecasts of a train that may be
     /// hardly known.
     pub(crate) fn keep_apart(mut self, model: &MotionModel) -> Self {
@@ -223,15 +223,15 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::calibration::motion::Guess;
+    use crate::calibration::motion::Gaussian;
     use crate::ids::{SpeedStep, TrainId};
 
     #[test]
     fn what_a_step_is_off_by_is_not_taken_along_to_the_next() {
         // Given a train of which nothing is known, and which runs 13 % faster at step 9 than such trains do,
         let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
-        let exact = |mean: f64| Guess { mean, variance: 1e-6 };
-        let running = || Following::<N>::running(&model, 0.0, 14, exact(0.0)).keep_apart(&model);
+        let exact = |mean: f64| Gaussian { mean, variance: 1e-6 };
+        let running = || MotionFilter::<N>::running(&model, 0.0, 14, exact(0.0)).keep_apart(&model);
         let (mut train, mut believed) = (running(), running());
         // when it is seen every second at step 14, at 9 and at 14 again,
         let mut found = Vec::new();

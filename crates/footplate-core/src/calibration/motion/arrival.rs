@@ -1,6 +1,6 @@
 //! When a train comes to a place that is known only together with other numbers, such as the length of the hop before it.
 //!
-//! The letters of [`Following`] have companions `c` then: the place is `W + Σ h c`, with slopes `h`, and the train is there
+//! The letters of [`MotionFilter`] have companions `c` then: the place is `W + Σ h c`, with slopes `h`, and the train is there
 //! when `x(t) = W + Σ h c`. The variance of that difference, over the squared speed, is the variance of the time.
 #![expect(
     clippy::indexing_slicing,
@@ -8,8 +8,8 @@
 )]
 
 use super::course::{B, E, N};
-use super::follow::{BISECTIONS, Following, Guess, LONGEST_WAIT, SLOWEST};
 use super::model::MotionModel;
+use super::motion_filter::{BISECTIONS, Gaussian, LONGEST_WAIT, MotionFilter, SLOWEST};
 
 /// When a train reaches a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub(crate) struct Arrival {
     pub(crate) speed: f64,
 }
 
-impl<const L: usize> Following<L> {
+impl<const L: usize> MotionFilter<L> {
     /// Slopes of how far a train is past a place that companions move.
     pub(super) fn past(mut slope: [f64; L], companions: &[(usize, f64)]) -> [f64; L] {
         for (companion, by) in companions {
@@ -53,7 +53,7 @@ impl<const L: usize> Following<L> {
     pub(crate) fn arrives(
         &self,
         model: &MotionModel,
-        place: Guess,
+        place: Gaussian,
         slopes: &[(usize, f64)],
         now: f64,
     ) -> Option<Arrival> {

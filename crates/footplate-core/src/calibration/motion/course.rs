@@ -11,7 +11,7 @@
 //! x(t) = b + e^(ε + s) S(t − η) + (ζ + τ Δ) r(t)
 //! ```
 //!
-//! [`Following`](super::Following) knows beside it how sure each letter is. What commands not given yet would come to is
+//! [`MotionFilter`](super::MotionFilter) knows beside it how sure each letter is. What commands not given yet would come to is
 //! asked of a copy: cheap enough to look at thousands of ways to go on within a millisecond.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 

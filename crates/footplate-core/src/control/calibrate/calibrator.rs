@@ -13,7 +13,7 @@ use super::tracker::{Tracker, Verdict};
 use crate::calibration::motion::{MotionFit, MotionModel, StepUse};
 use crate::calibration::{SectionIndex, SurveyTest};
 use crate::control::{Machine, Output};
-use crate::estimation::{Ground, Locator};
+use crate::estimation::{Locator, TrackContext};
 use crate::event::{Approach, Command, Event, EventKind, Report};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::latency::{ContactWindow, PollTiming};
@@ -188,8 +188,8 @@ impl<'l> Calibrator<'l> {
         self.fit.model()
     }
 
-    pub(super) const fn ground(&self) -> Ground<'_> {
-        Ground { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts }
+    pub(super) const fn context(&self) -> TrackContext<'_> {
+        TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts }
     }
 
     pub(super) fn say(&mut self, notice: CalibrationNotice) {
@@ -220,7 +220,7 @@ impl<'l> Calibrator<'l> {
     /// Asks for the contact that comes next, if that is another one than before.
     pub(super) fn watch_next(&mut self) {
         let next =
-            self.tracker.last().and_then(|node| self.ground().hop_from(node)).and_then(|hop| hop.sensor);
+            self.tracker.last().and_then(|node| self.context().hop_from(node)).and_then(|hop| hop.sensor);
         let next = next.filter(|_| self.stance.step > SpeedStep::STAND);
         if next != self.watched {
             self.watched = next;
@@ -230,9 +230,10 @@ impl<'l> Calibrator<'l> {
 
     /// A command to this train has left.
     fn handle_told(&mut self, now: Timestamp, event: &Event, step: SpeedStep) {
-        let ground = Ground { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
+        let context =
+            TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         self.fit.take(self.layout, &self.turnouts, event);
-        self.locator.handle_command(ground, self.fit.model(), event);
+        self.locator.handle_command(context, self.fit.model(), event);
         let before = self.stance.step;
         self.told_at = event.time;
         self.steady_at = event.time + self.model().settles_within(before, step);
@@ -253,10 +254,11 @@ impl<'l> Calibrator<'l> {
     fn handle_report(&mut self, now: Timestamp, event: &Event, report: Report) {
         let interval = report.poll_interval.unwrap_or(PollTiming::ASSUMED.period).abs();
         let window = ContactWindow { after: event.time - interval, until: event.time };
-        let ground = Ground { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
+        let context =
+            TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         let model = self.fit.model();
         let before = self.tracker.last();
-        match self.tracker.judge(ground, &self.locator, model, report.sensor, window) {
+        match self.tracker.judge(context, &self.locator, model, report.sensor, window) {
             Verdict::Again => {}
             Verdict::First(_) => self.accept(now, event, report.sensor, window),
             Verdict::Passed(node) => {
@@ -301,8 +303,9 @@ impl<'l> Calibrator<'l> {
 
     /// The train passed a contact.
     fn accept(&mut self, now: Timestamp, event: &Event, sensor: SensorId, window: ContactWindow) {
-        let ground = Ground { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
-        let passed = self.locator.pass(ground, self.fit.model(), sensor, window);
+        let context =
+            TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
+        let passed = self.locator.pass(context, self.fit.model(), sensor, window);
         self.note_pushes(&passed);
         self.fit.take(self.layout, &self.turnouts, event);
         self.note_that_it_moves(now);

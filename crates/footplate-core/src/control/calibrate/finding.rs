@@ -107,13 +107,13 @@ impl Calibrator<'_> {
 
     /// The train has been turned around: it faces where it came from.
     pub(super) fn handle_turned(&mut self, now: Timestamp, event: &Event) {
-        let ground = crate::estimation::Ground {
+        let context = crate::estimation::TrackContext {
             layout: self.layout,
             sections: &self.sections,
             turnouts: &self.turnouts,
         };
         self.fit.take(self.layout, &self.turnouts, event);
-        self.locator.handle_command(ground, self.fit.model(), event);
+        self.locator.handle_command(context, self.fit.model(), event);
         if matches!(self.activity, Activity::Turning { .. }) {
             self.find(now);
         }

@@ -51,7 +51,7 @@ impl Calibrator<'_> {
             return;
         }
         let since = self.tracker.last_time().map_or(self.told_at, |last| last.max(self.told_at));
-        let due = self.locator.next_contact(self.ground(), self.model(), now);
+        let due = self.locator.next_contact(self.context(), self.model(), now);
         let due_by = match due {
             Some(due) => {
                 let doubt = TimeSpan::from_s(2.0 * due.uncertainty.as_s()).min(LONGEST_DOUBT);
@@ -60,14 +60,14 @@ impl Calibrator<'_> {
             }
             None => {
                 // No forecast: the longest that the hop would take at half the speed, from rest.
-                let hop = self.tracker.last().and_then(|node| self.ground().hop_from(node));
+                let hop = self.tracker.last().and_then(|node| self.context().hop_from(node));
                 let length = hop.map_or(super::gain::TYPICAL_HOP, |hop| self.longest(&hop));
                 let speed = self.model().speed(self.stance.step, Approach::Below).value;
                 let slowest = (0.5 * speed).max(Speed::from_mm_per_s(20.0));
                 self.steady_at.max(since) + length / slowest + LATE
             }
         };
-        let pushed = self.tracker.last().and_then(|node| self.ground().hop_from(node));
+        let pushed = self.tracker.last().and_then(|node| self.context().hop_from(node));
         let pushed = pushed.map(|hop| self.told_at + self.longest(&hop) / PUSHED_SPEED + LATE);
         self.due_by =
             Some(if self.pushes > 0 { pushed.unwrap_or(due_by).min(due_by) } else { due_by }.max(now));

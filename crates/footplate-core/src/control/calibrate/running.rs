@@ -211,11 +211,11 @@ impl Calibrator<'_> {
     }
 
     fn moment_to_stop(&self, now: Timestamp) -> Option<Timestamp> {
-        let (ground, model) = (self.ground(), self.model());
+        let (context, model) = (self.context(), self.model());
         let node = self.tracker.last()?;
         let soonest = now + SOONEST;
-        let rest = self.locator.rest_if_stopped(ground, model, soonest)?;
-        let speed = self.locator.locate(ground, model, soonest)?.speed;
+        let rest = self.locator.rest_if_stopped(context, model, soonest)?;
+        let speed = self.locator.locate(context, model, soonest)?.speed;
         if speed <= Speed::ZERO {
             return None;
         }
@@ -226,7 +226,7 @@ impl Calibrator<'_> {
         };
         let mut begins = Length::ZERO;
         let mut rest_way = None;
-        for hop in ground.hops_ahead(node).take(2 * MOST_AHEAD) {
+        for hop in context.hops_ahead(node).take(2 * MOST_AHEAD) {
             if hop.from == rest.at.node && rest_way.is_none() {
                 rest_way = Some(begins + rest.at.way);
             }
@@ -243,7 +243,7 @@ impl Calibrator<'_> {
 
     /// When the train rests that has been told to stop.
     fn rests_at(&self, now: Timestamp) -> Timestamp {
-        let rest = self.locator.rest_if_stopped(self.ground(), self.model(), now);
+        let rest = self.locator.rest_if_stopped(self.context(), self.model(), now);
         rest.map_or(now + self.stops_within(), |rest| rest.time.max(now) + AFTER_REST)
     }
 
@@ -316,8 +316,8 @@ impl Calibrator<'_> {
     }
 
     fn way_to_next_contact(&self, now: Timestamp) -> Option<Length> {
-        let at = self.locator.locate(self.ground(), self.model(), now)?.at;
-        let hop = self.ground().hop_from(at.node)?;
+        let at = self.locator.locate(self.context(), self.model(), now)?.at;
+        let hop = self.context().hop_from(at.node)?;
         Some(self.model().length(&self.sections, &hop)[0] - at.way)
     }
 

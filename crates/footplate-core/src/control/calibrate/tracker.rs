@@ -5,7 +5,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::{Ground, Locator};
+use crate::estimation::{Locator, TrackContext};
 use crate::ids::{NodeId, SensorId, TurnoutId};
 use crate::latency::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
@@ -83,7 +83,7 @@ impl Tracker {
     /// Judges a report.
     pub(super) fn judge(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         locator: &Locator,
         model: &MotionModel,
         sensor: SensorId,
@@ -94,35 +94,35 @@ impl Tracker {
         if before.is_some_and(|before| time - before < ONE_CLOSURE) {
             return Verdict::Again;
         }
-        let Some(node) = ground.node_of(sensor) else { return self.strange(ground, sensor, None, time) };
+        let Some(node) = context.node_of(sensor) else { return self.strange(context, sensor, None, time) };
         let Some((last, _)) = self.last else {
             self.take(node, time);
             return Verdict::First(node);
         };
-        let is_likely = locator.likelihood(ground, model, sensor, window).map_or_else(
-            || locator.locate(ground, model, time).is_none(),
+        let is_likely = locator.likelihood(context, model, sensor, window).map_or_else(
+            || locator.locate(context, model, time).is_none(),
             |log| log > libm::log(LEAST_DENSITY),
         );
         // The very next contact is believed whenever a train can have got there: contacts that report by themselves do so
         // anywhere, and forecasts of a train that is not known yet are poor.
-        let is_next = leads_to(ground.layout, ground.turnouts, last, node, 0)
-            && self.in_time(ground.layout, self.last, node, time);
-        if is_next || is_likely && leads_to(ground.layout, ground.turnouts, last, node, LOOK_PAST) {
+        let is_next = leads_to(context.layout, context.turnouts, last, node, 0)
+            && self.in_time(context.layout, self.last, node, time);
+        if is_next || is_likely && leads_to(context.layout, context.turnouts, last, node, LOOK_PAST) {
             self.take(node, time);
             return Verdict::Passed(node);
         }
-        if let Some((turnout, leg)) = other_leg(ground, last, node)
-            && self.in_time(ground.layout, self.last, node, time)
+        if let Some((turnout, leg)) = other_leg(context, last, node)
+            && self.in_time(context.layout, self.last, node, time)
         {
             self.take(node, time);
             return Verdict::ByOtherLeg { node, turnout, leg };
         }
-        if self.in_time(ground.layout, self.elsewhere, node, time) {
+        if self.in_time(context.layout, self.elsewhere, node, time) {
             self.strange.push(sensor);
             self.take(node, time);
             return Verdict::Moved { from: Some(last), to: node };
         }
-        self.strange(ground, sensor, Some(node), time)
+        self.strange(context, sensor, Some(node), time)
     }
 
     /// The train was here: what was strange is a little less so.
@@ -134,14 +134,14 @@ impl Tracker {
 
     fn strange(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         sensor: SensorId,
         node: Option<NodeId>,
         time: Timestamp,
     ) -> Verdict {
         if self.strange.is_empty() {
             let from = self.last.map(|(last, _)| last);
-            let next = from.into_iter().flat_map(|last| ground.layout.hops_from(last));
+            let next = from.into_iter().flat_map(|last| context.layout.hops_from(last));
             self.expected = next.filter_map(|hop| hop.sensor).collect();
         }
         if !self.strange.contains(&sensor) {
@@ -179,13 +179,13 @@ fn leads_to(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, to: NodeId,
 
 /// The turnout that must have lain otherwise than it was told for a train to get from one node to another, the first on
 /// the way, and how it lay.
-fn other_leg(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<(TurnoutId, Leg)> {
+fn other_leg(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<(TurnoutId, Leg)> {
     let unknown = TurnoutStates::unknown();
     // Without a silent contact between: two things at once that seldom happen are rather a spurious report.
-    let way = ground.layout.reaches(from, &unknown, 0).find(|way| way.to == to)?;
-    let hops = way.hops().iter().filter_map(|id| ground.layout.hop(*id));
+    let way = context.layout.reaches(from, &unknown, 0).find(|way| way.to == to)?;
+    let hops = way.hops().iter().filter_map(|id| context.layout.hop(*id));
     let mut needs = hops.flat_map(|hop| hop.needs.iter());
-    needs.find(|need| !ground.turnouts.allow(**need)).map(|need| (need.turnout, need.leg))
+    needs.find(|need| !context.turnouts.allow(**need)).map(|need| (need.turnout, need.leg))
 }
 
 #[cfg(test)]
@@ -212,13 +212,14 @@ mod tests {
     impl Scene {
         /// What the tracker says of contacts by name at seconds, with a locator that knows nothing.
         fn judge(&mut self, seconds: f64, name: &str) -> Verdict {
-            let ground = Ground { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts };
+            let context =
+                TrackContext { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts };
             let train = TrainId(24);
             let until = Timestamp::from_s(seconds);
             let window = ContactWindow { after: until - TimeSpan::from_ms(70), until };
             let sensor = self.layout.sensor_named(name).unwrap();
             let model = MotionModel::unknown(train, SpeedStep::new(14).unwrap());
-            self.tracker.judge(ground, &Locator::new(train), &model, sensor, window)
+            self.tracker.judge(context, &Locator::new(train), &model, sensor, window)
         }
 
         fn node(&self, name: &str) -> NodeId {

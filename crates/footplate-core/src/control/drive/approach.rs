@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::calibration::motion::StepUse;
-use crate::estimation::{Ground, Located, WayPoint};
+use crate::estimation::{Located, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
@@ -56,7 +56,7 @@ impl DrivenTrain {
     /// the one whose rest is surest.
     pub(super) fn approach_step(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         located: &Located,
         destination: &Destination,
@@ -64,16 +64,16 @@ impl DrivenTrain {
         let out_of_reach = || Refusal::OutOfReach { target: alloc::string::String::new() };
         let at = destination.at.ok_or_else(out_of_reach)?;
         if let Some(step) = destination.step {
-            return match self.short_run(ground, now, at, step, destination) {
+            return match self.short_run(context, now, at, step, destination) {
                 CommandTime::At(..) => Ok(step),
-                CommandTime::TooLate(_, beyond) => Err(self.too_near(ground, at, beyond, destination)),
-                CommandTime::Never => Err(self.no_way(ground, at.node, destination)),
+                CommandTime::TooLate(_, beyond) => Err(self.too_near(context, at, beyond, destination)),
+                CommandTime::Never => Err(self.no_way(context, at.node, destination)),
             };
         }
         let steps = self.usable_steps();
         let settled: Vec<(SpeedStep, Length)> = steps
             .iter()
-            .filter(|step| self.settles_before(ground, located, at, **step))
+            .filter(|step| self.settles_before(context, located, at, **step))
             .map(|step| (*step, self.stop_spread(*step)))
             .collect();
         let surest_stop = settled.iter().map(|(_, spread)| *spread).reduce(Length::min);
@@ -91,9 +91,9 @@ impl DrivenTrain {
         let mut slowest: Option<(SpeedStep, TimeSpan)> = None;
         let mut nearest: Option<Length> = None;
         // A short run is over before a zone has been left.
-        let fastest = self.fastest_allowed(ground, now);
+        let fastest = self.fastest_allowed(context, now);
         for step in steps.into_iter().filter(|step| fastest.is_none_or(|fastest| *step <= fastest)) {
-            match self.short_run(ground, now, at, step, destination) {
+            match self.short_run(context, now, at, step, destination) {
                 CommandTime::At(_, rest) if rest.time - now <= MOVE_LIMIT => {
                     if surest.is_none_or(|(_, least)| spread(&rest) < least) {
                         surest = Some((step, spread(&rest)));
@@ -118,8 +118,8 @@ impl DrivenTrain {
             return Ok(step);
         }
         Err(match nearest {
-            Some(beyond) => self.too_near(ground, at, beyond, destination),
-            None => self.no_way(ground, at.node, destination),
+            Some(beyond) => self.too_near(context, at, beyond, destination),
+            None => self.no_way(context, at.node, destination),
         })
     }
 
@@ -147,7 +147,7 @@ impl DrivenTrain {
     /// Whether a contact is passed at a settled speed, in time before the command to stop.
     pub(super) fn settles_before(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         located: &Located,
         at: WayPoint,
         step: SpeedStep,
@@ -158,12 +158,12 @@ impl DrivenTrain {
         let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
         let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * REPORT_TIME;
         at.node == located.at.node
-            && contacts_until(ground, &self.model, at.node, last).any(|(_, way)| way > settled)
+            && contacts_until(context, &self.model, at.node, last).any(|(_, way)| way > settled)
     }
 
     pub(super) fn short_run(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         at: WayPoint,
         step: SpeedStep,
@@ -171,8 +171,8 @@ impl DrivenTrain {
     ) -> CommandTime {
         let start = now + LINE_TIME;
         command_time(start + SHORTEST_RUN, |stop| {
-            let rest = self.locator.rest_after_move(ground, &self.model, start, step, stop)?;
-            Some((rest, self.aimed_beyond(ground, &rest, at, destination.aim)?))
+            let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
+            Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))
         })
     }
 }

@@ -9,7 +9,7 @@ use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::event::Event;
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
@@ -87,13 +87,13 @@ impl Attribution {
     pub(super) fn command_left(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         event: &Event,
     ) {
         let branches = self.doubt.iter_mut().flat_map(|doubt| &mut doubt.otherwise);
         for branch in branches {
             if let Some(train) = trains.get(&branch.train) {
-                branch.locator.handle_command(ground, &train.model, event);
+                branch.locator.handle_command(context, &train.model, event);
             }
         }
     }
@@ -102,7 +102,7 @@ impl Attribution {
     pub(super) fn decide(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         closure: Closure,
     ) -> Option<Decided> {
@@ -115,8 +115,8 @@ impl Attribution {
         let likely = |found: &[Hypothesis]| {
             libm::exp(log_nothing) + found.iter().map(|one| libm::exp(one.log_density)).sum::<f64>()
         };
-        let believed = doubt.share * likely(&hypotheses(trains, ground, now, closure));
-        let explains = |branch: &Branch| branch.explains(trains, ground, now, closure);
+        let believed = doubt.share * likely(&hypotheses(trains, context, now, closure));
+        let explains = |branch: &Branch| branch.explains(trains, context, now, closure);
         let explained: Vec<Vec<Hypothesis>> = doubt.otherwise.iter().map(explains).collect();
         for (branch, found) in doubt.otherwise.iter_mut().zip(&explained) {
             branch.share *= likely(found);
@@ -145,7 +145,7 @@ impl Attribution {
         doubt.share = believed / all;
         for (branch, found) in doubt.otherwise.iter_mut().zip(&explained) {
             branch.share /= all;
-            branch.go_on(trains, ground, closure, found, log_nothing);
+            branch.go_on(trains, context, closure, found, log_nothing);
         }
         self.doubt = Some(doubt);
         None
@@ -155,11 +155,11 @@ impl Attribution {
     pub(super) fn judge(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         closure: Closure,
     ) -> Verdict {
-        let found = hypotheses(trains, ground, now, closure);
+        let found = hypotheses(trains, context, now, closure);
         let nothing = libm::exp(self.conduct.log_rate(closure.sensor, now));
         let density = |one: &Hypothesis| libm::exp(one.log_density);
         let all = nothing + found.iter().map(density).sum::<f64>();
@@ -191,7 +191,7 @@ impl Attribution {
                     }
                     if let Some(train) = trains.get(&train) {
                         let not_passed =
-                            Branch::not_passing(train, ground, closure, &one.explanation, nothing / all);
+                            Branch::not_passing(train, context, closure, &one.explanation, nothing / all);
                         self.doubt = Some(Doubt::believed(now, not_passed, self.doubt.take()));
                     }
                 }
@@ -208,7 +208,7 @@ impl Attribution {
         let otherwise = found
             .iter()
             .filter(|one| density(one) >= NEGLIGIBLE * all)
-            .filter_map(|one| Branch::passing(trains, ground, closure, one, density(one) / all));
+            .filter_map(|one| Branch::passing(trains, context, closure, one, density(one) / all));
         // One doubt at a time: an older one that this closure did not decide is given up.
         self.doubt = Some(Doubt::unbelieved(now, closure, nothing / all, otherwise.collect()));
         let second = of_trains.get(1).filter(|(_, share)| *share >= nothing / all);

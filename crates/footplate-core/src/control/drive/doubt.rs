@@ -3,7 +3,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::{Ground, Locator, PassedContact};
+use crate::estimation::{Locator, PassedContact, TrackContext};
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutStates};
@@ -87,7 +87,7 @@ impl Branch {
     /// A train as it goes on from a contact, if it passed it.
     pub(super) fn passing(
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         closure: Closure,
         hypothesis: &Hypothesis,
         share: f64,
@@ -95,21 +95,21 @@ impl Branch {
         let explanation = hypothesis.explanation;
         let train = trains.get(&explanation.train())?;
         let mut branch = Self { did_it: true, unseen: None, ..Self::before(train, closure, share) };
-        branch.pass(trains, ground, closure, explanation);
+        branch.pass(trains, context, closure, explanation);
         Some(branch)
     }
 
     /// A train as it goes on if it did not pass a contact, as is believed. What that has shown of a turnout is not so then.
     pub(super) fn not_passing(
         train: &DrivenTrain,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         closure: Closure,
         believed: &Explanation,
         share: f64,
     ) -> Self {
         let mut branch = Self::before(train, closure, share);
         if let Explanation::Turnout { turnout, .. } = *believed {
-            branch.lies.extend(ground.turnouts.get(turnout).map(|lies| (turnout, lies)));
+            branch.lies.extend(context.turnouts.get(turnout).map(|lies| (turnout, lies)));
         }
         branch
     }
@@ -129,18 +129,18 @@ impl Branch {
     fn world(
         &self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
     ) -> (BTreeMap<TrainId, DrivenTrain>, TurnoutStates) {
         let mut trains = trains.clone();
         if let Some(train) = trains.get_mut(&self.train) {
             train.locator = self.locator.clone();
             train.expected.unseen = self.unseen;
         }
-        (trains, self.turnouts(ground))
+        (trains, self.turnouts(context))
     }
 
-    fn turnouts(&self, ground: Ground<'_>) -> TurnoutStates {
-        let mut turnouts = ground.turnouts.clone();
+    fn turnouts(&self, context: TrackContext<'_>) -> TurnoutStates {
+        let mut turnouts = context.turnouts.clone();
         self.lies.iter().for_each(|(turnout, leg)| turnouts.set(*turnout, *leg));
         turnouts
     }
@@ -149,19 +149,19 @@ impl Branch {
     pub(super) fn explains(
         &self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         closure: Closure,
     ) -> Vec<Hypothesis> {
-        let (trains, turnouts) = self.world(trains, ground);
-        hypotheses(&trains, Ground { turnouts: &turnouts, ..ground }, now, closure)
+        let (trains, turnouts) = self.world(trains, context);
+        hypotheses(&trains, TrackContext { turnouts: &turnouts, ..context }, now, closure)
     }
 
     /// Goes on over one more closure if the likeliest explanation of it is this train.
     pub(super) fn go_on(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         closure: Closure,
         found: &[Hypothesis],
         log_nothing: f64,
@@ -171,14 +171,14 @@ impl Branch {
             && one.log_density > log_nothing
             && one.explanation.train() == self.train
         {
-            self.pass(trains, ground, closure, one.explanation);
+            self.pass(trains, context, closure, one.explanation);
         }
     }
 
     fn pass(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         closure: Closure,
         explanation: Explanation,
     ) {
@@ -188,9 +188,9 @@ impl Branch {
             Explanation::Strayed(_) => self.locator.lose(),
             Explanation::Train(_) => {}
         }
-        let turnouts = self.turnouts(ground);
-        let ground = Ground { turnouts: &turnouts, ..ground };
-        let passed = self.locator.pass(ground, &train.model, closure.sensor, closure.window);
+        let turnouts = self.turnouts(context);
+        let context = TrackContext { turnouts: &turnouts, ..context };
+        let passed = self.locator.pass(context, &train.model, closure.sensor, closure.window);
         self.unseen = None;
         self.passes.push(Pass { closure, explanation, passed });
     }

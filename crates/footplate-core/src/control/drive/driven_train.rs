@@ -1,7 +1,7 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
 use crate::calibration::motion::{MotionModel, StepUse};
-use crate::estimation::{Ground, Located, Locator, PassedContact, WayPoint, landmark_of};
+use crate::estimation::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
@@ -14,7 +14,7 @@ use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::refusal::Refusal;
-use super::restraint::Restraint;
+use super::speed_supervision::SpeedSupervision;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
 use super::turnout_guard::TRAIN_REACH;
@@ -55,7 +55,7 @@ pub(super) struct DrivenTrain {
     /// How far it reaches ahead of and behind the leading end of its pickup.
     pub(super) reach: [Length; 2],
     /// What keeps it to speed restrictions.
-    pub(super) restraint: Restraint,
+    pub(super) speed_supervision: SpeedSupervision,
     /// What it is paced for, while that is its goal.
     pub(super) pacing: Option<Pacing>,
     /// When it came by the contacts behind it, for who follows it.
@@ -74,7 +74,7 @@ impl DrivenTrain {
             expected: Expectation::default(),
             limit: None,
             reach: [TRAIN_REACH; 2],
-            restraint: Restraint::default(),
+            speed_supervision: SpeedSupervision::default(),
             pacing: None,
             passages: Passages::default(),
         }
@@ -90,32 +90,38 @@ impl DrivenTrain {
         self.model.train()
     }
 
-    pub(super) fn located(&self, ground: Ground<'_>, now: Timestamp) -> Option<Located> {
-        self.locator.locate(ground, &self.model, now)
+    pub(super) fn located(&self, context: TrackContext<'_>, now: Timestamp) -> Option<Located> {
+        self.locator.locate(context, &self.model, now)
     }
 
     /// As far as is known; a train that nobody can find stands if it was told to and nobody waits for it to.
-    pub(super) fn stands(&self, ground: Ground<'_>, now: Timestamp) -> bool {
+    pub(super) fn stands(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let told_to = self.told == SpeedStep::STAND && self.unsent.is_none();
         told_to
-            && self.located(ground, now).map_or_else(
+            && self.located(context, now).map_or_else(
                 || self.task.is_none() || matches!(self.goal(), Some(Goal::Run)),
                 |located| located.at_rest,
             )
     }
 
     /// Whether it runs, or may.
-    pub(super) fn may_move(&self, ground: Ground<'_>, now: Timestamp) -> bool {
-        !self.stands(ground, now)
+    pub(super) fn may_move(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
+        !self.stands(context, now)
     }
 
     /// A person says where it is.
-    pub(super) fn place(&mut self, ground: Ground<'_>, now: Timestamp, at: WayPoint, uncertainty: Length) {
+    pub(super) fn place(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        at: WayPoint,
+        uncertainty: Length,
+    ) {
         self.locator.place(now, at, uncertainty);
         self.passages.forget();
         self.seen();
-        self.limit_here(ground, now);
-        self.expect_next(ground, now);
+        self.limit_here(context, now);
+        self.expect_next(context, now);
     }
 
     pub(super) const fn is_told(&self) -> bool {
@@ -137,18 +143,18 @@ impl DrivenTrain {
     /// Tells it a step, or the fastest below that the zones about it allow.
     pub(super) fn tell_step(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         step: SpeedStep,
         out: &mut Outputs,
     ) {
-        let step = self.restrained(ground, now, step, out);
+        let step = self.restrained(context, now, step, out);
         self.tell_at_once(now, step, out);
     }
 
     /// Tells it to stand.
     pub(super) fn tell_stand(&mut self, now: Timestamp, out: &mut Outputs) {
-        self.restraint = Restraint::default();
+        self.speed_supervision = SpeedSupervision::default();
         self.tell_at_once(now, SpeedStep::STAND, out);
     }
 
@@ -166,7 +172,7 @@ impl DrivenTrain {
     /// Runs at a step, or comes to rest if that is 0.
     pub(super) fn run(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         step: SpeedStep,
@@ -174,20 +180,20 @@ impl DrivenTrain {
     ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
         self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
-        self.tell_step(ground, now, step, out);
+        self.tell_step(context, now, step, out);
     }
 
     /// Comes to rest if it does not, and turns around.
     pub(super) fn reverse(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         then: SpeedStep,
         out: &mut Outputs,
     ) {
         let goal = Goal::Reverse(then);
-        if self.stands(ground, now) {
+        if self.stands(context, now) {
             self.take(Task { order, goal, phase: Phase::Turning }, out);
             self.tell(now, Command::Reverse { train: self.id() }, out);
         } else {
@@ -199,14 +205,14 @@ impl DrivenTrain {
     /// A command to this train has left the line.
     pub(super) fn command_left(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         event: &Event,
         out: &mut Outputs,
     ) {
         match event.kind {
             EventKind::Speed { step, .. } => {
-                self.locator.handle_command(ground, &self.model, event);
+                self.locator.handle_command(context, &self.model, event);
                 let train = self.id();
                 let waits_for = self.unsent.map(|(command, _)| command);
                 if waits_for == Some(Command::Speed { train, step }) {
@@ -214,30 +220,30 @@ impl DrivenTrain {
                 } else if waits_for.is_none() {
                     self.told = step;
                 }
-                self.expect_on(ground, now);
+                self.expect_on(context, now);
                 self.paced_step_left(event.time);
-                self.step_left(ground, now, step, out);
+                self.step_left(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
-                let stood = self.stands_at(ground, event.time);
-                self.locator.handle_command(ground, &self.model, event);
+                let stood = self.stands_at(context, event.time);
+                self.locator.handle_command(context, &self.model, event);
                 if matches!(self.unsent, Some((Command::Reverse { .. }, _))) {
                     self.unsent = None;
                 }
-                match stood.and_then(|located| turned(ground, &self.model, located)) {
+                match stood.and_then(|located| turned(context, &self.model, located)) {
                     Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
                     None => self.locator.lose(),
                 }
                 self.passages.forget();
-                self.limit_here(ground, now);
-                self.expect_next(ground, now);
+                self.limit_here(context, now);
+                self.expect_next(context, now);
                 if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
                     if then > SpeedStep::STAND {
                         self.task =
                             Some(Task { order, goal: Goal::Run, phase: Phase::Telling { promise: None } });
-                        self.tell_step(ground, now, then, out);
+                        self.tell_step(context, now, then, out);
                     } else {
-                        self.finish(ground, now, order, None, None, out);
+                        self.finish(context, now, order, None, None, out);
                     }
                 }
             }
@@ -245,24 +251,24 @@ impl DrivenTrain {
         }
     }
 
-    fn stands_at(&self, ground: Ground<'_>, time: Timestamp) -> Option<Located> {
-        self.located(ground, time).filter(|located| located.at_rest)
+    fn stands_at(&self, context: TrackContext<'_>, time: Timestamp) -> Option<Located> {
+        self.located(context, time).filter(|located| located.at_rest)
     }
 
-    fn step_left(&mut self, ground: Ground<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+    fn step_left(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         let Some(task) = self.task else { return };
         match (task.phase, task.goal) {
             (Phase::Telling { .. }, Goal::Run) if step > SpeedStep::STAND => {
-                self.finish(ground, now, task.order, None, None, out);
+                self.finish(context, now, task.order, None, None, out);
             }
             // A stop that leaves after it has been told to run again was of what it did before.
             (Phase::Telling { .. } | Phase::Running { .. }, _)
                 if step == SpeedStep::STAND && self.told == SpeedStep::STAND =>
             {
-                let rest = self.locator.rest_if_stopped(ground, &self.model, now);
+                let rest = self.locator.rest_if_stopped(context, &self.model, now);
                 let promise = match task.goal {
                     Goal::RestAt(Destination { at: Some(at), .. }) => {
-                        rest.and_then(|rest| self.promise(ground, &rest, at))
+                        rest.and_then(|rest| self.promise(context, &rest, at))
                     }
                     _ => None,
                 };
@@ -276,7 +282,7 @@ impl DrivenTrain {
                 });
                 self.task = Some(Task { phase: Phase::Settling { promise, until }, ..task });
             }
-            (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(ground, now, out),
+            (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(context, now, out),
             _ => {}
         }
     }
@@ -284,39 +290,39 @@ impl DrivenTrain {
     /// A contact was judged to have been closed by this train.
     pub(super) fn passed(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         node: NodeId,
         passed: PassedContact,
         out: &mut Outputs,
     ) {
         self.seen();
-        self.note_passage(ground, node, passed.at);
-        self.count_limit_from(ground, node);
-        self.expect_next(ground, now);
+        self.note_passage(context, node, passed.at);
+        self.count_limit_from(context, node);
+        self.expect_next(context, now);
         out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
-        self.paced_passed(ground, now, node, out);
+        self.paced_passed(context, now, node, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
-            (Phase::Finding { .. }, _) => self.set_out(ground, now, task.order, destination, out),
-            (_, Some(at)) => match self.counted_again(ground, at, node, &destination) {
+            (Phase::Finding { .. }, _) => self.set_out(context, now, task.order, destination, out),
+            (_, Some(at)) => match self.counted_again(context, at, node, &destination) {
                 Some(at) => {
                     let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
                     self.task = Some(Task { goal, ..task });
-                    self.plan(ground, now, out);
-                    self.keep_time(ground, now, out);
+                    self.plan(context, now, out);
+                    self.keep_time(context, now, out);
                 }
-                None => self.give_up(now, self.no_way(ground, node, &destination), out),
+                None => self.give_up(now, self.no_way(context, node, &destination), out),
             },
             _ => {}
         }
     }
 
     /// The report says when within a poll, and where it was expected just then says it better.
-    fn note_passage(&mut self, ground: Ground<'_>, node: NodeId, middle: Timestamp) {
+    fn note_passage(&mut self, context: TrackContext<'_>, node: NodeId, middle: Timestamp) {
         let located =
-            self.located(ground, middle).filter(|located| located.at.node == node && !located.at_rest);
+            self.located(context, middle).filter(|located| located.at.node == node && !located.at_rest);
         let since = located.filter(|located| located.speed.as_m_per_s() > 0.0);
         let since = since.map_or(TimeSpan::ZERO, |located| located.at.way / located.speed);
         self.passages.note(node, middle - since);
@@ -335,7 +341,7 @@ impl DrivenTrain {
         [phase, unsent, self.next_doubt(), self.guard()].into_iter().chain(looks).flatten().min()
     }
 
-    pub(super) fn handle_timeout(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn handle_timeout(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         if let Some((command, _)) = self.unsent.filter(|(_, since)| now - *since >= UNCONFIRMED) {
             out.say(DriveNotice::Unconfirmed { command });
             self.unsent = None;
@@ -343,14 +349,14 @@ impl DrivenTrain {
                 self.tell(now, command, out);
             }
         }
-        self.keep_on_track(ground, now, out);
+        self.keep_on_track(context, now, out);
         if let Some(task) = self.task {
-            self.go_on(ground, now, task, out);
+            self.go_on(context, now, task, out);
         }
-        self.doubt(ground, now, out);
+        self.doubt(context, now, out);
     }
 
-    fn go_on(&mut self, ground: Ground<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
+    fn go_on(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
             Phase::Running { plan: Some(plan) } if plan.leaves - LINE_TIME <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
@@ -360,7 +366,7 @@ impl DrivenTrain {
                 self.give_up(now, why, out);
             }
             Phase::Settling { promise, until } if until <= now => {
-                self.rested(ground, now, task, promise, out);
+                self.rested(context, now, task, promise, out);
             }
             _ => {}
         }
@@ -389,14 +395,14 @@ impl DrivenTrain {
 
     fn rested(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         task: Task,
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
         // From now on it stands, whatever a better model may make of its way to here.
-        if let Some(located) = self.located(ground, now) {
+        if let Some(located) = self.located(context, now) {
             self.locator.place(now, located.at, located.uncertainty);
         }
         match task.goal {
@@ -404,35 +410,35 @@ impl DrivenTrain {
                 self.task = Some(Task { phase: Phase::Turning, ..task });
                 self.tell(now, Command::Reverse { train: self.id() }, out);
             }
-            Goal::RestAt(Destination { at, .. }) => self.finish(ground, now, task.order, at, promise, out),
-            Goal::Rest | Goal::Run | Goal::Pace => self.finish(ground, now, task.order, None, None, out),
+            Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),
+            Goal::Rest | Goal::Run | Goal::Pace => self.finish(context, now, task.order, None, None, out),
         }
     }
 
     /// A contact that it should have passed, without a report.
-    pub(super) fn passed_unheard(&self, ground: Ground<'_>, located: &Located) -> Option<SensorId> {
+    pub(super) fn passed_unheard(&self, context: TrackContext<'_>, located: &Located) -> Option<SensorId> {
         let passed = located.at.way - located.uncertainty * SHOULD_HAVE_PASSED;
-        contacts_until(ground, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
+        contacts_until(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
     /// The order has been carried out.
     pub(super) fn finish(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         time: Timestamp,
         order: OrderId,
         target: Option<WayPoint>,
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        let located = self.located(ground, time);
+        let located = self.located(context, time);
         let achieved = located.map(|located| Achieved {
-            at: landmark_of(ground, &self.model, located.at),
+            at: landmark_of(context, &self.model, located.at),
             uncertainty: located.uncertainty,
-            error: target.and_then(|target| self.beyond(ground, located.at, target)),
+            error: target.and_then(|target| self.beyond(context, located.at, target)),
         });
         if let Some(located) = located {
-            self.expected.unseen = self.expected.unseen.or(self.passed_unheard(ground, &located));
+            self.expected.unseen = self.expected.unseen.or(self.passed_unheard(context, &located));
         }
         self.task = None;
         let unseen = self.expected.unseen;

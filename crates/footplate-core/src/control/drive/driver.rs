@@ -113,19 +113,19 @@ impl Driver {
     /// Where a train is at a time not before the last entry; `None` if nobody knows.
     #[must_use]
     pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {
-        self.trains.get(&train)?.located(self.track.ground(), now)
+        self.trains.get(&train)?.located(self.track.context(), now)
     }
 
     /// A point of a train's way as people name it.
     #[must_use]
     pub fn landmark(&self, train: TrainId, at: WayPoint) -> Option<Landmark> {
-        Some(landmark_of(self.track.ground(), &self.trains.get(&train)?.model, at))
+        Some(landmark_of(self.track.context(), &self.trains.get(&train)?.model, at))
     }
 
     /// Whether a train stands, as far as is known.
     #[must_use]
     pub fn stands(&self, train: TrainId, now: Timestamp) -> bool {
-        self.trains.get(&train).is_some_and(|train| train.stands(self.track.ground(), now))
+        self.trains.get(&train).is_some_and(|train| train.stands(self.track.context(), now))
     }
 
     /// The step that a train was told last, whether or not that has left yet; 0 for one that is not driven here.
@@ -144,7 +144,7 @@ impl Driver {
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         self.attribution.forget(train);
         if let Some(train) = self.trains.get_mut(&train) {
-            train.place(self.track.ground(), now, at, uncertainty);
+            train.place(self.track.context(), now, at, uncertainty);
         }
     }
 
@@ -155,25 +155,25 @@ impl Driver {
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         self.check(&order)?;
         let id = OrderId(self.orders);
-        let ground = self.track.ground();
+        let context = self.track.context();
         let out = &mut self.outputs;
         if let Order::Follow { train, leader, gap } = order {
             // Whoever follows looks at the others.
             if let Some(mut follower) = self.trains.remove(&train) {
-                let taken = follower.follow(ground, now, id, (leader, gap), &self.trains, out);
+                let taken = follower.follow(context, now, id, (leader, gap), &self.trains, out);
                 self.trains.insert(train, follower);
                 taken?;
             }
         }
         let train = order.train().and_then(|train| self.trains.get_mut(&train));
         match (order, train) {
-            (Order::Speed { step, .. }, Some(train)) => train.run(ground, now, id, step, out),
-            (Order::Reverse { then, .. }, Some(train)) => train.reverse(ground, now, id, then, out),
-            (Order::Stop(stop), Some(train)) => train.stop_at(ground, now, id, &stop, out)?,
-            (Order::Move { distance, .. }, Some(train)) => train.move_on(ground, now, id, distance, out)?,
-            (Order::Hold { speed, .. }, Some(train)) => train.hold(ground, now, id, speed, out)?,
+            (Order::Speed { step, .. }, Some(train)) => train.run(context, now, id, step, out),
+            (Order::Reverse { then, .. }, Some(train)) => train.reverse(context, now, id, then, out),
+            (Order::Stop(stop), Some(train)) => train.stop_at(context, now, id, &stop, out)?,
+            (Order::Move { distance, .. }, Some(train)) => train.move_on(context, now, id, distance, out)?,
+            (Order::Hold { speed, .. }, Some(train)) => train.hold(context, now, id, speed, out)?,
             (Order::Arrive { target, within, .. }, Some(train)) => {
-                train.arrive(ground, now, id, target, within, out)?;
+                train.arrive(context, now, id, target, within, out)?;
             }
             (Order::Turnout { turnout, curved }, _) => self.throw(now, id, turnout, curved)?,
             _ => {}
@@ -227,21 +227,21 @@ impl Driver {
         turnout: TurnoutId,
         curved: bool,
     ) -> Result<(), Refusal> {
-        let ground = self.track.ground();
-        if ground.layout.branch(turnout).is_none() {
+        let context = self.track.context();
+        if context.layout.branch(turnout).is_none() {
             return Err(Refusal::UnknownTurnout { turnout });
         }
-        let lies = ground.turnouts.get(turnout) == Some(Leg::from_curved(curved));
-        let on_it = train_on(&self.trains, ground, now, turnout);
+        let lies = context.turnouts.get(turnout) == Some(Leg::from_curved(curved));
+        let on_it = train_on(&self.trains, context, now, turnout);
         if let Some(train) = on_it.filter(|_| !lies) {
             return Err(Refusal::TurnoutOccupied { turnout, train });
         }
-        let partner = ground
+        let partner = context
             .layout
             .never_curved_with(turnout)
-            .filter(|partner| curved && ground.turnouts.get(*partner) != Some(Leg::Straight));
+            .filter(|partner| curved && context.turnouts.get(*partner) != Some(Leg::Straight));
         if let Some(partner) = partner {
-            if let Some(train) = train_on(&self.trains, ground, now, partner) {
+            if let Some(train) = train_on(&self.trains, context, now, partner) {
                 return Err(Refusal::PartnerOccupied { turnout, partner, train });
             }
             self.outputs.command(Command::Turnout { turnout: partner, curved: false });
@@ -271,9 +271,9 @@ impl Driver {
     }
 
     fn ways_changed(&mut self, now: Timestamp) {
-        let ground = self.track.ground();
+        let context = self.track.context();
         for train in self.trains.values_mut() {
-            train.way_changed(ground, now, &mut self.outputs);
+            train.way_changed(context, now, &mut self.outputs);
         }
     }
 
@@ -289,7 +289,7 @@ impl Driver {
             self.outputs.say(DriveNotice::ContactBehaves { sensor });
         }
         let closure = Closure { sensor, window };
-        match self.attribution.decide(&self.trains, self.track.ground(), now, closure) {
+        match self.attribution.decide(&self.trains, self.track.context(), now, closure) {
             Some(Decided::Otherwise(branch)) => self.take_back(now, *branch),
             Some(Decided::Nothing(closure)) => {
                 let time = closure.window.until;
@@ -297,7 +297,7 @@ impl Driver {
             }
             None => {}
         }
-        match self.attribution.judge(&self.trains, self.track.ground(), now, closure) {
+        match self.attribution.judge(&self.trains, self.track.context(), now, closure) {
             Verdict::Explained(explanation) => self.passed(now, closure, explanation),
             Verdict::Ambiguous { likeliest, or } => {
                 self.outputs.say(DriveNotice::Ambiguous { sensor, time, likeliest, or });
@@ -313,17 +313,17 @@ impl Driver {
         if let Explanation::Turnout { train, turnout, leg } = explanation {
             self.believe(train, turnout, leg);
         }
-        let ground = self.track.ground();
+        let context = self.track.context();
         if let (Some(train), Some(node)) =
-            (self.trains.get_mut(&explanation.train()), ground.node_of(closure.sensor))
+            (self.trains.get_mut(&explanation.train()), context.node_of(closure.sensor))
         {
             if matches!(explanation, Explanation::Strayed(_)) {
                 train.locator.lose();
                 train.passages.forget();
             }
-            train.learn_length(ground, closure.sensor, closure.window);
-            let passed = train.locator.pass(ground, &train.model, closure.sensor, closure.window);
-            train.passed(ground, now, node, passed, &mut self.outputs);
+            train.learn_length(context, closure.sensor, closure.window);
+            let passed = train.locator.pass(context, &train.model, closure.sensor, closure.window);
+            train.passed(context, now, node, passed, &mut self.outputs);
         }
         if matches!(explanation, Explanation::Turnout { .. }) {
             self.ways_changed(now);
@@ -338,17 +338,17 @@ impl Driver {
             self.outputs.say(DriveNotice::Unexplained { sensor, time: window.until });
         }
         lies.iter().for_each(|(turnout, leg)| self.believe(train, *turnout, *leg));
-        let ground = self.track.ground();
+        let context = self.track.context();
         let Some(train) = self.trains.get_mut(&train) else { return };
         train.locator = locator;
         train.expected.unseen = unseen;
         for pass in &passes {
-            if let Some(node) = ground.node_of(pass.closure.sensor) {
-                train.passed(ground, now, node, pass.passed, &mut self.outputs);
+            if let Some(node) = context.node_of(pass.closure.sensor) {
+                train.passed(context, now, node, pass.passed, &mut self.outputs);
             }
         }
         if passes.is_empty() {
-            train.way_changed(ground, now, &mut self.outputs);
+            train.way_changed(context, now, &mut self.outputs);
         }
         if !lies.is_empty() {
             self.ways_changed(now);
@@ -391,13 +391,13 @@ impl Machine for Driver {
     type Notice = DriveNotice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
-        let ground = self.track.ground();
+        let context = self.track.context();
         match event.kind {
             EventKind::Sensor(report) => self.report(now, event.time, report),
             EventKind::Speed { train, .. } | EventKind::Reverse { train } => {
-                self.attribution.command_left(&self.trains, ground, event);
+                self.attribution.command_left(&self.trains, context, event);
                 if let Some(train) = self.trains.get_mut(&train) {
-                    train.command_left(ground, now, event, &mut self.outputs);
+                    train.command_left(context, now, event, &mut self.outputs);
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_left(now, turnout, curved),
@@ -409,9 +409,9 @@ impl Machine for Driver {
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        let ground = self.track.ground();
+        let context = self.track.context();
         for train in self.trains.values_mut() {
-            train.handle_timeout(ground, now, &mut self.outputs);
+            train.handle_timeout(context, now, &mut self.outputs);
         }
         self.heed_zones(now);
         self.pace(now);

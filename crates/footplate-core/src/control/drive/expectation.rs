@@ -1,6 +1,6 @@
 //! What should happen next to a train that runs, and what follows when it does not.
 
-use crate::estimation::{DueContact, Ground, WayPoint};
+use crate::estimation::{DueContact, TrackContext, WayPoint};
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Ratio};
@@ -75,25 +75,25 @@ impl DrivenTrain {
     }
 
     /// Looks ahead to the next contact, to the end of the track and to the limit.
-    pub(super) fn expect_next(&mut self, ground: Ground<'_>, now: Timestamp) {
-        let due = self.locator.next_contact(ground, &self.model, now);
-        let end = self.end_of_track(ground, now);
-        let limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
-        self.look_at_zones(ground, now);
+    pub(super) fn expect_next(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        let due = self.locator.next_contact(context, &self.model, now);
+        let end = self.end_of_track(context, now);
+        let limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
+        self.look_at_zones(context, now);
         // What was missed is not forgotten because something was commanded.
         self.expected = Expectation { due, since: now, overdue_said: false, end, limit, ..self.expected };
     }
 
     /// Looks at another limit, and at nothing else.
-    pub(super) fn expect_limit(&mut self, ground: Ground<'_>, now: Timestamp) {
-        self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(ground, now, limit));
+    pub(super) fn expect_limit(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
     }
 
     /// The same after a command to it. A contact that it should have come by already stays due: who is told something
     /// else every other second must not be lost for that without anybody noticing.
-    pub(super) fn expect_on(&mut self, ground: Ground<'_>, now: Timestamp) {
+    pub(super) fn expect_on(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let before = self.expected;
-        self.expect_next(ground, now);
+        self.expect_next(context, now);
         if self.told == SpeedStep::STAND {
             // Each run is judged by its own contacts; that one was silent stays known.
             self.expected.silent = 0;
@@ -128,7 +128,7 @@ impl DrivenTrain {
         overdue.into_iter().chain(self.expected.lost_by).min()
     }
 
-    pub(super) fn doubt(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn doubt(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         if self.next_doubt().is_none_or(|at| now < at) {
             return;
         }
@@ -143,7 +143,7 @@ impl DrivenTrain {
                 if self.expected.silent >= MOST_SILENT {
                     return self.lose(now, out);
                 }
-                let next = self.locator.next_contact(ground, &self.model, now);
+                let next = self.locator.next_contact(context, &self.model, now);
                 // The one behind it is waited for now; where none is known only the clock ends the wait.
                 let next = next.filter(|next| next.sensor != due.sensor);
                 self.expected.overdue_said = next.is_none();
@@ -184,7 +184,7 @@ impl DrivenTrain {
     }
 
     /// Stops the train where the track ends ahead of it, or what it may enter.
-    pub(super) fn keep_on_track(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn keep_on_track(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         let train = self.id();
         if self.limit_guard().is_some_and(|at| at <= now) {
             self.expected.limit = None;
@@ -195,17 +195,17 @@ impl DrivenTrain {
             && at <= now
         {
             self.expected.end = None;
-            let name = ground.layout.node_name(end).into();
+            let name = context.layout.node_name(end).into();
             out.say(DriveNotice::TrackEnds { train, end });
             self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
         }
     }
 
-    fn end_of_track(&self, ground: Ground<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
-        let located = self.located(ground, now).filter(|_| self.told > SpeedStep::STAND)?;
-        let (end, way) = track_end(ground, &self.model, located.at.node)?;
+    fn end_of_track(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
+        let located = self.located(context, now).filter(|_| self.told > SpeedStep::STAND)?;
+        let (end, way) = track_end(context, &self.model, located.at.node)?;
         let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
-        Some((self.last_stop_before(ground, now, at)?, end))
+        Some((self.last_stop_before(context, now, at)?, end))
     }
 
     /// The latest time at which a command to stop may leave so that the train comes to rest before a point, but for one
@@ -213,7 +213,7 @@ impl DrivenTrain {
     /// come so far.
     pub(super) fn last_stop_before(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         at: WayPoint,
     ) -> Option<Timestamp> {
@@ -222,8 +222,8 @@ impl DrivenTrain {
         }
         let earliest = now + LINE_TIME;
         let found = command_time(earliest, |leaves| {
-            let rest = self.locator.rest_if_stopped(ground, &self.model, leaves)?;
-            Some((rest, self.aimed_beyond(ground, &rest, at, Aim::NotBeyond(NEARER))?))
+            let rest = self.locator.rest_if_stopped(context, &self.model, leaves)?;
+            Some((rest, self.aimed_beyond(context, &rest, at, Aim::NotBeyond(NEARER))?))
         });
         match found {
             CommandTime::At(leaves, _) => Some(leaves),

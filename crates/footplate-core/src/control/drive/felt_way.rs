@@ -1,7 +1,7 @@
 //! Ways along the hops as the turnouts lie, in lengths as a train feels them.
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::{Ground, WayPoint};
+use crate::estimation::{TrackContext, WayPoint};
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::track::{Hop, NodeKind};
 use crate::units::Length;
@@ -9,21 +9,21 @@ use crate::units::Length;
 /// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after
 /// as many hops as there are nodes, which is more than one lap of any circuit.
 fn felt_hops<'g>(
-    ground: Ground<'g>,
+    context: TrackContext<'g>,
     model: &MotionModel,
     from: NodeId,
 ) -> impl Iterator<Item = (Hop<'g>, [Length; 2])> {
     let mut end = Length::ZERO;
-    ground.hops_ahead(from).take(ground.layout.nodes().len()).map(move |hop| {
+    context.hops_ahead(from).take(context.layout.nodes().len()).map(move |hop| {
         let begin = end;
-        end += model.length(ground.sections, &hop)[0];
+        end += model.length(context.sections, &hop)[0];
         (hop, [begin, end])
     })
 }
 
 /// The way from one node to another that is ahead of it.
 pub(super) fn way_between(
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     model: &MotionModel,
     from: NodeId,
     to: NodeId,
@@ -31,19 +31,19 @@ pub(super) fn way_between(
     if from == to {
         return Some(Length::ZERO);
     }
-    felt_hops(ground, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
+    felt_hops(context, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
 }
 
 /// The way once round from a node to itself, on a circuit. Hops end at contacts: from any other node it is the way round
 /// from the next contact, if that leads over the node.
-pub(super) fn lap(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
-    let contact = match ground.layout.sensor_at(node) {
+pub(super) fn lap(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
+    let contact = match context.layout.sensor_at(node) {
         Some(_) => node,
-        None => ground.hops_ahead(node).next()?.to,
+        None => context.hops_ahead(node).next()?.to,
     };
     let mut over_it = contact == node;
-    let (_, [_, end]) = felt_hops(ground, model, contact).find(|(hop, _)| {
-        let starts_at = |edge: &EdgeId| ground.layout.edge(*edge).is_some_and(|edge| edge.from == node);
+    let (_, [_, end]) = felt_hops(context, model, contact).find(|(hop, _)| {
+        let starts_at = |edge: &EdgeId| context.layout.edge(*edge).is_some_and(|edge| edge.from == node);
         over_it |= hop.edges.iter().any(starts_at);
         hop.to == contact
     })?;
@@ -53,44 +53,48 @@ pub(super) fn lap(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Opti
 /// The same point counted from another node, which the train came to since: ahead of the one before, and once round if
 /// it is the same.
 pub(super) fn counted_from(
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     model: &MotionModel,
     point: WayPoint,
     node: NodeId,
 ) -> Option<WayPoint> {
-    let (_, [_, between]) = felt_hops(ground, model, point.node).find(|(hop, _)| hop.to == node)?;
+    let (_, [_, between]) = felt_hops(context, model, point.node).find(|(hop, _)| hop.to == node)?;
     Some(WayPoint { node, way: point.way - between })
 }
 
 /// The contacts ahead of a node up to a way, with their ways.
 pub(super) fn contacts_until<'g>(
-    ground: Ground<'g>,
+    context: TrackContext<'g>,
     model: &MotionModel,
     from: NodeId,
     until: Length,
 ) -> impl Iterator<Item = (SensorId, Length)> {
-    felt_hops(ground, model, from)
+    felt_hops(context, model, from)
         .take_while(move |(_, [_, end])| *end <= until)
         .filter_map(|(hop, [_, end])| Some((hop.sensor?, end)))
 }
 
 /// Where the way ahead of a node ends, and how far that is; `None` on a circuit, and where a turnout is not known.
-pub(super) fn track_end(ground: Ground<'_>, model: &MotionModel, from: NodeId) -> Option<(NodeId, Length)> {
-    let (hop, [_, end]) = felt_hops(ground, model, from).find(|(hop, _)| hop.sensor.is_none())?;
+pub(super) fn track_end(
+    context: TrackContext<'_>,
+    model: &MotionModel,
+    from: NodeId,
+) -> Option<(NodeId, Length)> {
+    let (hop, [_, end]) = felt_hops(context, model, from).find(|(hop, _)| hop.sensor.is_none())?;
     Some((hop.to, end))
 }
 
 /// The first turnout ahead of a node at which the way forks and nobody knows where it leads.
-pub(super) fn unknown_turnout(ground: Ground<'_>, from: NodeId) -> Option<TurnoutId> {
-    let last = ground.hops_ahead(from).take(ground.layout.nodes().len()).last().map_or(from, |hop| hop.to);
-    let hop = ground.layout.open_hops_from(last, ground.turnouts).next()?;
-    let fork = hop.needs.iter().find(|need| need.facing && ground.turnouts.get(need.turnout).is_none())?;
+pub(super) fn unknown_turnout(context: TrackContext<'_>, from: NodeId) -> Option<TurnoutId> {
+    let last = context.hops_ahead(from).take(context.layout.nodes().len()).last().map_or(from, |hop| hop.to);
+    let hop = context.layout.open_hops_from(last, context.turnouts).next()?;
+    let fork = hop.needs.iter().find(|need| need.facing && context.turnouts.get(need.turnout).is_none())?;
     Some(fork.turnout)
 }
 
 /// The nodes of a turnout: met at its toe, and from its legs.
-pub(super) fn nodes_of_turnout(ground: Ground<'_>, turnout: TurnoutId) -> Option<[NodeId; 2]> {
-    let branch = ground.layout.branch(turnout)?;
-    debug_assert!(ground.layout.node(branch).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))));
+pub(super) fn nodes_of_turnout(context: TrackContext<'_>, turnout: TurnoutId) -> Option<[NodeId; 2]> {
+    let branch = context.layout.branch(turnout)?;
+    debug_assert!(context.layout.node(branch).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))));
     Some([branch, branch.reverse()])
 }

@@ -4,7 +4,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::event::Approach;
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::latency::ContactWindow;
@@ -69,14 +69,14 @@ pub(super) struct Hypothesis {
 /// Everything that trains have to do with a closure.
 pub(super) fn hypotheses(
     trains: &BTreeMap<TrainId, DrivenTrain>,
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     now: Timestamp,
     closure: Closure,
 ) -> Vec<Hypothesis> {
     let mut found = Vec::new();
-    for train in trains.values().filter(|train| may_have_moved(train, ground, now, closure.window)) {
+    for train in trains.values().filter(|train| may_have_moved(train, context, now, closure.window)) {
         let id = train.id();
-        let anywhere = log_anywhere(train, ground);
+        let anywhere = log_anywhere(train, context);
         let mut add = |explanation, log_density: f64| {
             if log_density.is_finite() {
                 found.push(Hypothesis { explanation, log_density });
@@ -89,19 +89,19 @@ pub(super) fn hypotheses(
         let is_unseen = train.unseen().is_some();
         // That it was not seen has happened already, whichever way it is explained.
         let given = if is_unseen { -LOG_UNSEEN } else { 0.0 };
-        let claim = |ground: Ground<'_>| {
-            let claim = train.locator.claim(ground, &train.model, closure.sensor, closure.window)?;
+        let claim = |context: TrackContext<'_>| {
+            let claim = train.locator.claim(context, &train.model, closure.sensor, closure.window)?;
             Some(claim + given)
         };
-        let as_it_lies = claim(ground);
+        let as_it_lies = claim(context);
         if let Some(log_density) = as_it_lies {
             add(Explanation::Train(id), log_density);
         }
         if as_it_lies.is_none_or(|log_density| log_density < CONVINCING) {
-            for (turnout, leg) in other_legs(train, ground, now) {
-                let mut turnouts: TurnoutStates = ground.turnouts.clone();
+            for (turnout, leg) in other_legs(train, context, now) {
+                let mut turnouts: TurnoutStates = context.turnouts.clone();
                 turnouts.set(turnout, leg);
-                if let Some(log_density) = claim(Ground { turnouts: &turnouts, ..ground }) {
+                if let Some(log_density) = claim(TrackContext { turnouts: &turnouts, ..context }) {
                     let explanation = Explanation::Turnout { train: id, turnout, leg };
                     add(explanation, log_density + LOG_TURNOUT_FAILS);
                 }
@@ -114,19 +114,24 @@ pub(super) fn hypotheses(
 }
 
 /// A train that stands closes no contact.
-fn may_have_moved(train: &DrivenTrain, ground: Ground<'_>, now: Timestamp, window: ContactWindow) -> bool {
-    if train.may_move(ground, now) {
+fn may_have_moved(
+    train: &DrivenTrain,
+    context: TrackContext<'_>,
+    now: Timestamp,
+    window: ContactWindow,
+) -> bool {
+    if train.may_move(context, now) {
         return true;
     }
-    let before = train.located(ground, window.after - STILL);
+    let before = train.located(context, window.after - STILL);
     before.is_some_and(|before| !before.at_rest)
 }
 
 /// ln of the density (1/s) with which a train that may be anywhere comes to one contact: its speed over all ways there
 /// are, in either direction.
-fn log_anywhere(train: &DrivenTrain, ground: Ground<'_>) -> f64 {
+fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
     let speed = train.model.speed(train.told, Approach::Below).value.as_m_per_s();
-    let ways: f64 = ground.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
+    let ways: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
     let ways = if ways > 0.0 { ways } else { SOMEWHERE_M };
     libm::log(speed.max(f64::MIN_POSITIVE) / ways)
 }
@@ -134,12 +139,12 @@ fn log_anywhere(train: &DrivenTrain, ground: Ground<'_>) -> f64 {
 /// The turnouts that a train meets at their toes before long, with the leg for which they are not believed to lie.
 fn other_legs<'g>(
     train: &DrivenTrain,
-    ground: Ground<'g>,
+    context: TrackContext<'g>,
     now: Timestamp,
 ) -> impl Iterator<Item = (TurnoutId, Leg)> + use<'g> {
-    let node = train.located(ground, now).map(|located| located.at.node);
+    let node = train.located(context, now).map(|located| located.at.node);
     node.into_iter()
-        .flat_map(move |node| ground.hops_ahead(node).take(HOPS_LOOKED_AT))
+        .flat_map(move |node| context.hops_ahead(node).take(HOPS_LOOKED_AT))
         .flat_map(|hop| hop.needs.iter().filter(|need| need.facing))
         .map(|need| {
             let other = if need.leg.is_curved() { Leg::Straight } else { Leg::Curved };

@@ -1,10 +1,10 @@
 //! The layout as it lies, owned by who drives on it.
 
 use crate::calibration::SectionIndex;
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::track::{Layout, TurnoutStates};
 
-/// What [`Ground`] points to.
+/// What [`TrackContext`] points to.
 #[derive(Debug, Clone)]
 pub(super) struct KnownTrack {
     pub(super) layout: Layout,
@@ -18,7 +18,7 @@ impl KnownTrack {
         Self { layout, sections, turnouts }
     }
 
-    pub(super) const fn ground(&self) -> Ground<'_> {
-        Ground { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts }
+    pub(super) const fn context(&self) -> TrackContext<'_> {
+        TrackContext { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts }
     }
 }

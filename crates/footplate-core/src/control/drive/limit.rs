@@ -2,7 +2,7 @@
 
 use alloc::collections::BTreeSet;
 
-use crate::estimation::{Ground, Rest, WayPoint, place_of, way_to};
+use crate::estimation::{Rest, TrackContext, WayPoint, place_of, way_to};
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::Position;
@@ -21,9 +21,9 @@ impl Driver {
     /// a stop plans it before the limit. A train that is put elsewhere or turned around may not move until it is given
     /// another limit; `None` lifts it.
     pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
-        let ground = self.track.ground();
+        let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
-            train.set_limit(ground, now, limit);
+            train.set_limit(context, now, limit);
         }
         self.wish(now);
     }
@@ -52,7 +52,7 @@ impl Driver {
     #[must_use]
     pub fn stopped_at(&self, train: TrainId, at: Timestamp) -> Option<Rest> {
         let train = self.trains.get(&train)?;
-        train.locator.rest_if_stopped(self.track.ground(), &train.model, at)
+        train.locator.rest_if_stopped(self.track.context(), &train.model, at)
     }
 
     /// How far a train reaches ahead of and behind the leading end of its pickup, whichever way it runs. Unless it is said,
@@ -74,8 +74,8 @@ impl Driver {
     /// believed to be.
     #[must_use]
     pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
-        let (train, ground) = (self.trains.get(&train)?, self.track.ground());
-        train.unseen().or_else(|| train.passed_unheard(ground, &train.located(ground, now)?))
+        let (train, context) = (self.trains.get(&train)?, self.track.context());
+        train.unseen().or_else(|| train.passed_unheard(context, &train.located(context, now)?))
     }
 
     /// Whether it is not sure which contacts a train has passed: it may be where it would be otherwise.
@@ -90,7 +90,7 @@ impl Driver {
         let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
         let at = self.position_at(train, located.at).and_then(|place| {
             let model = &self.trains.get(&train)?.model;
-            let trailing = trailing_place(self.track.ground(), model, located.at)?;
+            let trailing = trailing_place(self.track.context(), model, located.at)?;
             let behind = self.track.layout.edge(trailing.edge)?.from;
             if behind == located.at.node { None } else { self.way_point(train, behind, place) }
         });
@@ -103,7 +103,7 @@ impl Driver {
     #[must_use]
     pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
         let train = self.trains.get(&train);
-        train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.ground(), train, now))
+        train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.context(), train, now))
     }
 
     /// The place of a train on the layout; `None` if nobody knows it.
@@ -115,7 +115,7 @@ impl Driver {
     /// The place on the layout of a point of a train's way as the turnouts lie.
     #[must_use]
     pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
-        place_of(self.track.ground(), &self.trains.get(&train)?.model, at)
+        place_of(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// The same ahead of a point of its way: where the way leads there only once round, that is taken.
@@ -125,7 +125,7 @@ impl Driver {
         if found.way > from.way {
             return Some(found);
         }
-        let round = lap(self.track.ground(), &self.trains.get(&train)?.model, from.node)?;
+        let round = lap(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
         Some(WayPoint { way: found.way + round, ..found })
     }
 
@@ -134,43 +134,43 @@ impl Driver {
     #[must_use]
     pub fn turned_place(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         let at = self.locate(train, now)?.at;
-        turned_place(self.track.ground(), &self.trains.get(&train)?.model, at)
+        turned_place(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// The same for a train that would stand at a place, wherever it came from.
     #[must_use]
     pub fn turned_place_at(&self, place: Position) -> Option<Position> {
-        turned_as_it_lies(self.track.ground(), place)
+        turned_as_it_lies(self.track.context(), place)
     }
 
     /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads
     /// there.
     #[must_use]
     pub fn way_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<WayPoint> {
-        let way = way_to(self.track.ground(), &self.trains.get(&train)?.model, from, to)?;
+        let way = way_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
         Some(WayPoint { node: from, way })
     }
 }
 
 impl DrivenTrain {
     /// Sets another limit, or none.
-    pub(super) fn set_limit(&mut self, ground: Ground<'_>, now: Timestamp, limit: Option<WayPoint>) {
+    pub(super) fn set_limit(&mut self, context: TrackContext<'_>, now: Timestamp, limit: Option<WayPoint>) {
         self.limit = limit;
-        self.expect_limit(ground, now);
+        self.expect_limit(context, now);
     }
 
     /// The train was put somewhere or turned around: whatever it was allowed before, it was not allowed from here.
-    pub(super) fn limit_here(&mut self, ground: Ground<'_>, now: Timestamp) {
+    pub(super) fn limit_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
         if self.limit.is_some() {
-            self.limit = self.located(ground, now).map(|located| located.at);
+            self.limit = self.located(context, now).map(|located| located.at);
         }
     }
 
     /// The train has come to a contact. Where no way leads from there to the limit it is somewhere else than it should
     /// be, and the limit is here.
-    pub(super) fn count_limit_from(&mut self, ground: Ground<'_>, node: NodeId) {
+    pub(super) fn count_limit_from(&mut self, context: TrackContext<'_>, node: NodeId) {
         if let Some(limit) = self.limit {
-            let counted = counted_from(ground, &self.model, limit, node);
+            let counted = counted_from(context, &self.model, limit, node);
             self.limit = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
         }
     }

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::ids::NodeId;
 use crate::track::{Hop, Zone};
 
@@ -25,7 +25,7 @@ impl<'g> RestrictedWay<'g> {
     /// What is restricted behind a node and ahead of it, so far each (m), as the turnouts lie; the ways behind first. Where
     /// nobody knows how a turnout ahead lies, what is restricted on either leg.
     pub(super) fn about(
-        ground: Ground<'g>,
+        context: TrackContext<'g>,
         model: &MotionModel,
         node: NodeId,
         behind: f64,
@@ -33,26 +33,26 @@ impl<'g> RestrictedWay<'g> {
     ) -> Vec<Self> {
         let mut found = Vec::new();
         let mut at = 0.0;
-        for hop in ground.hops_ahead(node.reverse()).take(MOST_HOPS) {
+        for hop in context.hops_ahead(node.reverse()).take(MOST_HOPS) {
             if at > behind {
                 break;
             }
-            at += add(&mut found, ground, model, &hop, at);
+            at += add(&mut found, context, model, &hop, at);
         }
         for way in &mut found {
             (way.from, way.to) = (-way.to, -way.from);
         }
         found.reverse();
         let (mut at, mut end) = (0.0, node);
-        for hop in ground.hops_ahead(node).take(MOST_HOPS) {
+        for hop in context.hops_ahead(node).take(MOST_HOPS) {
             if at > ahead {
                 return found;
             }
-            at += add(&mut found, ground, model, &hop, at);
+            at += add(&mut found, context, model, &hop, at);
             end = hop.to;
         }
-        for hop in ground.layout.open_hops_from(end, ground.turnouts) {
-            add(&mut found, ground, model, &hop, at);
+        for hop in context.layout.open_hops_from(end, context.turnouts) {
+            add(&mut found, context, model, &hop, at);
         }
         found
     }
@@ -61,20 +61,20 @@ impl<'g> RestrictedWay<'g> {
 /// Adds the restricted edges of a hop that begins so far ahead (m); returns how long the train feels the hop.
 fn add<'g>(
     found: &mut Vec<RestrictedWay<'g>>,
-    ground: Ground<'g>,
+    context: TrackContext<'g>,
     model: &MotionModel,
     hop: &Hop<'g>,
     begins: f64,
 ) -> f64 {
-    let felt = model.length(ground.sections, hop)[0].as_m();
+    let felt = model.length(context.sections, hop)[0].as_m();
     let surveyed = hop.length.as_m();
     let scale = if surveyed > 0.0 { felt / surveyed } else { 1.0 };
     let mut along = begins;
     for id in hop.edges {
-        let Some(edge) = ground.layout.edge(*id) else { continue };
+        let Some(edge) = context.layout.edge(*id) else { continue };
         let (from, to) = (along, along + edge.length.as_m() * scale);
         along = to;
-        let Some(zone) = ground.layout.zone(*id) else { continue };
+        let Some(zone) = context.layout.zone(*id) else { continue };
         match found.last_mut() {
             Some(last) if last.zone == zone && (from - last.to).abs() <= TOUCHING => last.to = to,
             _ => found.push(RestrictedWay { zone, from, to }),

@@ -1,7 +1,7 @@
 //! Where a train is once it has turned around: its shoe's other end leads.
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::{Ground, Located, WayPoint, place_of, way_to};
+use crate::estimation::{Located, TrackContext, WayPoint, place_of, way_to};
 use crate::track::Position;
 use crate::units::Length;
 
@@ -15,32 +15,36 @@ const SHOE_DOUBT: Length = Length::from_mm(12.0);
 /// node behind it, whatever is there: how turnouts further away lie makes no difference then. `None` where the way back
 /// is not known, or does not lead to where the train stands.
 pub(super) fn turned(
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     model: &MotionModel,
     located: Located,
 ) -> Option<(WayPoint, Length)> {
-    let leading = turned_place(ground, model, located.at)?;
-    let behind = ground.layout.edge(leading.edge)?.from;
-    let way = way_to(ground, model, behind, leading)?;
+    let leading = turned_place(context, model, located.at)?;
+    let behind = context.layout.edge(leading.edge)?.from;
+    let way = way_to(context, model, behind, leading)?;
     let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DOUBT.as_m()));
     Some((WayPoint { node: behind, way }, uncertainty))
 }
 
 /// Where the leading end of the pickup is once a train at rest has turned around.
-pub(super) fn turned_place(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
-    ground.layout.reversed(trailing_place(ground, model, at)?)
+pub(super) fn turned_place(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
+    context.layout.reversed(trailing_place(context, model, at)?)
 }
 
 /// Where the trailing end of the pickup is, facing as its leading end does: back along the way that the train came, over
 /// points that may lie for another leg by now, or lay for it all the time and gave way.
-pub(super) fn trailing_place(ground: Ground<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
+pub(super) fn trailing_place(
+    context: TrackContext<'_>,
+    model: &MotionModel,
+    at: WayPoint,
+) -> Option<Position> {
     if at.way >= SHOE {
-        return place_of(ground, model, WayPoint { way: at.way - SHOE, ..at });
+        return place_of(context, model, WayPoint { way: at.way - SHOE, ..at });
     }
-    ground.layout.reversed(turned_as_it_lies(ground, place_of(ground, model, at)?)?)
+    context.layout.reversed(turned_as_it_lies(context, place_of(context, model, at)?)?)
 }
 
 /// The same for a train that would stand at a place, wherever it came from.
-pub(super) fn turned_as_it_lies(ground: Ground<'_>, place: Position) -> Option<Position> {
-    ground.layout.advance(ground.layout.reversed(place)?, SHOE, ground.turnouts).ok()
+pub(super) fn turned_as_it_lies(context: TrackContext<'_>, place: Position) -> Option<Position> {
+    context.layout.advance(context.layout.reversed(place)?, SHOE, context.turnouts).ok()
 }

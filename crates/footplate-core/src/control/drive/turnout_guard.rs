@@ -3,7 +3,7 @@
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use crate::estimation::{Ground, place_of};
+use crate::estimation::{TrackContext, place_of};
 use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{NodeKind, Position};
@@ -25,43 +25,48 @@ const AT_NODE: Length = Length::from_mm(1e-6);
 /// A train that is on a turnout as far as is known, or will be before it has been thrown.
 pub(super) fn train_on(
     trains: &BTreeMap<TrainId, DrivenTrain>,
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     now: Timestamp,
     turnout: TurnoutId,
 ) -> Option<TrainId> {
-    let nodes = nodes_of_turnout(ground, turnout)?;
-    let on_it =
-        |train: &&DrivenTrain| nodes_under(ground, train, now).iter().any(|(under, _)| nodes.contains(under));
+    let nodes = nodes_of_turnout(context, turnout)?;
+    let on_it = |train: &&DrivenTrain| {
+        nodes_under(context, train, now).iter().any(|(under, _)| nodes.contains(under))
+    };
     trains.values().find(on_it).map(DrivenTrain::id)
 }
 
 /// The turnouts that a train is on, or will be before they have been thrown.
-pub(super) fn turnouts_under(ground: Ground<'_>, train: &DrivenTrain, now: Timestamp) -> BTreeSet<TurnoutId> {
-    let turnout_at = |node| match ground.layout.node(node)?.kind {
+pub(super) fn turnouts_under(
+    context: TrackContext<'_>,
+    train: &DrivenTrain,
+    now: Timestamp,
+) -> BTreeSet<TurnoutId> {
+    let turnout_at = |node| match context.layout.node(node)?.kind {
         NodeKind::Branch(turnout) | NodeKind::Merge(turnout) => Some(turnout),
         _ => None,
     };
-    nodes_under(ground, train, now).into_iter().filter_map(|(node, _)| turnout_at(node)).collect()
+    nodes_under(context, train, now).into_iter().filter_map(|(node, _)| turnout_at(node)).collect()
 }
 
 /// The nodes that a train is on, or will be soon, seen in either direction: it may come from the toe or from a leg.
-fn nodes_under(ground: Ground<'_>, train: &DrivenTrain, now: Timestamp) -> Vec<(NodeId, Length)> {
+fn nodes_under(context: TrackContext<'_>, train: &DrivenTrain, now: Timestamp) -> Vec<(NodeId, Length)> {
     let mut under = Vec::new();
-    let located = train.located(ground, now);
-    let place = located.and_then(|located| place_of(ground, &train.model, located.at));
+    let located = train.located(context, now);
+    let place = located.and_then(|located| place_of(context, &train.model, located.at));
     let (Some(located), Some(place)) = (located, place) else { return under };
     let [ahead, behind] = train.reach.map(|reach| reach + located.uncertainty * CERTAIN);
-    nodes_within(ground, place, (ahead + located.speed * THROWING).max(behind), &mut under);
-    if let Some(back) = ground.layout.reversed(place) {
-        nodes_within(ground, back, behind, &mut under);
+    nodes_within(context, place, (ahead + located.speed * THROWING).max(behind), &mut under);
+    if let Some(back) = context.layout.reversed(place) {
+        nodes_within(context, back, behind, &mut under);
     }
     under
 }
 
 /// Adds the nodes ahead of a place that are no further than a limit, over turnouts that lie right or are unknown, each
 /// with how far it is from there.
-fn nodes_within(ground: Ground<'_>, from: Position, limit: Length, found: &mut Vec<(NodeId, Length)>) {
-    let Some(edge) = ground.layout.edge(from.edge) else { return };
+fn nodes_within(context: TrackContext<'_>, from: Position, limit: Length, found: &mut Vec<(NodeId, Length)>) {
+    let Some(edge) = context.layout.edge(from.edge) else { return };
     let begin = found.len();
     let mut open = alloc::vec![(edge.to, edge.length - from.offset)];
     if from.offset <= AT_NODE {
@@ -73,9 +78,9 @@ fn nodes_within(ground: Ground<'_>, from: Position, limit: Length, found: &mut V
             continue;
         }
         found.push((node, way));
-        for id in ground.layout.ways(node).edges() {
-            if let Some(next) = ground.layout.edge(id)
-                && ground.layout.needs_of(id).all(|need| ground.turnouts.allow(need))
+        for id in context.layout.ways(node).edges() {
+            if let Some(next) = context.layout.edge(id)
+                && context.layout.needs_of(id).all(|need| context.turnouts.allow(need))
             {
                 open.push((next.to, way + next.length));
             }

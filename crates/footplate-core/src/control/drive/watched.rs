@@ -1,7 +1,7 @@
 //! What somebody who watches over a driver asks of it.
 
 use crate::calibration::motion::MotionFit;
-use crate::estimation::{Ground, PassedContact};
+use crate::estimation::{PassedContact, TrackContext};
 use crate::ids::{NodeId, SensorId, TrainId};
 use crate::time::Timestamp;
 use crate::units::Length;
@@ -12,31 +12,31 @@ impl Driver {
     /// What is believed of where a train is was wrong: from now on nobody knows.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.attribution.forget(train);
-        let ground = self.track.ground();
+        let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
             train.locator.lose();
             train.passages.forget();
             train.seen();
-            train.expect_next(ground, now);
+            train.expect_next(context, now);
         }
         self.wish(now);
     }
 
     /// What the trains move on.
-    pub(crate) const fn ground(&self) -> Ground<'_> {
-        self.track.ground()
+    pub(crate) const fn context(&self) -> TrackContext<'_> {
+        self.track.context()
     }
 
     /// The contact that a train comes to next if it goes on, as the turnouts lie, whether it moves or not.
     #[must_use]
     pub fn contact_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let located = self.locate(train, now)?;
-        let ground = self.track.ground();
+        let context = self.track.context();
         let model = self.model(train)?;
         let mut way = Length::ZERO;
-        let hops = ground.hops_ahead(located.at.node).take(ground.layout.nodes().len());
+        let hops = context.hops_ahead(located.at.node).take(context.layout.nodes().len());
         for hop in hops {
-            way += model.length(ground.sections, &hop)[0];
+            way += model.length(context.sections, &hop)[0];
             if way > located.at.way {
                 return hop.sensor;
             }
@@ -47,9 +47,9 @@ impl Driver {
     /// The way from one node to the contact that is next behind it, as a train feels it; `None` if the other one is not.
     #[must_use]
     pub fn felt_hop(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
-        let ground = self.track.ground();
-        let hop = ground.hop_from(from).filter(|hop| hop.to == to)?;
-        Some(self.model(train)?.length(ground.sections, &hop)[0])
+        let context = self.track.context();
+        let hop = context.hop_from(from).filter(|hop| hop.to == to)?;
+        Some(self.model(train)?.length(context.sections, &hop)[0])
     }
 
     /// The node of the contact that a train passed.

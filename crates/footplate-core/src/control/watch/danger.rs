@@ -125,8 +125,8 @@ impl Watchdog {
             .flatten()
             .collect();
         let limit = self.driver.locate(train, now).and_then(|located| {
-            let ground = self.driver.ground();
-            let hops = ground.hops_ahead(located.at.node).take(layout.nodes().len());
+            let context = self.driver.context();
+            let hops = context.hops_ahead(located.at.node).take(layout.nodes().len());
             let edges = hops.flat_map(|hop| hop.edges.iter().copied());
             let blocked = edges.into_iter().find(|edge| taken.contains(&rails(*edge)))?;
             let begin = Position { edge: blocked, offset: Length::ZERO };

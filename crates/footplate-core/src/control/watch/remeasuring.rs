@@ -111,9 +111,9 @@ impl Watchdog {
 
     /// A place shortly before a contact, behind the second one from here on.
     fn target_short_of_contact(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
-        let ground = self.driver.ground();
+        let context = self.driver.context();
         let from = self.driver.locate(train, now)?.at.node;
-        let hops = ground.hops_ahead(from).skip(2).take(HOPS_TO_STOP);
+        let hops = context.hops_ahead(from).skip(2).take(HOPS_TO_STOP);
         let mut hops = hops.filter(|hop| hop.sensor.is_some() && hop.length > 2.0 * SHORT_OF);
         hops.next().map(|hop| Landmark { node: hop.from, offset: hop.length + -SHORT_OF })
     }

@@ -6,7 +6,7 @@ use footplate_core::calibration::SectionIndex;
 use footplate_core::control::{
     DriveNotice, Driver, Finished, Order, OrderId, PlannedStop, Refusal, StopOrder,
 };
-use footplate_core::estimation::{DueContact, Ground, PassedContact};
+use footplate_core::estimation::{DueContact, PassedContact, TrackContext};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -99,12 +99,12 @@ impl<'l> Tour<'l> {
         // To speed up takes about as long as to stop, and an even run before the stop makes it better.
         let mut least = at.way + model.stop(step, Approach::Below).distance * 2.5;
         for _ in 0..TRIES {
-            let ground = Ground {
+            let context = TrackContext {
                 layout: self.layout,
                 sections: &self.sections,
                 turnouts: self.driver.machine().turnouts(),
             };
-            let target = target_ahead(dice, ground, at.node, least)?;
+            let target = target_ahead(dice, context, at.node, least)?;
             let order = StopOrder { step: Some(step), ..StopOrder::at(self.train, target) };
             match self.order(now, Order::Stop(order)) {
                 Ok(id) => return Some((id, target)),

@@ -1,6 +1,6 @@
 //! Where the demo asks trains to stop: anywhere on their way, drawn from the seed.
 
-use footplate_core::estimation::Ground;
+use footplate_core::estimation::TrackContext;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, NodeId, SpeedStep};
 
@@ -49,13 +49,13 @@ impl Dice {
 /// A place on the way ahead of a train that is on its way from a node, at least `least` beyond that node.
 pub(super) fn target_ahead(
     dice: &mut Dice,
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     from: NodeId,
     least: Length,
 ) -> Option<Landmark> {
     let mut way = Length::ZERO;
     let mut places: Vec<(NodeId, Length)> = Vec::new();
-    for hop in ground.hops_ahead(from).take(LOOK_AHEAD) {
+    for hop in context.hops_ahead(from).take(LOOK_AHEAD) {
         if way >= least && hop.sensor.is_some() && hop.length > PAST + BEFORE {
             places.push((hop.from, hop.length));
         }
@@ -96,16 +96,16 @@ mod tests {
         for (turnout, _) in layout.turnouts() {
             turnouts.set(turnout, Leg::Straight);
         }
-        let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         let from = layout.node_named("C13").unwrap();
         let mut dice = Dice::new(7);
         for _ in 0..200 {
-            let target = target_ahead(&mut dice, ground, from, Length::from_m(1.0)).unwrap();
-            let hop = ground.hop_from(target.node).unwrap();
+            let target = target_ahead(&mut dice, context, from, Length::from_m(1.0)).unwrap();
+            let hop = context.hop_from(target.node).unwrap();
             assert!(layout.sensor_at(target.node).is_some());
             assert!(target.offset >= PAST && target.offset < hop.length);
         }
-        assert!(target_ahead(&mut dice, ground, from, Length::from_m(900.0)).is_none());
+        assert!(target_ahead(&mut dice, context, from, Length::from_m(900.0)).is_none());
     }
 
     #[test]

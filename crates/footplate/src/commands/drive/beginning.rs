@@ -1,4 +1,4 @@
-//! How a session of driving begins, as it is kept: all that its conductor is made of.
+//! How a session of driving begins, as it is kept: all that its script runner is made of.
 
 use anyhow::Context;
 use footplate_core::calibration::motion::{MotionFit, MotionModel};
@@ -7,13 +7,13 @@ use footplate_core::track::{Leg, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId, TurnoutId};
 use serde::{Deserialize, Serialize};
 
-use super::conductor::{Conductor, Giver};
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::step;
+use super::script_runner::{Giver, ScriptRunner};
 use crate::commands::written_layout::WrittenLayout;
 
-/// All that a [`Conductor`] is made of. A session and its replay both make theirs of it.
+/// All that a [`ScriptRunner`] is made of. A session and its replay both make theirs of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct DriveBeginning {
     /// The text of the layout.
@@ -57,11 +57,11 @@ impl DriveBeginning {
         &self.layout
     }
 
-    /// The conductor that begins so.
+    /// The script runner that begins so.
     ///
     /// # Errors
-    /// What makes no conductor: the text of the layout, or a line of the script.
-    pub(crate) fn conductor(self) -> anyhow::Result<Conductor> {
+    /// What makes no script runner: the text of the layout, or a line of the script.
+    pub(crate) fn script_runner(self) -> anyhow::Result<ScriptRunner> {
         let layout = WrittenLayout::of("the layout of the session", self.layout)?.layout;
         let highest = self.models.iter().map(|model| (model.train(), model.highest()));
         let highest: std::collections::BTreeMap<TrainId, SpeedStep> = highest.collect();
@@ -73,10 +73,11 @@ impl DriveBeginning {
         }
         let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
         self.models.into_iter().for_each(|model| driver.add_train(model));
-        let mut conductor = Conductor::new(driver, Learning::new(&layout, self.fits), self.giver, steps);
+        let mut script_runner =
+            ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.giver, steps);
         if self.is_complete {
-            conductor.complete();
+            script_runner.complete();
         }
-        Ok(conductor)
+        Ok(script_runner)
     }
 }

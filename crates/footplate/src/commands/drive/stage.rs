@@ -10,7 +10,7 @@ use footplate_core::control::{LinkNews, Machine as _};
 use footplate_core::{Command, Timestamp};
 use footplate_wire::{CommandError, LinkNotice};
 
-use super::conductor::Conductor;
+use super::script_runner::ScriptRunner;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter};
@@ -41,7 +41,7 @@ pub(super) struct Stage {
     lines: Option<Receiver<String>>,
     screen: Screen,
     watched: Option<Watched>,
-    /// What was heard of the line since the conductor was told last.
+    /// What was heard of the line since the script runner was told last.
     news: Vec<LinkNews>,
     /// What whoever knows the truth should look at before anything moves on.
     pub(super) for_referee: Vec<Spoken>,
@@ -57,11 +57,11 @@ struct Watched {
 }
 
 impl Watched {
-    fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
         while let Some(asked) = self.board.next_asked() {
-            let mistake = conductor.machine().mistake(&asked.line);
+            let mistake = script_runner.machine().mistake(&asked.line);
             if mistake.is_none() {
-                conductor.handle_word(now, &Input::Line(asked.line.clone()));
+                script_runner.handle_word(now, &Input::Line(asked.line.clone()));
             }
             asked.answer(mistake.map_or(Answer::Taken, Answer::Refused));
         }
@@ -69,7 +69,7 @@ impl Watched {
         if elapsed >= self.painted + BETWEEN_PICTURES {
             // Counted from when it was due: a look that came late does not make all others late.
             self.painted = (self.painted + BETWEEN_PICTURES).max(elapsed.saturating_sub(BETWEEN_PICTURES));
-            conductor.machine().show(&mut self.painter, now);
+            script_runner.machine().show(&mut self.painter, now);
         }
     }
 }
@@ -130,7 +130,7 @@ impl Stage {
     }
 }
 
-impl Attendant<Witnessed<Conductor>> for Stage {
+impl Attendant<Witnessed<ScriptRunner>> for Stage {
     fn hear(&mut self, now: Timestamp, notice: Spoken) {
         match notice {
             Spoken::Line { text, status } => {
@@ -166,23 +166,23 @@ impl Attendant<Witnessed<Conductor>> for Stage {
         self.alarm(now, &Alarm::not_sent(&why));
     }
 
-    fn attend(&mut self, now: Timestamp, conductor: &mut Witnessed<Conductor>) -> Wish {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) -> Wish {
         for news in std::mem::take(&mut self.news) {
-            conductor.handle_word(now, &Input::Link(news));
+            script_runner.handle_word(now, &Input::Link(news));
         }
         while let Some(lines) = &self.lines {
             match lines.try_recv() {
-                Ok(line) => conductor.handle_word(now, &Input::Line(line)),
+                Ok(line) => script_runner.handle_word(now, &Input::Line(line)),
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => {
                     self.lines = None;
-                    conductor.handle_word(now, &Input::NoMoreLines);
-                    conductor.handle_timeout(now);
+                    script_runner.handle_word(now, &Input::NoMoreLines);
+                    script_runner.handle_timeout(now);
                 }
             }
         }
         if let Some(watched) = &mut self.watched {
-            watched.attend(now, conductor);
+            watched.attend(now, script_runner);
         }
         if self.is_over || !self.for_referee.is_empty() { Wish::Finish } else { Wish::GoOn }
     }

@@ -12,7 +12,7 @@ use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_la
 use super::session::read;
 use crate::commands::calibrate::{CalibrationBeginning, calibration_line};
 use crate::commands::demo::TourBeginning;
-use crate::commands::drive::{Conductor, DriveBeginning, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, Board, LayoutPicture, Painter, Shadow, TrainPassed};
 use crate::witness::{Input, Listener};
@@ -85,8 +85,8 @@ impl Walked {
             DriveBeginning::KIND => {
                 let beginning: DriveBeginning = read(stored)?;
                 self.draws(beginning.layout())?;
-                let look = |machine: &Conductor, painter: &mut Painter, now| machine.show(painter, now);
-                self.tell(&mut beginning.conductor()?, trace, Painter::new, look, of_session);
+                let look = |machine: &ScriptRunner, painter: &mut Painter, now| machine.show(painter, now);
+                self.tell(&mut beginning.script_runner()?, trace, Painter::new, look, of_session);
             }
             TourBeginning::KIND => {
                 let beginning: TourBeginning = read(stored)?;

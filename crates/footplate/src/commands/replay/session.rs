@@ -29,7 +29,7 @@ pub(super) fn rehearse(
     match stored.kind.as_str() {
         DriveBeginning::KIND => {
             let beginning: DriveBeginning = read(stored)?;
-            Ok(rehear(&mut beginning.conductor()?, trace, extent))
+            Ok(rehear(&mut beginning.script_runner()?, trace, extent))
         }
         CalibrationBeginning::KIND => {
             let beginning: CalibrationBeginning = read(stored)?;

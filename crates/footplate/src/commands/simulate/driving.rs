@@ -13,7 +13,7 @@ use std::num::NonZeroUsize;
 use clap::Args;
 use footplate_core::TimeSpan;
 use footplate_core::calibration::SectionIndex;
-use footplate_core::estimation::Ground;
+use footplate_core::estimation::TrackContext;
 use footplate_core::track::Layout;
 use footplate_sim::LawFamily;
 use footplate_store::layout_named;
@@ -121,8 +121,8 @@ fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow
     // What is asked differs from train to train, and is the same whoever drives.
     let asked = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
     let way: Vec<_> = ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
-    let ground = Ground { layout, sections: &sections, turnouts: &calibrated.turnouts };
-    let knowing = known_train::known(ground, line.station.world().truth(), TRAIN, &way)?;
+    let context = TrackContext { layout, sections: &sections, turnouts: &calibrated.turnouts };
+    let knowing = known_train::known(context, line.station.world().truth(), TRAIN, &way)?;
     let mut by = Vec::new();
     for model in [calibrated.model.clone(), knowing] {
         let mut world = line.clone();

@@ -9,7 +9,7 @@
 use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::estimation::{Ground, WayPoint};
+use crate::estimation::{TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::kinematics::{MinimumJerk, Motion, SpeedLaw, Transit};
@@ -222,7 +222,7 @@ impl DrivenTrain {
     /// What can be planned with: the steps from which it stops surely, and speeds between its slowest and its fastest.
     pub(super) fn means(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         at: WayPoint,
         usable: &[SpeedStep],
@@ -241,7 +241,7 @@ impl DrivenTrain {
             }
         };
         let last: Vec<FinalStep> = self.sure_steps(usable).into_iter().map(stop_from).collect();
-        let slow = self.slow_parts(ground, now, at);
+        let slow = self.slow_parts(context, now, at);
         let least = last.iter().map(|last| last.speed).fold(f64::INFINITY, f64::min);
         let is_slower =
             |step: &SpeedStep| !slow.is_empty() && (CREEPING.as_m_per_s()..least).contains(&speed(step));
@@ -261,8 +261,8 @@ impl DrivenTrain {
     }
 
     /// Where zones on the way to a target allow less, and what the step that keeps to them runs at, as m before the target.
-    fn slow_parts(&self, ground: Ground<'_>, now: Timestamp, at: WayPoint) -> Vec<SlowPart> {
-        let restricted = self.restricted_until(ground, now, at);
+    fn slow_parts(&self, context: TrackContext<'_>, now: Timestamp, at: WayPoint) -> Vec<SlowPart> {
+        let restricted = self.restricted_until(context, now, at);
         let [ahead, behind] = self.reach.map(Length::as_m);
         let parts = restricted.into_iter().map(|(way, step)| {
             let speed = self.model.steady_speed(step, Approach::Below).as_m_per_s();

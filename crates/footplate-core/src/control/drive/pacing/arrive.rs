@@ -14,7 +14,7 @@ use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
-use crate::estimation::{Ground, Located, WayPoint};
+use crate::estimation::{Located, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
@@ -65,14 +65,14 @@ impl Arriving {
     /// Where it should be; `None` when the way does not lead to the target any more.
     pub(super) fn reference(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         model: &MotionModel,
         now: Timestamp,
         node: NodeId,
     ) -> Option<Reference> {
         let (at, plan) = (self.destination.at?, self.plan?);
         if at.node != node {
-            self.destination.at = counted_from(ground, model, at, node);
+            self.destination.at = counted_from(context, model, at, node);
         }
         let zero = self.destination.at?.way.as_m() - plan.begins.left;
         let since = now - self.begins();
@@ -86,19 +86,19 @@ impl DrivenTrain {
     /// Takes an order to come to rest at a place in time.
     pub(in crate::control::drive) fn arrive(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         target: Landmark,
         within: TimeSpan,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        ground.layout.locate(target, ground.turnouts).map_err(Refusal::Place)?;
-        let stands = self.stands(ground, now);
+        context.layout.locate(target, context.turnouts).map_err(Refusal::Place)?;
+        let stands = self.stands(context, now);
         if !stands && self.told == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        let located = self.located(ground, now).filter(|_| self.unseen().is_none() || !stands);
+        let located = self.located(context, now).filter(|_| self.unseen().is_none() || !stands);
         let located = located.ok_or(Refusal::Lost { train: self.id() })?;
         let mut destination = Destination {
             named: Some(target),
@@ -108,13 +108,13 @@ impl DrivenTrain {
             next_round: false,
             in_time: None,
         };
-        let mut at = self.waypoint(ground, now, &located, &destination, stands);
+        let mut at = self.waypoint(context, now, &located, &destination, stands);
         if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
             destination.next_round = true;
-            at = self.waypoint(ground, now, &located, &destination, stands);
+            at = self.waypoint(context, now, &located, &destination, stands);
         }
         let at = at?;
-        let round = lap(ground, &self.model, at.node);
+        let round = lap(context, &self.model, at.node);
         let (mut latest, mut unreached) = (None, None);
         let rounds = if round.is_some() { MOST_ROUNDS } else { 0 };
         for rounds in 0..=rounds {
@@ -122,13 +122,13 @@ impl DrivenTrain {
             destination.at = Some(WayPoint { way: at.way + further, ..at });
             destination.in_time = Some(now + within);
             let found = if stands {
-                self.begun_at_rest(ground, now, &located, destination, within)
+                self.begun_at_rest(context, now, &located, destination, within)
             } else {
-                self.on_the_run(ground, now, destination, within)
+                self.on_the_run(context, now, destination, within)
             };
             match found {
                 Ok(found) => {
-                    self.begin_arrival(ground, now, order, found, out);
+                    self.begin_arrival(context, now, order, found, out);
                     return Ok(());
                 }
                 Err(Refusal::TooSlow { latest: found, .. }) => latest = latest.or(Some(found)),
@@ -140,7 +140,7 @@ impl DrivenTrain {
                 Err(why) => return Err(why),
             }
         }
-        let target = ground.layout.display(target).to_string();
+        let target = context.layout.display(target).to_string();
         Err(match latest {
             Some(latest) => Refusal::TooSlow { target, latest },
             None => unreached.unwrap_or(Refusal::OutOfReach { target }),
@@ -149,7 +149,7 @@ impl DrivenTrain {
 
     fn begin_arrival(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         Found { arriving, by }: Found,
@@ -161,35 +161,35 @@ impl DrivenTrain {
         out.say(DriveNotice::Arrives(PlannedArrival { order, train, by, starts, profile }));
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Arrive(Box::new(arriving)), self.usable_steps(), now));
-        self.goes_by_plan(ground, now, out);
+        self.goes_by_plan(context, now, out);
     }
 
     /// From a train that runs.
     fn on_the_run(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         destination: Destination,
         within: TimeSpan,
     ) -> Result<Found, Refusal> {
         let lost = || Refusal::Lost { train: self.id() };
-        let (at, mut outlook) = (destination.at.ok_or_else(lost)?, self.locator.outlook().ok_or_else(lost)?);
-        let [place, speed] = outlook.place_and_speed(&self.model, outlook.seconds(now));
+        let (at, mut rollout) = (destination.at.ok_or_else(lost)?, self.locator.rollout().ok_or_else(lost)?);
+        let [place, speed] = rollout.place_and_speed(&self.model, rollout.seconds(now));
         let begins = Beginning { after: 0.0, left: at.way.as_m() - place, speed };
-        let means = self.means(ground, now, at, &self.usable_steps(), CREEPING);
+        let means = self.means(context, now, at, &self.usable_steps(), CREEPING);
         match means.plan(begins, within.as_s()) {
             Some(plan) => {
                 let arriving = Arriving { destination, plan: Some(plan), since: now, start: None };
                 Ok(Found { arriving, by: now + within })
             }
-            None => Err(self.out_of_time(ground, &means, begins, within, &destination)),
+            None => Err(self.out_of_time(context, &means, begins, within, &destination)),
         }
     }
 
     /// From a train at rest, which may start later.
     fn begun_at_rest(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         located: &Located,
         destination: Destination,
@@ -197,9 +197,9 @@ impl DrivenTrain {
     ) -> Result<Found, Refusal> {
         let usable = self.usable_steps();
         let at = destination.at.ok_or(Refusal::Lost { train: self.id() })?;
-        let means = self.means(ground, now, at, &usable, UNHURRIED);
+        let means = self.means(context, now, at, &usable, UNHURRIED);
         let left = (at.way - located.at.way).as_m();
-        let allowed = self.fastest_allowed(ground, now);
+        let allowed = self.fastest_allowed(context, now);
         let may_start = |step: &SpeedStep| allowed.is_none_or(|allowed| *step <= allowed);
         let starts: Vec<SpeedStep> = usable.iter().copied().filter(may_start).collect();
         let step_for = |within: f64| self.nearest_step(&starts, START_LOSS * left / within);
@@ -222,7 +222,7 @@ impl DrivenTrain {
         }
         // One step and the stop, from one that is sure or slower: on a short way that is steady by then where a fast one is not.
         let stands = self.model.standing_times();
-        let slowest = self.restricted_until(ground, now, at).into_iter().map(|(_, step)| step).min();
+        let slowest = self.restricted_until(context, now, at).into_iter().map(|(_, step)| step).min();
         let creeps = |step: SpeedStep| self.model.steady_speed(step, Approach::Below) < CREEPING;
         let sure = || means.last.iter().map(|last| last.step);
         let fastest = sure().max().into_iter().chain(slowest).min();
@@ -231,7 +231,7 @@ impl DrivenTrain {
             fastest.is_none_or(|fastest| *step <= fastest) && (is_sure || !creeps(*step))
         };
         let steps = starts.iter().copied().filter(may_run);
-        let runs = steps.filter_map(|step| match self.short_run(ground, now, at, step, &destination) {
+        let runs = steps.filter_map(|step| match self.short_run(context, now, at, step, &destination) {
             CommandTime::At(stop, rest) => {
                 let stands = self.standing_time(&stands, [now + LINE_TIME, stop], step, &rest)?;
                 Some((step, stands - now, spread(&rest)))
@@ -247,7 +247,7 @@ impl DrivenTrain {
         }
         let quickest = runs.iter().map(|(_, takes, _)| *takes).min();
         let soonest = soonest.map(TimeSpan::from_s).into_iter().chain(quickest).min();
-        let target = name(ground, &destination);
+        let target = name(context, &destination);
         Err(match soonest {
             Some(earliest) => Refusal::TooSoon { target, earliest },
             None => Refusal::OutOfReach { target },
@@ -257,13 +257,13 @@ impl DrivenTrain {
     /// Why there is no plan, and which time would do.
     fn out_of_time(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         means: &Means,
         begins: Beginning,
         within: TimeSpan,
         destination: &Destination,
     ) -> Refusal {
-        let target = name(ground, destination);
+        let target = name(context, destination);
         match means.soonest(|_| Some(begins)) {
             Some(soonest) if soonest < within.as_s() => {
                 let latest = TimeSpan::from_s(means.latest(soonest, |_| Some(begins)));
@@ -282,16 +282,21 @@ impl DrivenTrain {
 
     /// Where a start leads that has settled.
     fn started(&self, now: Timestamp, step: SpeedStep, at: WayPoint) -> Option<Beginning> {
-        let mut outlook = self.locator.outlook()?;
+        let mut rollout = self.locator.rollout()?;
         let after = self.model.settles_within(SpeedStep::STAND, step).as_s();
-        let zero = outlook.seconds(now);
-        outlook.tell(&self.model, zero + (LINE_TIME + POLL_WAIT).as_s(), step);
-        let [place, speed] = outlook.place_and_speed(&self.model, zero + after);
+        let zero = rollout.seconds(now);
+        rollout.tell(&self.model, zero + (LINE_TIME + POLL_WAIT).as_s(), step);
+        let [place, speed] = rollout.place_and_speed(&self.model, zero + after);
         Some(Beginning { after, left: at.way.as_m() - place, speed })
     }
 
     /// Does what comes before the plan is followed, and after; says whether it is followed now.
-    pub(super) fn goes_by_plan(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) -> bool {
+    pub(super) fn goes_by_plan(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        out: &mut Outputs,
+    ) -> bool {
         let Some(task) = self.task else { return false };
         let Some(Pacing { pace: Pace::Arrive(arriving), look, .. }) = &mut self.pacing else {
             return true;
@@ -307,7 +312,7 @@ impl DrivenTrain {
             if arriving.plan.is_none() {
                 self.leave_to_stop(task, destination);
             }
-            self.tell_step(ground, now, step, out);
+            self.tell_step(context, now, step, out);
             return false;
         }
         if now < begins {
@@ -318,9 +323,9 @@ impl DrivenTrain {
             return true;
         }
         self.leave_to_stop(task, destination);
-        match self.step_in_time(ground, now, &destination) {
-            Some(step) => self.tell_step(ground, now, step, out),
-            None => self.plan(ground, now, out),
+        match self.step_in_time(context, now, &destination) {
+            Some(step) => self.tell_step(context, now, step, out),
+            None => self.plan(context, now, out),
         }
         false
     }
@@ -334,19 +339,19 @@ impl DrivenTrain {
     /// A contact was passed on the way: is the target still ahead?
     pub(super) fn count_target_from(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         node: NodeId,
         out: &mut Outputs,
     ) {
         let Some(Pacing { pace: Pace::Arrive(arriving), .. }) = &mut self.pacing else { return };
         let destination = arriving.destination;
-        let again = destination.at.and_then(|at| self.counted_again(ground, at, node, &destination));
+        let again = destination.at.and_then(|at| self.counted_again(context, at, node, &destination));
         match (again, &mut self.pacing) {
             (Some(at), Some(Pacing { pace: Pace::Arrive(arriving), .. })) => {
                 arriving.destination.at = Some(at);
             }
-            _ => self.give_up(now, self.no_way(ground, node, &destination), out),
+            _ => self.give_up(now, self.no_way(context, node, &destination), out),
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
-use crate::estimation::{Ground, WayPoint};
+use crate::estimation::{TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
@@ -108,7 +108,7 @@ impl DrivenTrain {
     /// Takes an order to follow.
     pub(in crate::control::drive) fn follow(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         (leader, gap): (TrainId, Gap),
@@ -117,7 +117,7 @@ impl DrivenTrain {
     ) -> Result<(), Refusal> {
         let ahead = others.get(&leader).ok_or(Refusal::UnknownTrain { train: leader })?;
         for train in [&*self, ahead] {
-            if train.located(ground, now).is_none() {
+            if train.located(context, now).is_none() {
                 return Err(Refusal::Lost { train: train.id() });
             }
         }
@@ -217,14 +217,14 @@ impl DrivenTrain {
     /// Where a follower should be; `None` while nobody knows where its leader is.
     pub(super) fn follow_reference(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         following: Following,
         node: NodeId,
         others: &Others,
     ) -> Option<Reference> {
-        let located = self.located(ground, now)?;
-        let past = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
+        let located = self.located(context, now)?;
+        let past = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
         let (mut late, mut behind) = (0.0, 0.0);
         let (mut train, mut following) = (self, following);
         // The first of all, by the sum of what is kept.
@@ -239,7 +239,7 @@ impl DrivenTrain {
                 None => break leader,
             }
         };
-        let line = LeadLine::of(ground, first, now, (node, past))?;
+        let line = LeadLine::of(context, first, now, (node, past))?;
         let speeds = [0.0, Reference::SPAN].map(|ahead| line.speed(ahead - late));
         Some(Reference::of(|ahead| line.place(ahead - late) - behind, speeds))
     }
@@ -248,34 +248,34 @@ impl DrivenTrain {
     /// from now on, on the follower's way. `None` if no way leads there.
     fn rear_of(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         leader: &Self,
         stopped: Timestamp,
     ) -> Option<WayPoint> {
-        let node = self.locator.outlook()?.node();
+        let node = self.locator.rollout()?.node();
         let seen = leader
             .passages
             .iter()
             .next_back()
             .map(|(node, _)| node)
-            .or(leader.locator.outlook().map(|outlook| outlook.node()))?;
-        let rest = leader.locator.rest_if_stopped(ground, &leader.model, stopped);
-        let rest = rest.filter(|_| !leader.is_in_doubt(ground, now));
+            .or(leader.locator.rollout().map(|rollout| rollout.node()))?;
+        let rest = leader.locator.rest_if_stopped(context, &leader.model, stopped);
+        let rest = rest.filter(|_| !leader.is_in_doubt(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
             let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(SHORTER).margin();
             surely.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
-        let between = way_between(ground, &self.model, node, from)?;
+        let between = way_between(context, &self.model, node, from)?;
         Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE })
     }
 
     /// Whether it may be elsewhere than where it is believed to be. Contacts fail thirty times as often as trains stall: one
     /// that was silent is no doubt of a train that was seen running before, and runs too fast to stall, until the next is late.
     /// Of one that creeps only the contact is sure that it came by last: it stalls any time, and the next is late long after.
-    fn is_in_doubt(&self, ground: Ground<'_>, now: Timestamp) -> bool {
-        let Some(located) = self.located(ground, now) else { return true };
+    fn is_in_doubt(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
+        let Some(located) = self.located(context, now) else { return true };
         let speed = self.model.steady_speed(self.told, Approach::Below);
         if self.unseen().is_none() {
             return self.told > SpeedStep::STAND && speed < CREEPS;
@@ -287,13 +287,14 @@ impl DrivenTrain {
 
     /// The fastest step that it could be told now and still stop before the rear of its leader in a while, if neither is told
     /// anything else until then; `None` if it is time to stand.
-    fn fastest_behind(&self, ground: Ground<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
+    fn fastest_behind(&self, context: TrackContext<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
         let later = now + FORESEEN;
-        let rear = self.rear_of(ground, now, leader, later)?;
+        let rear = self.rear_of(context, now, leader, later)?;
         let start = now + LINE_TIME + POLL_WAIT;
         let is_safe = |step: &SpeedStep| {
-            let rest = self.locator.rest_after_move(ground, &self.model, start, *step, later);
-            let beyond = rest.and_then(|rest| self.aimed_beyond(ground, &rest, rear, Aim::NotBeyond(NEARER)));
+            let rest = self.locator.rest_after_move(context, &self.model, start, *step, later);
+            let beyond =
+                rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
             beyond.is_some_and(|beyond| beyond <= Length::ZERO)
         };
         let runs = |step: &&SpeedStep| self.model.steady_speed(**step, Approach::Below) >= CREEPS;
@@ -303,7 +304,7 @@ impl DrivenTrain {
     /// Looks after the distance to the leader. Says whether the train may be paced now.
     pub(super) fn may_follow(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         others: &Others,
         out: &mut Outputs,
@@ -315,16 +316,16 @@ impl DrivenTrain {
             self.give_up(now, Refusal::UnknownTrain { train: leader }, out);
             return false;
         };
-        let rear = self.rear_of(ground, now, ahead, now);
-        let fastest = self.fastest_behind(ground, now, ahead);
+        let rear = self.rear_of(context, now, ahead, now);
+        let fastest = self.fastest_behind(context, now, ahead);
         let soon = now + LINE_TIME + TimeSpan::from_s(LOOK_AGAIN);
-        let stop_by = rear.and_then(|rear| self.last_stop_before(ground, now, rear));
+        let stop_by = rear.and_then(|rear| self.last_stop_before(context, now, rear));
         let is_free = rear.is_some_and(|rear| {
             if self.told > SpeedStep::STAND {
                 return fastest.is_some() && stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
             }
-            let rest = self.locator.rest_if_stopped(ground, &self.model, now);
-            let beyond = rest.and_then(|rest| self.beyond(ground, rest.at, rear));
+            let rest = self.locator.rest_if_stopped(context, &self.model, now);
+            let beyond = rest.and_then(|rest| self.beyond(context, rest.at, rear));
             ahead.told > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
         });
         let told = self.told;
@@ -337,7 +338,7 @@ impl DrivenTrain {
             following.is_held = false;
             let slower = fastest.filter(|step| *step < told);
             if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
-                self.tell_step(ground, now, step, out);
+                self.tell_step(context, now, step, out);
             }
             return slower.is_none();
         }
@@ -353,12 +354,17 @@ impl DrivenTrain {
 
     /// Whether a step may be told now: whether a stop that is told as soon as the line is free again would still end before
     /// the leader. Who gets slower always may.
-    pub(super) fn could_still_stop(&self, ground: Ground<'_>, now: Timestamp, step: SpeedStep) -> bool {
+    pub(super) fn could_still_stop(
+        &self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        step: SpeedStep,
+    ) -> bool {
         let Some(following) = self.followed().filter(|_| step > self.told) else { return true };
         let Some(rear) = following.rear else { return false };
         let start = now + LINE_TIME + POLL_WAIT;
-        let rest = self.locator.rest_after_move(ground, &self.model, start, step, start + UNDONE);
-        let beyond = rest.and_then(|rest| self.aimed_beyond(ground, &rest, rear, Aim::NotBeyond(NEARER)));
+        let rest = self.locator.rest_after_move(context, &self.model, start, step, start + UNDONE);
+        let beyond = rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
         beyond.is_some_and(|beyond| beyond <= Length::ZERO)
     }
 }

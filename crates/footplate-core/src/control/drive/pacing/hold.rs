@@ -6,7 +6,7 @@ use crate::control::drive::order::OrderId;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
@@ -30,12 +30,12 @@ impl Holding {
     /// Where it should be; `None` before there is a line, and when the way does not lead on from it any more.
     pub(super) fn reference(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         node: NodeId,
     ) -> Option<Reference> {
         if self.line?.node != node {
-            self.line = self.line?.counted_from(ground, node, now);
+            self.line = self.line?.counted_from(context, node, now);
         }
         let line = self.line?;
         let speed = line.speed.as_m_per_s();
@@ -47,7 +47,7 @@ impl DrivenTrain {
     /// Takes an order to hold a speed.
     pub(in crate::control::drive) fn hold(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         speed: Speed,
@@ -74,9 +74,9 @@ impl DrivenTrain {
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
         // Where zones are, it may have to slow down at any time, and what keeps it to them knows it as it was calibrated.
-        self.locator.repeat(ground.layout.zones().is_empty());
+        self.locator.repeat(context.layout.zones().is_empty());
         if step != self.told {
-            self.tell_step(ground, now, step, out);
+            self.tell_step(context, now, step, out);
         }
         Ok(())
     }
@@ -84,19 +84,19 @@ impl DrivenTrain {
     /// The first contact that is passed at a settled speed begins the line; from then on it is counted from every one.
     pub(super) fn begin_line(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         holding: &mut Holding,
         out: &mut Outputs,
     ) {
-        let Some(located) = self.located(ground, now) else { return };
+        let Some(located) = self.located(context, now) else { return };
         let node = located.at.node;
-        holding.line = holding.line.and_then(|line| line.counted_from(ground, node, now));
+        holding.line = holding.line.and_then(|line| line.counted_from(context, node, now));
         if holding.line.is_some() || now < holding.settled || self.is_restrained() {
             return;
         }
-        let way = SurveyedWay::ahead(ground, &self.model, node).of_felt(located.at.way.as_m());
+        let way = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
         let line = IdealLine { node, way: Length::from_m(way), time: now, speed: holding.speed };
         holding.line = Some(line);
         let IdealLine { way, time, speed, .. } = line;
@@ -106,15 +106,15 @@ impl DrivenTrain {
     /// How far it is ahead of its line, as far as is believed; `None` while there is none.
     pub(in crate::control::drive) fn ahead_of_line(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
     ) -> Option<Length> {
         let Pacing { pace: Pace::Hold(Holding { line: Some(line), .. }), .. } = self.paced()? else {
             return None;
         };
-        let at = self.located(ground, now)?.at;
-        let line = line.counted_from(ground, at.node, now)?;
-        let way = SurveyedWay::ahead(ground, &self.model, at.node).of_felt(at.way.as_m());
+        let at = self.located(context, now)?.at;
+        let line = line.counted_from(context, at.node, now)?;
+        let way = SurveyedWay::ahead(context, &self.model, at.node).of_felt(at.way.as_m());
         Some(Length::from_m(way - line.place(now)))
     }
 

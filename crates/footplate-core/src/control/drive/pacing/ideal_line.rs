@@ -1,6 +1,6 @@
 //! The straight line of a train that runs at one speed.
 
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::ids::NodeId;
 use crate::time::Timestamp;
 use crate::units::{Length, Speed};
@@ -27,16 +27,21 @@ impl IdealLine {
 
     /// The same line counted from another contact, for a train that is near it: one that was passed since, or one before
     /// if a report has turned out to be another train's. `None` if no way leads from one to the other.
-    pub(super) fn counted_from(self, ground: Ground<'_>, node: NodeId, now: Timestamp) -> Option<Self> {
+    pub(super) fn counted_from(
+        self,
+        context: TrackContext<'_>,
+        node: NodeId,
+        now: Timestamp,
+    ) -> Option<Self> {
         if node == self.node {
             // Once more if it has been round since.
-            let lap = surveyed_between(ground, node, node);
+            let lap = surveyed_between(context, node, node);
             let laps = lap.map_or(0.0, |lap| libm::round((self.place(now) / lap.as_m()).max(0.0)));
             let way = self.way - lap.unwrap_or(Length::ZERO) * laps;
             return Some(Self { way, ..self });
         }
-        let after = surveyed_between(ground, self.node, node).map(|between| self.way - between);
-        let before = surveyed_between(ground, node, self.node).map(|between| self.way + between);
+        let after = surveyed_between(context, self.node, node).map(|between| self.way - between);
+        let before = surveyed_between(context, node, self.node).map(|between| self.way + between);
         let off = |way: &Length| Self { way: *way, ..self }.place(now).abs();
         let way = after.into_iter().chain(before).min_by(|one, other| off(one).total_cmp(&off(other)))?;
         Some(Self { node, way, ..self })

@@ -10,7 +10,7 @@ use crate::control::drive::command_time::{CommandTime, command_time, spread};
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
-use crate::estimation::{Ground, Rest};
+use crate::estimation::{Rest, TrackContext};
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
 
@@ -32,7 +32,7 @@ impl DrivenTrain {
     /// Looks whether a train that will stop by itself should do so from another step to stand in time, and tells it.
     pub(in crate::control::drive) fn keep_time(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         out: &mut Outputs,
     ) {
@@ -44,15 +44,15 @@ impl DrivenTrain {
         if destination.in_time.is_none() || is_soon || !self.is_told() {
             return;
         }
-        if let Some(step) = self.step_in_time(ground, now, &destination) {
-            self.tell_step(ground, now, step, out);
+        if let Some(step) = self.step_in_time(context, now, &destination) {
+            self.tell_step(context, now, step, out);
         }
     }
 
     /// The step that it should be told now, if another is better than the one it has been told.
     pub(super) fn step_in_time(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         destination: &Destination,
     ) -> Option<SpeedStep> {
@@ -67,7 +67,7 @@ impl DrivenTrain {
         let others = steps.iter().filter(|step| about.contains(&step.get()) && **step != self.told);
         let stands = self.model.standing_times();
         let cost = |step: SpeedStep| {
-            let found = self.rest_from(ground, now, &stands, step, destination);
+            let found = self.rest_from(context, now, &stands, step, destination);
             found.map_or(f64::INFINITY, |(time, rest)| cost_of(by, time, &rest))
         };
         let as_it_is = cost(self.told);
@@ -79,7 +79,7 @@ impl DrivenTrain {
     /// When and where it stands if it is told a step now and stops from there.
     fn rest_from(
         &self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         stands: &StandingTimes<'_>,
         step: SpeedStep,
@@ -89,8 +89,8 @@ impl DrivenTrain {
         let start = now + LINE_TIME + POLL_WAIT;
         let first = if step == self.told { now + LINE_TIME } else { start + FELT };
         let found = command_time(first, |stop| {
-            let rest = self.locator.rest_after_move(ground, &self.model, start, step, stop)?;
-            Some((rest, self.aimed_beyond(ground, &rest, at, destination.aim)?))
+            let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
+            Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))
         });
         match found {
             CommandTime::At(stop, rest) => {
@@ -109,11 +109,11 @@ impl DrivenTrain {
         step: SpeedStep,
         rest: &Rest,
     ) -> Option<Timestamp> {
-        let mut outlook = self.locator.outlook()?;
+        let mut rollout = self.locator.rollout()?;
         if start < stop {
-            outlook.tell(&self.model, outlook.seconds(start), step);
+            rollout.tell(&self.model, rollout.seconds(start), step);
         }
-        let [_, speed] = outlook.place_and_speed(&self.model, outlook.seconds(stop));
+        let [_, speed] = rollout.place_and_speed(&self.model, rollout.seconds(stop));
         Some(rest.time + TimeSpan::from_s(stands.later(speed)))
     }
 }

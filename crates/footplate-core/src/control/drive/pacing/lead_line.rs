@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use crate::calibration::motion::MotionModel;
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::estimation::{Ground, Outlook};
+use crate::estimation::{Rollout, TrackContext};
 use crate::ids::NodeId;
 use crate::time::Timestamp;
 use crate::units::Length;
@@ -24,11 +24,11 @@ pub(super) struct LeadLine<'a> {
     /// passed last).
     marks: Vec<[f64; 2]>,
     /// Where it goes from there: from the last of them, or from where it was put.
-    outlook: Outlook,
+    rollout: Rollout,
     begins: f64,
     way: SurveyedWay,
     model: &'a MotionModel,
-    /// Now, on the clock of the outlook.
+    /// Now, on the clock of the rollout.
     now: f64,
 }
 
@@ -36,28 +36,28 @@ impl<'a> LeadLine<'a> {
     /// The line of `leader` for a train that passed the contact at `from` last and is so far (surveyed m) past it; `None` if
     /// nobody knows it.
     pub(super) fn of(
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         leader: &'a DrivenTrain,
         now: Timestamp,
         (from, past): (NodeId, f64),
     ) -> Option<Self> {
-        let outlook = leader.locator.outlook()?;
-        let way = SurveyedWay::ahead(ground, &leader.model, outlook.node());
-        let zero = outlook.seconds(now);
-        let mut here = outlook;
+        let rollout = leader.locator.rollout()?;
+        let way = SurveyedWay::ahead(context, &leader.model, rollout.node());
+        let zero = rollout.seconds(now);
+        let mut here = rollout;
         let since = way.of_felt(here.place(&leader.model, zero));
-        let mut begins = ahead_of(ground, from, outlook.node())?;
+        let mut begins = ahead_of(context, from, rollout.node())?;
         // It may have come by the contact without a report, and be less than a round ahead.
-        if let Some(round) = surveyed_between(ground, from, from).map(Length::as_m)
+        if let Some(round) = surveyed_between(context, from, from).map(Length::as_m)
             && begins + since - round > past
         {
             begins -= round;
         }
         let mut marks: Vec<[f64; 2]> = Vec::new();
-        let (mut surveyed, mut next) = (begins, outlook.node());
+        let (mut surveyed, mut next) = (begins, rollout.node());
         for (node, time) in leader.passages.iter().rev() {
             if node != next {
-                surveyed -= surveyed_between(ground, node, next)?.as_m();
+                surveyed -= surveyed_between(context, node, next)?.as_m();
             }
             next = node;
             marks.push([(time - now).as_s(), surveyed]);
@@ -67,7 +67,7 @@ impl<'a> LeadLine<'a> {
             }
         }
         marks.reverse();
-        Some(Self { marks, outlook, begins, way, model: &leader.model, now: zero })
+        Some(Self { marks, rollout, begins, way, model: &leader.model, now: zero })
     }
 
     /// Where it is at a time (s from now).
@@ -84,8 +84,8 @@ impl<'a> LeadLine<'a> {
         {
             return from + (to - from) * (time - at) / (until - at);
         }
-        let mut outlook = self.outlook;
-        let since = self.way.of_felt(outlook.place(self.model, self.now + time));
+        let mut rollout = self.rollout;
+        let since = self.way.of_felt(rollout.place(self.model, self.now + time));
         self.begins + since
     }
 
@@ -96,6 +96,6 @@ impl<'a> LeadLine<'a> {
 }
 
 /// The surveyed way (m) from a contact to one ahead of it, which may be itself.
-fn ahead_of(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<f64> {
-    if from == to { Some(0.0) } else { surveyed_between(ground, from, to).map(Length::as_m) }
+fn ahead_of(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<f64> {
+    if from == to { Some(0.0) } else { surveyed_between(context, from, to).map(Length::as_m) }
 }

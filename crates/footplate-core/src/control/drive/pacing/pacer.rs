@@ -14,11 +14,11 @@ impl Driver {
         let due = |train: &DrivenTrain| train.next_look().is_some_and(|at| at <= now);
         let due: Vec<TrainId> =
             self.trains.values().filter(|train| due(train)).map(DrivenTrain::id).collect();
-        let ground = self.track.ground();
+        let context = self.track.context();
         for id in due {
             // Whoever follows looks at the others.
             if let Some(mut train) = self.trains.remove(&id) {
-                train.pace(ground, now, &self.trains, &mut self.outputs);
+                train.pace(context, now, &self.trains, &mut self.outputs);
                 self.trains.insert(id, train);
             }
         }
@@ -28,7 +28,7 @@ impl Driver {
     /// for any other, and before the line begins.
     #[must_use]
     pub fn ahead_of_line(&self, train: TrainId, now: Timestamp) -> Option<Length> {
-        self.trains.get(&train)?.ahead_of_line(self.track.ground(), now)
+        self.trains.get(&train)?.ahead_of_line(self.track.context(), now)
     }
 
     /// The contact that a train that keeps to a pace is about to pass. Keeps in mind when that changes.

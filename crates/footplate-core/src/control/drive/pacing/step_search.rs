@@ -15,7 +15,7 @@ use super::command_budget::CommandBudget;
 use super::reference::{GRID, LOOKS, Reference};
 use super::surveyed_way::SurveyedWay;
 use crate::calibration::motion::MotionModel;
-use crate::estimation::Outlook;
+use crate::estimation::Rollout;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 
@@ -59,7 +59,7 @@ pub(super) struct StepSearch<'a> {
     pub(super) model: &'a MotionModel,
     pub(super) way: &'a SurveyedWay,
     pub(super) reference: &'a Reference,
-    /// The moment (s on the clock of the outlook) from which the grid counts, and how much later a command leaves than it
+    /// The moment (s on the clock of the rollout) from which the grid counts, and how much later a command leaves than it
     /// is given.
     pub(super) now: f64,
     pub(super) leaves_after: f64,
@@ -89,27 +89,27 @@ impl<'a> StepSearch<'a> {
     }
 
     /// The best of all sequences that stay within what is left of a budget.
-    pub(super) fn best(mut self, outlook: Outlook, budget: CommandBudget) -> Choice {
-        self.go_on(0, &outlook, Sequence { budget, first: None, commands: 0, cost: 0.0 });
+    pub(super) fn best(mut self, rollout: Rollout, budget: CommandBudget) -> Choice {
+        self.go_on(0, &rollout, Sequence { budget, first: None, commands: 0, cost: 0.0 });
         self.best
     }
 
-    fn go_on(&mut self, at: usize, outlook: &Outlook, sequence: Sequence) {
+    fn go_on(&mut self, at: usize, rollout: &Rollout, sequence: Sequence) {
         if sequence.cost >= self.best.cost {
             return;
         }
         let Some(ideal) = self.reference.places.get(at).copied() else {
-            return self.end(outlook, sequence);
+            return self.end(rollout, sequence);
         };
         let Sequence { budget, first, commands, .. } = sequence;
         let time = self.now + GRID * at as f64;
         let leaves = time + self.leaves_after;
-        let told = outlook.step();
+        let told = rollout.step();
         let steps = self.steps;
         let may = commands < MOST_COMMANDS && budget.free() <= time + SAME_TIME;
         let others = steps.iter().flatten().filter(|step| may && step.get() != told);
         for command in core::iter::once(None).chain(others.map(Some)) {
-            let mut next = *outlook;
+            let mut next = *rollout;
             let mut paid = 0.0;
             let mut left = budget;
             if let Some(step) = command {
@@ -130,9 +130,9 @@ impl<'a> StepSearch<'a> {
         }
     }
 
-    fn end(&mut self, outlook: &Outlook, Sequence { cost, first, .. }: Sequence) {
+    fn end(&mut self, rollout: &Rollout, Sequence { cost, first, .. }: Sequence) {
         let time = self.now + GRID * LOOKS as f64;
-        let [place, speed] = outlook.settled_place_and_speed(self.model, time);
+        let [place, speed] = rollout.settled_place_and_speed(self.model, time);
         let off = self.way.of_felt(place) - self.reference.last();
         let [_, wanted] = self.reference.speeds;
         let faster = speed - wanted;

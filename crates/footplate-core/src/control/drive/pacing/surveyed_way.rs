@@ -1,7 +1,7 @@
 //! The way ahead of a train as the survey has it, beside the way as the train feels it.
 
 use crate::calibration::motion::MotionModel;
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::ids::NodeId;
 use crate::units::Length;
 
@@ -17,11 +17,11 @@ pub(super) struct SurveyedWay {
 
 impl SurveyedWay {
     /// The way ahead of a node as the turnouts lie.
-    pub(super) fn ahead(ground: Ground<'_>, model: &MotionModel, node: NodeId) -> Self {
+    pub(super) fn ahead(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Self {
         let mut way = Self { ends: [[0.0; 2]; MOST_HOPS], count: 0 };
         let (mut felt, mut surveyed) = (0.0, 0.0);
-        for (hop, end) in ground.hops_ahead(node).zip(&mut way.ends) {
-            felt += model.length(ground.sections, &hop)[0].as_m();
+        for (hop, end) in context.hops_ahead(node).zip(&mut way.ends) {
+            felt += model.length(context.sections, &hop)[0].as_m();
             surveyed += hop.length.as_m();
             *end = [felt, surveyed];
             way.count += 1;
@@ -53,9 +53,9 @@ impl SurveyedWay {
 }
 
 /// The surveyed way from one contact to the next time another is passed: once round if it is the same.
-pub(super) fn surveyed_between(ground: Ground<'_>, from: NodeId, to: NodeId) -> Option<Length> {
+pub(super) fn surveyed_between(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<Length> {
     let mut way = Length::ZERO;
-    for hop in ground.hops_ahead(from).take(ground.layout.nodes().len()) {
+    for hop in context.hops_ahead(from).take(context.layout.nodes().len()) {
         way += hop.length;
         if hop.to == to {
             return Some(way);

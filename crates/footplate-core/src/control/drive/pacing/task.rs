@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal};
-use crate::estimation::Ground;
+use crate::estimation::TrackContext;
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::latency::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
@@ -93,7 +93,7 @@ impl DrivenTrain {
     /// kept in mind for the next time.
     pub(in crate::control::drive) fn learn_length(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         sensor: SensorId,
         window: ContactWindow,
     ) {
@@ -101,7 +101,7 @@ impl DrivenTrain {
         if self.paced().is_none() && !comes_in_time {
             return;
         }
-        if let Some((section, longer)) = self.locator.shown_length(ground, &self.model, sensor, window) {
+        if let Some((section, longer)) = self.locator.shown_length(context, &self.model, sensor, window) {
             self.model.set_section(section, longer.mean, longer.variance);
         }
     }
@@ -109,7 +109,7 @@ impl DrivenTrain {
     /// A contact was passed: all is looked at again.
     pub(in crate::control::drive) fn paced_passed(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         node: NodeId,
         out: &mut Outputs,
@@ -117,17 +117,17 @@ impl DrivenTrain {
         let Some(task) = self.task.filter(|task| task.goal == Goal::Pace) else { return };
         let Some(mut pacing) = self.pacing.take() else { return };
         if let Pace::Hold(holding) = &mut pacing.pace {
-            self.begin_line(ground, now, task.order, holding, out);
+            self.begin_line(context, now, task.order, holding, out);
         }
         pacing.look = Some(now);
         self.pacing = Some(pacing);
-        self.count_target_from(ground, now, node, out);
+        self.count_target_from(context, now, node, out);
     }
 
     /// Looks at what it does against what it should do, and commands what is due.
     pub(in crate::control::drive) fn pace(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         others: &Others,
         out: &mut Outputs,
@@ -138,35 +138,35 @@ impl DrivenTrain {
             self.pacing.iter_mut().for_each(|pacing| pacing.look = None);
             return;
         }
-        if !self.goes_by_plan(ground, now, out) || !self.may_follow(ground, now, others, out) {
+        if !self.goes_by_plan(context, now, out) || !self.may_follow(context, now, others, out) {
             return;
         }
-        let Some(outlook) = self.locator.outlook() else { return };
-        let (node, model) = (outlook.node(), &self.model);
+        let Some(rollout) = self.locator.rollout() else { return };
+        let (node, model) = (rollout.node(), &self.model);
         let followed = match self.pacing.as_ref().map(|pacing| &pacing.pace) {
-            Some(Pace::Follow(following)) => self.follow_reference(ground, now, *following, node, others),
+            Some(Pace::Follow(following)) => self.follow_reference(context, now, *following, node, others),
             _ => None,
         };
-        let allowed = self.fastest_allowed(ground, now);
+        let allowed = self.fastest_allowed(context, now);
         let Some(pacing) = &mut self.pacing else { return };
         let guard = pacing.look.take().filter(|_| matches!(pacing.pace, Pace::Follow(_)));
         let (reference, way) = match &mut pacing.pace {
             Pace::Hold(holding) => {
-                (holding.reference(ground, now, node), SurveyedWay::ahead(ground, model, node))
+                (holding.reference(context, now, node), SurveyedWay::ahead(context, model, node))
             }
             Pace::Arrive(arriving) => {
                 pacing.look = Some(now + TimeSpan::from_s(AGAIN));
-                (arriving.reference(ground, model, now, node), SurveyedWay::felt())
+                (arriving.reference(context, model, now, node), SurveyedWay::felt())
             }
-            Pace::Follow(_) => (followed, SurveyedWay::ahead(ground, model, node)),
+            Pace::Follow(_) => (followed, SurveyedWay::ahead(context, model, node)),
         };
         let Some(reference) = reference else {
             pacing.look = guard.or(pacing.look);
             return;
         };
         let leaves = (LINE_TIME + POLL_WAIT).as_s();
-        let at = outlook.seconds(now);
-        let mut here = outlook;
+        let at = rollout.seconds(now);
+        let mut here = rollout;
         let behind = reference.now() - way.of_felt(here.place(&self.model, at));
         let fastest = match pacing.pace {
             Pace::Follow(following) => following.fastest(),
@@ -176,12 +176,12 @@ impl DrivenTrain {
         let usable = pacing.usable.partition_point(|step| fastest.is_none_or(|fastest| *step <= fastest));
         let usable = pacing.usable.get(..usable).unwrap_or_default();
         let search = StepSearch::new(&self.model, &way, &reference, usable, [at, leaves], behind);
-        let choice = search.best(outlook, pacing.budget.later(at - seconds(now)));
+        let choice = search.best(rollout, pacing.budget.later(at - seconds(now)));
         match choice.first {
             Some((0, step)) => {
                 pacing.look = Some(now + SPACING);
-                if self.could_still_stop(ground, now, step) {
-                    self.tell_step(ground, now, step, out);
+                if self.could_still_stop(context, now, step) {
+                    self.tell_step(context, now, step, out);
                 }
             }
             Some((grid, _)) => {

@@ -6,7 +6,7 @@
 
 use anyhow::{Context, anyhow};
 use footplate_core::calibration::motion::{MotionModel, StepUse};
-use footplate_core::estimation::{Ground, Locator, WayPoint};
+use footplate_core::estimation::{Locator, TrackContext, WayPoint};
 use footplate_core::{Approach, Event, EventKind, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{Law, Train, Truth};
 
@@ -36,7 +36,7 @@ const COUNTS_PER_STEP: f64 = 9.0;
 
 /// The model of a train whose every property is known; `ahead` is the way on which its lengths are wanted.
 pub(in crate::commands::simulate) fn known(
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     truth: Truth<'_, '_>,
     train: TrainId,
     ahead: &[NodeId],
@@ -81,7 +81,7 @@ pub(in crate::commands::simulate) fn known(
             *found = StepUse::Unreliable;
         }
     }
-    numbers.sections = sections(ground, truth, train, ahead);
+    numbers.sections = sections(context, truth, train, ahead);
     let plain = MotionModel::from_numbers(&numbers).map_err(|error| anyhow!("{error}"))?;
 
     // What the laws leave over, from the train itself.
@@ -94,7 +94,7 @@ pub(in crate::commands::simulate) fn known(
     let starts = steps(numbers.highest).filter_map(|step| {
         let really =
             engine.way_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
-        let foreseen = way_after_start(ground, &plain, step)?;
+        let foreseen = way_after_start(context, &plain, step)?;
         (really > Length::ZERO)
             .then(|| (engine.speeds.speed(step, Approach::Below).as_m_per_s(), (really - foreseen).as_m()))
     });
@@ -131,29 +131,29 @@ fn lags_and_ramps(law: &Law) -> [[f64; 3]; 2] {
 }
 
 /// How far a train gets that is told a step, by a model.
-fn way_after_start(ground: Ground<'_>, model: &MotionModel, step: SpeedStep) -> Option<Length> {
+fn way_after_start(context: TrackContext<'_>, model: &MotionModel, step: SpeedStep) -> Option<Length> {
     let train = model.train();
-    let (_, node) = ground.layout.sensors().next()?;
+    let (_, node) = context.layout.sensors().next()?;
     let mut locator = Locator::new(train);
     locator.place(Timestamp::ZERO, WayPoint { node, way: Length::ZERO }, Length::ZERO);
     let told = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
-    locator.handle_command(ground, model, &told);
-    Some(locator.locate(ground, model, Timestamp::ZERO + STARTED)?.at.way)
+    locator.handle_command(context, model, &told);
+    Some(locator.locate(context, model, Timestamp::ZERO + STARTED)?.at.way)
 }
 
 /// Lengths of hops as the train feels them, by section.
 fn sections(
-    ground: Ground<'_>,
+    context: TrackContext<'_>,
     truth: Truth<'_, '_>,
     train: TrainId,
     ahead: &[NodeId],
 ) -> Vec<(usize, f64, f64)> {
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for node in ahead {
-        for hop in ground.layout.hops_from(*node) {
-            let (Some(from), Some(to)) = (ground.layout.sensor_at(*node), hop.sensor) else { continue };
+        for hop in context.layout.hops_from(*node) {
+            let (Some(from), Some(to)) = (context.layout.sensor_at(*node), hop.sensor) else { continue };
             let felt = truth.felt(train, hop.edges, from, to);
-            if let (Some(section), Some(felt)) = (ground.sections.section(hop.id), felt)
+            if let (Some(section), Some(felt)) = (context.sections.section(hop.id), felt)
                 && !found.iter().any(|(known, ..)| *known == section)
             {
                 let longer = (felt - hop.length).as_m();
@@ -205,12 +205,12 @@ mod tests {
     fn what_the_oracle_says_of_a_train_is_true() {
         let layout = footplate_store::layout_named("track-a").unwrap().layout;
         let (sections, turnouts) = (SectionIndex::of(&layout), TurnoutStates::unknown());
-        let ground = Ground { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         for law in LawFamily::ALL {
             let line = world(&layout, 3, law).unwrap();
             let truth = line.station.world().truth();
             let engine = truth.engine(TRAIN).unwrap();
-            let model = known(ground, truth, TRAIN, &[]).unwrap();
+            let model = known(context, truth, TRAIN, &[]).unwrap();
             for step in steps(engine.speeds.highest()).skip(4) {
                 let speed = engine.speeds.speed(step, Approach::Below);
                 let found = model.speed(step, Approach::Below).value;

@@ -4,7 +4,7 @@ use anyhow::Context;
 use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Order, PacedLine};
-use footplate_core::estimation::Ground;
+use footplate_core::estimation::TrackContext;
 use footplate_core::track::Layout;
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -111,8 +111,8 @@ pub(super) fn told_the_truth(
     train: TrainId,
 ) -> anyhow::Result<MotionModel> {
     let sections = SectionIndex::of(layout);
-    let ground = Ground { layout, sections: &sections, turnouts: &stage.turnouts };
-    known(ground, stage.world().truth(), train, &way.nodes)
+    let context = TrackContext { layout, sections: &sections, turnouts: &stage.turnouts };
+    known(context, stage.world().truth(), train, &way.nodes)
 }
 
 /// The speeds of the slowest and the fastest step that moves a train (mm/s).

@@ -12,7 +12,7 @@ use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};
 use super::Extent;
 use super::timed::Timed;
 use super::world::WorldName;
-use crate::commands::drive::{Conductor, DriveBeginning, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
 use crate::commands::simulate::driving::trial::{Plan, TRAIN};
 use crate::commands::simulate::rehearsal::{VirtualLine, calibrate};
 use crate::commands::written_layout::WrittenLayout;
@@ -138,18 +138,18 @@ impl Driven<'_, '_> {
         }
         self.scored.taken += machine.taken;
         self.scored.longest = self.scored.longest.max(machine.longest);
-        Ok(machine.conductor.handed_over())
+        Ok(machine.script_runner.handed_over())
     }
 
-    /// The conductor of a session; what it knows goes through the text that is kept of it.
-    fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<Conductor> {
+    /// The script runner of a session; what it knows goes through the text that is kept of it.
+    fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<ScriptRunner> {
         let sections = SectionIndex::of(&self.written.layout);
         learnt.1.iter_mut().for_each(|fit| fit.begin_session(&sections));
         learnt.0 = learnt.1.iter().map(|fit| fit.model().clone()).collect();
         let beginning = DriveBeginning::of_person(self.written, &self.turnouts, learnt);
         let text = serde_json::to_string(&beginning).context("what was learnt is kept as text")?;
         let kept: DriveBeginning = serde_json::from_str(&text).context("what was kept is read back")?;
-        kept.conductor()
+        kept.script_runner()
     }
 
     fn stop(&mut self, machine: &mut Timed, session: u8, early: bool) {

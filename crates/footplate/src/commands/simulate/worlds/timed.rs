@@ -1,4 +1,4 @@
-//! A conductor whose computing is timed.
+//! A script runner whose computing is timed.
 
 use std::time::Duration;
 
@@ -6,12 +6,12 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, Timestamp};
 
 use crate::clock::Stopwatch;
-use crate::commands::drive::{Conductor, Spoken};
+use crate::commands::drive::{ScriptRunner, Spoken};
 use crate::witness::{Input, Listener};
 
 /// Passes everything on, and counts the time it takes.
 pub(super) struct Timed {
-    pub(super) conductor: Conductor,
+    pub(super) script_runner: ScriptRunner,
     /// All time so far.
     pub(super) taken: Duration,
     /// The longest that the line had to wait.
@@ -19,17 +19,17 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    pub(super) const fn new(conductor: Conductor) -> Self {
-        Self { conductor, taken: Duration::ZERO, longest: Duration::ZERO }
+    pub(super) const fn new(script_runner: ScriptRunner) -> Self {
+        Self { script_runner, taken: Duration::ZERO, longest: Duration::ZERO }
     }
 
     pub(super) fn handle_word(&mut self, now: Timestamp, word: &Input) {
-        self.time(|conductor| conductor.handle_word(now, word));
+        self.time(|script_runner| script_runner.handle_word(now, word));
     }
 
-    fn time<A>(&mut self, call: impl FnOnce(&mut Conductor) -> A) -> A {
+    fn time<A>(&mut self, call: impl FnOnce(&mut ScriptRunner) -> A) -> A {
         let stopwatch = Stopwatch::start();
-        let answer = call(&mut self.conductor);
+        let answer = call(&mut self.script_runner);
         let taken = stopwatch.elapsed();
         self.taken += taken;
         self.longest = self.longest.max(taken);
@@ -41,18 +41,18 @@ impl Machine for Timed {
     type Notice = Spoken;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
-        self.time(|conductor| conductor.handle_event(now, event));
+        self.time(|script_runner| script_runner.handle_event(now, event));
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        self.time(|conductor| conductor.handle_timeout(now));
+        self.time(|script_runner| script_runner.handle_timeout(now));
     }
 
     fn poll_output(&mut self) -> Option<Output<Spoken>> {
-        self.conductor.poll_output()
+        self.script_runner.poll_output()
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        self.conductor.next_timeout()
+        self.script_runner.next_timeout()
     }
 }

@@ -1,9 +1,9 @@
 //! How fast one train may be where it goes from here, with the doubts of it and with commands that have not been given.
 //!
-//! [`Outlook`](super::Outlook) says what is most likely, thousands of times; this says what is to be reckoned with. `k` is
+//! [`Rollout`](super::Rollout) says what is most likely, thousands of times; this says what is to be reckoned with. `k` is
 //! everywhere the number of standard deviations that are allowed for.
 
-use crate::calibration::motion::{FELT, Following, Guess, MotionModel};
+use crate::calibration::motion::{FELT, Gaussian, MotionFilter, MotionModel};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
 
@@ -19,14 +19,14 @@ const HALVINGS: usize = 10;
 ///
 /// Ways in m past [`node`](Self::node), in lengths as the train feels them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Foresight {
+pub(crate) struct ReachableSet {
     node: Option<NodeId>,
     epoch: Timestamp,
-    following: Following,
+    following: MotionFilter,
 }
 
-impl Foresight {
-    pub(super) const fn new(node: Option<NodeId>, epoch: Timestamp, following: Following) -> Self {
+impl ReachableSet {
+    pub(super) const fn new(node: Option<NodeId>, epoch: Timestamp, following: MotionFilter) -> Self {
         Self { node, epoch, following }
     }
 
@@ -97,7 +97,7 @@ impl Foresight {
         now.max(self.fastest_settled(k))
     }
 
-    /// How fast (m/s) it may run once all changes are done, of a foresight [`after_all`](Self::after_all).
+    /// How fast (m/s) it may run once all changes are done, of a reachable set [`after_all`](Self::after_all).
     pub(crate) fn fastest_settled(&self, k: f64) -> f64 {
         local(self.following.settled_speed(), k)
     }
@@ -105,11 +105,11 @@ impl Foresight {
 
 /// The bound of a speed on any single stretch: a model knows speeds as means of whole hops in the train's own measure, and a
 /// stretch of rail is felt shorter or longer than that by what hops are.
-fn local(of: Guess, k: f64) -> f64 {
+fn local(of: Gaussian, k: f64) -> f64 {
     let felt = FELT * of.mean;
-    bound(Guess { variance: of.variance + felt * felt, ..of }, k)
+    bound(Gaussian { variance: of.variance + felt * felt, ..of }, k)
 }
 
-fn bound(of: Guess, k: f64) -> f64 {
+fn bound(of: Gaussian, k: f64) -> f64 {
     of.mean + k * libm::sqrt(of.variance)
 }

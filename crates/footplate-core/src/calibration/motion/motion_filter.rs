@@ -41,7 +41,7 @@ const OTHER_SHAPES: f64 = 2.0;
 
 /// A mean and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Guess {
+pub(crate) struct Gaussian {
     pub(crate) mean: f64,
     pub(crate) variance: f64,
 }
@@ -52,7 +52,7 @@ pub(crate) struct Guess {
 /// together with it ([`pass_beside`](Self::pass_beside)). The companions' means are kept by the caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Following<const L: usize = N> {
+pub(crate) struct MotionFilter<const L: usize = N> {
     pub(super) course: Course,
     #[cfg_attr(feature = "serde", serde(with = "super::square"))]
     pub(super) p: [[f64; L]; L],
@@ -62,16 +62,16 @@ pub(crate) struct Following<const L: usize = N> {
     local: f64,
 }
 
-impl<const L: usize> Following<L> {
+impl<const L: usize> MotionFilter<L> {
     /// At rest at a place.
-    pub(crate) fn at_rest(time: f64, place: Guess) -> Self {
+    pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
         Self { course: Course::at_rest(time, place.mean), p, wandered: time, local: 0.0 }
     }
 
     /// Running steadily at a step for long.
-    pub(crate) fn running(model: &MotionModel, time: f64, step: u8, place: Guess) -> Self {
+    pub(crate) fn running(model: &MotionModel, time: f64, step: u8, place: Gaussian) -> Self {
         let mut following = Self::at_rest(time, place);
         following.course = Course::running(model, time, step, place.mean);
         let variance = model.ln_speed_variance(step, false);
@@ -228,19 +228,19 @@ impl<const L: usize> Following<L> {
     }
 
     /// Where it is (m) at a time.
-    pub(crate) fn place(&self, model: &MotionModel, time: f64) -> Guess {
+    pub(crate) fn place(&self, model: &MotionModel, time: f64) -> Gaussian {
         let later = self.at(model, time);
         let is_done = later.rests_at(time) && !later.course.is_still();
         let (mean, slope) = later.way_and_slopes(if is_done { f64::INFINITY } else { time });
         let shape = later.shape_error(time);
-        Guess { mean, variance: later.variance_along(slope) + shape * shape }
+        Gaussian { mean, variance: later.variance_along(slope) + shape * shape }
     }
 
     /// Its speed (m/s) at a time.
-    pub(crate) fn speed(&self, model: &MotionModel, time: f64) -> Guess {
+    pub(crate) fn speed(&self, model: &MotionModel, time: f64) -> Gaussian {
         let later = self.at(model, time);
         let speed = later.course.speed(time);
-        Guess { mean: speed, variance: speed * speed * later.ln_speed_variance() }
+        Gaussian { mean: speed, variance: speed * speed * later.ln_speed_variance() }
     }
 
     /// Once all that was told has taken effect.
@@ -253,7 +253,7 @@ impl<const L: usize> Following<L> {
     }
 
     /// Its speed (m/s) at a time, with what no shape of a change is true to and what a start that is late or early makes of it.
-    pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Guess {
+    pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Gaussian {
         let speed = self.speed(model, time);
         let later = self.at(model, time);
         let shape = later.shape_speed_error(time);
@@ -261,13 +261,13 @@ impl<const L: usize> Following<L> {
         let late = time - later.course.x[H];
         let [before, after] = [late - lateness, late + lateness].map(|late| later.course.segment.speed(late));
         let start = 0.5 * (after - before);
-        Guess { variance: speed.variance + shape * shape + start * start, ..speed }
+        Gaussian { variance: speed.variance + shape * shape + start * start, ..speed }
     }
 
     /// The speed (m/s) to which the change under way leads.
-    pub(crate) fn settled_speed(&self) -> Guess {
+    pub(crate) fn settled_speed(&self) -> Gaussian {
         let mean = self.course.grown() * self.course.segment.to;
-        Guess { mean, variance: mean * mean * self.ln_speed_variance() }
+        Gaussian { mean, variance: mean * mean * self.ln_speed_variance() }
     }
 
     /// Variance of ln of its speed over what the model says.
@@ -278,7 +278,7 @@ impl<const L: usize> Following<L> {
 
     /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
     /// train that was told to run.
-    pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Guess, f64, f64)> {
+    pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Gaussian, f64, f64)> {
         let later = self.after_all(model);
         if later.course.step != 0 {
             return None;
@@ -288,7 +288,7 @@ impl<const L: usize> Following<L> {
         let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);
-        Some((Guess { mean, variance }, scatter, later.course.rest_time()))
+        Some((Gaussian { mean, variance }, scatter, later.course.rest_time()))
     }
 
     /// One standard deviation (m/s) of the speed in the middle of a change.
@@ -329,8 +329,8 @@ impl<const L: usize> Following<L> {
 
     /// The train passed a place (m, with the variance of what is known of it) at a mean time (s, with its variance).
     /// Returns by how much (m) it was short of the place, and the variance of that.
-    pub(crate) fn pass(&mut self, model: &MotionModel, time: f64, time_variance: f64, place: Guess) -> Guess {
-        self.pass_beside(model, time, time_variance, place, &[], &mut [])
+    pub(crate) fn pass(&mut self, model: &MotionModel, at: f64, variance: f64, place: Gaussian) -> Gaussian {
+        self.pass_beside(model, at, variance, place, &[], &mut [])
     }
 
     /// The same where the place depends on companions: it is `place` as they are now, and moves with them by `slopes`
@@ -340,10 +340,10 @@ impl<const L: usize> Following<L> {
         model: &MotionModel,
         time: f64,
         time_variance: f64,
-        place: Guess,
+        place: Gaussian,
         slopes: &[(usize, f64)],
         beside: &mut [f64],
-    ) -> Guess {
+    ) -> Gaussian {
         self.settle(model, time);
         let speed = self.course.speed(time);
         let shape = self.shape_error(time);
@@ -351,7 +351,7 @@ impl<const L: usize> Following<L> {
         let (mean, before) = (self.course.x, *self);
         let (first, slope) = self.way_and_slopes(time);
         let (mut seen, mut slope) = (first, Self::past(slope, slopes));
-        let short = Guess { mean: place.mean - first, variance: self.variance_along(slope) + noise };
+        let short = Gaussian { mean: place.mean - first, variance: self.variance_along(slope) + noise };
         for look in 1..=LOOKS {
             let with = before.covariance_along(&slope);
             let s = (0..L).map(|j| slope[j] * with[j]).sum::<f64>() + noise;
@@ -429,7 +429,7 @@ impl<const L: usize> Following<L> {
     }
 
     /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.
-    pub(crate) fn reaches(&self, model: &MotionModel, place: Guess, now: f64) -> Option<(f64, f64)> {
+    pub(crate) fn reaches(&self, model: &MotionModel, place: Gaussian, now: f64) -> Option<(f64, f64)> {
         if let Some((rest, _, _)) = self.rest(model)
             && rest.mean <= place.mean
         {
@@ -475,7 +475,7 @@ mod tests {
     fn what_all_changes_on_a_trip_have_in_common_is_learnt_and_foreseen() {
         // Given a train that answers every command but its start 60 ms later than its model says,
         let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
-        let mut begins: Following = Following::at_rest(0.0, Guess { mean: 0.0, variance: 1e-6 });
+        let mut begins: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
         begins.repeat(true);
         let (mut train, mut believed) = (begins, begins);
         let mut missed = [0.0; 2];
@@ -486,7 +486,7 @@ mod tests {
             believed.tell(&model, sent, step);
             let seen = sent + 1.9;
             train = train.at(&model, seen);
-            let place = Guess { mean: train.place(&model, seen).mean, variance: 1e-6 };
+            let place = Gaussian { mean: train.place(&model, seen).mean, variance: 1e-6 };
             let short = believed.pass(&model, seen, 0.0, place).mean;
             missed[usize::from(nth >= 40)] += short * short;
         }

@@ -6,14 +6,14 @@ use footplate_core::control::{
 use footplate_core::track::Landmark;
 use footplate_core::{Timestamp, TrainId};
 
-use super::Conductor;
+use super::ScriptRunner;
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
 use crate::commands::drive::told::{trains, verb};
 use crate::dashboard::{Alarm, TrainPassed};
 
-impl Conductor {
+impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
         self.fell_short = true;
         self.say(format!("refused `{}`: {why}", step.text));

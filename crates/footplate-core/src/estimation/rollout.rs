@@ -9,7 +9,7 @@ use crate::time::Timestamp;
 /// In plain numbers, because searches ask thousands of times: ways in m past [`node`](Self::node) in lengths as the train
 /// feels them, times in s on a clock whose zero [`seconds`](Self::seconds) knows.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Outlook {
+pub(crate) struct Rollout {
     node: NodeId,
     epoch: Timestamp,
     course: Course,
@@ -18,7 +18,7 @@ pub(crate) struct Outlook {
 /// By this much (s) later every change of speed is over.
 const LONG_AFTER: f64 = 20.0;
 
-impl Outlook {
+impl Rollout {
     pub(super) const fn new(node: NodeId, epoch: Timestamp, course: Course) -> Self {
         Self { node, epoch, course }
     }
@@ -28,7 +28,7 @@ impl Outlook {
         self.node
     }
 
-    /// A time on the clock of the outlook.
+    /// A time on the clock of the rollout.
     pub(crate) fn seconds(&self, time: Timestamp) -> f64 {
         (time - self.epoch).as_s()
     }

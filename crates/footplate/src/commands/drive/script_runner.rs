@@ -43,7 +43,7 @@ pub(super) enum Giver {
 
 /// Drives by instructions.
 #[derive(Debug)]
-pub(crate) struct Conductor {
+pub(crate) struct ScriptRunner {
     dispatcher: Dispatcher,
     learning: Learning,
     giver: Giver,
@@ -76,7 +76,7 @@ struct Wait {
     is_met: bool,
 }
 
-impl Conductor {
+impl ScriptRunner {
     pub(super) fn new(driver: Driver, learning: Learning, giver: Giver, steps: Vec<Step>) -> Self {
         let highest = |train| {
             driver
@@ -434,7 +434,7 @@ fn runs_on(step: &Step) -> bool {
     matches!(step.instruction, Instruction::Order(Order::Hold { .. } | Order::Follow { .. }))
 }
 
-impl Machine for Conductor {
+impl Machine for ScriptRunner {
     type Notice = Spoken;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
@@ -465,7 +465,7 @@ impl Machine for Conductor {
     }
 }
 
-impl Listener for Conductor {
+impl Listener for ScriptRunner {
     fn handle_word(&mut self, now: Timestamp, word: &Input) {
         match word {
             Input::Line(line) => self.hear(now, line),

@@ -6,7 +6,7 @@ use crate::track::{Hop, Layout, TurnoutStates};
 
 /// The track under a train. Copied freely; it only points.
 #[derive(Debug, Clone, Copy)]
-pub struct Ground<'g> {
+pub struct TrackContext<'g> {
     /// The layout.
     pub layout: &'g Layout,
     /// Its sections, by which lengths are kept.
@@ -15,7 +15,7 @@ pub struct Ground<'g> {
     pub turnouts: &'g TurnoutStates,
 }
 
-impl<'g> Ground<'g> {
+impl<'g> TrackContext<'g> {
     /// The one open hop that leads on from a node; `None` where the way forks over a turnout nobody knows of.
     #[must_use]
     pub fn hop_from(&self, node: NodeId) -> Option<Hop<'g>> {
@@ -27,10 +27,10 @@ impl<'g> Ground<'g> {
     /// The hops ahead of a node, one after the other, as the turnouts lie: round and round on a circuit, and to where
     /// the way ends or is not known.
     pub fn hops_ahead(&self, from: NodeId) -> impl Iterator<Item = Hop<'g>> + use<'g> {
-        let ground = *self;
+        let context = *self;
         let mut node = Some(from);
         core::iter::from_fn(move || {
-            let hop = ground.hop_from(node?)?;
+            let hop = context.hop_from(node?)?;
             node = hop.sensor.map(|_| hop.to);
             Some(hop)
         })

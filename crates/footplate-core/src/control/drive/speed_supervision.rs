@@ -12,7 +12,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::estimation::{Foresight, Ground, WayPoint};
+use crate::estimation::{ReachableSet, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
@@ -51,7 +51,7 @@ const HALVINGS: usize = 8;
 
 /// What a train would run at if it were allowed to.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Restraint {
+pub(super) struct SpeedSupervision {
     /// The step that was asked for, while the train has been told a slower one.
     wanted: Option<SpeedStep>,
     /// When the zones about it are looked at next.
@@ -63,7 +63,7 @@ pub(super) struct Restraint {
 /// From where a train is judged: when a command can leave, how far it reaches and how it moves.
 struct Prospect<'t> {
     train: &'t DrivenTrain,
-    here: Foresight,
+    here: ReachableSet,
     now: Timestamp,
     usable: Vec<SpeedStep>,
     k: f64,
@@ -84,12 +84,12 @@ struct Slow<'g> {
 impl Driver {
     /// Looks at the zones about the trains for which that is due.
     pub(super) fn heed_zones(&mut self, now: Timestamp) {
-        let ground = self.track.ground();
-        if ground.layout.zones().is_empty() {
+        let context = self.track.context();
+        if context.layout.zones().is_empty() {
             return;
         }
         for train in self.trains.values_mut().filter(|train| train.zone_look().is_some_and(|at| at <= now)) {
-            train.heed_zones(ground, now, &mut self.outputs);
+            train.heed_zones(context, now, &mut self.outputs);
         }
     }
 }
@@ -97,41 +97,41 @@ impl Driver {
 impl DrivenTrain {
     /// When the zones about it are looked at next.
     pub(super) fn zone_look(&self) -> Option<Timestamp> {
-        self.restraint.look.filter(|_| self.told > SpeedStep::STAND)
+        self.speed_supervision.look.filter(|_| self.told > SpeedStep::STAND)
     }
 
     /// Something is known anew, or the train was told something. Where nothing is restricted nobody looks.
-    pub(super) fn look_at_zones(&mut self, ground: Ground<'_>, now: Timestamp) {
-        self.restraint.look = (!ground.layout.zones().is_empty()).then_some(now);
+    pub(super) fn look_at_zones(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        self.speed_supervision.look = (!context.layout.zones().is_empty()).then_some(now);
     }
 
     /// Whether it has been told a slower step than it was asked to run at.
     pub(super) const fn is_restrained(&self) -> bool {
-        self.restraint.wanted.is_some()
+        self.speed_supervision.wanted.is_some()
     }
 
     /// The fastest step of those that move it, if zones leave less than all of them.
-    pub(super) fn fastest_allowed(&self, ground: Ground<'_>, now: Timestamp) -> Option<SpeedStep> {
-        if ground.layout.zones().is_empty() {
+    pub(super) fn fastest_allowed(&self, context: TrackContext<'_>, now: Timestamp) -> Option<SpeedStep> {
+        if context.layout.zones().is_empty() {
             return None;
         }
-        let (fastest, zone) = self.allowed(ground, now, self.model.highest());
+        let (fastest, zone) = self.allowed(context, now, self.model.highest());
         zone.map(|_| fastest)
     }
 
     /// What is restricted on the way to a place, each with the fastest step that keeps to it.
     pub(super) fn restricted_until<'g>(
         &self,
-        ground: Ground<'g>,
+        context: TrackContext<'g>,
         now: Timestamp,
         at: WayPoint,
     ) -> Vec<(RestrictedWay<'g>, SpeedStep)> {
-        if ground.layout.zones().is_empty() {
+        if context.layout.zones().is_empty() {
             return Vec::new();
         }
         let prospect = Prospect::of(self, now);
         let [_, rear] = prospect.ends;
-        let mut ways = RestrictedWay::about(ground, &self.model, at.node, -rear, at.way.as_m());
+        let mut ways = RestrictedWay::about(context, &self.model, at.node, -rear, at.way.as_m());
         ways.retain(|way| way.to >= rear && way.from <= at.way.as_m());
         ways.into_iter().map(|way| (way, prospect.within(way.zone.limit.as_m_per_s()))).collect()
     }
@@ -139,27 +139,27 @@ impl DrivenTrain {
     /// The step to be told if one is asked for, which is kept in mind. Says so if zones leave less.
     pub(super) fn restrained(
         &mut self,
-        ground: Ground<'_>,
+        context: TrackContext<'_>,
         now: Timestamp,
         step: SpeedStep,
         out: &mut Outputs,
     ) -> SpeedStep {
-        self.restraint.wanted = None;
-        self.look_at_zones(ground, now);
-        if step == SpeedStep::STAND || ground.layout.zones().is_empty() {
+        self.speed_supervision.wanted = None;
+        self.look_at_zones(context, now);
+        if step == SpeedStep::STAND || context.layout.zones().is_empty() {
             return step;
         }
-        let (allowed, zone) = self.allowed(ground, now, step);
+        let (allowed, zone) = self.allowed(context, now, step);
         if let Some(zone) = zone {
-            self.restraint.wanted = Some(step);
+            self.speed_supervision.wanted = Some(step);
             self.say_restrained(allowed, zone, out);
         }
         allowed
     }
 
     fn say_restrained(&mut self, step: SpeedStep, zone: &Zone, out: &mut Outputs) {
-        if self.restraint.said.as_ref() != Some(&zone.name) {
-            self.restraint.said = Some(zone.name.clone());
+        if self.speed_supervision.said.as_ref() != Some(&zone.name) {
+            self.speed_supervision.said = Some(zone.name.clone());
             let (train, name, limit) = (self.id(), zone.name.clone(), zone.limit);
             out.say(DriveNotice::Restrained { train, step, zone: name, limit });
         }
@@ -168,12 +168,12 @@ impl DrivenTrain {
     /// The fastest step up to one that may be told now, and the zone that leaves no more.
     fn allowed<'g>(
         &self,
-        ground: Ground<'g>,
+        context: TrackContext<'g>,
         now: Timestamp,
         step: SpeedStep,
     ) -> (SpeedStep, Option<&'g Zone>) {
         let prospect = Prospect::of(self, now);
-        let ways = prospect.ways(ground, step);
+        let ways = prospect.ways(context, step);
         // Who slows down for a zone is told nothing faster until it has: what came of a change and its opposite within a moment
         // nobody could say.
         if prospect.slows_down
@@ -191,11 +191,11 @@ impl DrivenTrain {
     }
 
     /// Slows down for what is ahead, and gets faster where nothing restricts it any more.
-    fn heed_zones(&mut self, ground: Ground<'_>, now: Timestamp, out: &mut Outputs) {
+    fn heed_zones(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         let told = self.told;
-        let wanted = self.restraint.wanted.filter(|wanted| *wanted > told);
+        let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > told);
         let prospect = Prospect::of(self, now);
-        let ways = prospect.ways(ground, wanted.unwrap_or(told));
+        let ways = prospect.ways(context, wanted.unwrap_or(told));
         let by = prospect.slow_down_by(&ways, told);
         let due = by.filter(|(by, _)| *by <= prospect.start() + TICK);
         let slower = due.map(|(_, zone)| (prospect.fastest_below(&ways, told, WORTHWHILE), zone));
@@ -208,46 +208,46 @@ impl DrivenTrain {
                 !prospect.slows_down
                     && prospect.forbids(&ways, *step, WORTHWHILE).is_none()
                     && prospect.spares(&ways, *step)
-                    && self.is_worth_it(ground, now, *step)
+                    && self.is_worth_it(context, now, *step)
             })
         });
         let next = by.map(|(by, _)| by - SOONEST).into_iter().chain(leaves.filter(|_| wanted.is_some()));
         let next = next.chain(Some(now + AGAIN)).min().unwrap_or(now).max(now + TICK);
-        self.restraint.look = Some(next);
+        self.speed_supervision.look = Some(next);
         if let Some((step, zone)) = slower {
             // Who is paced is told what it should do at every look.
             if self.is_paced_by_itself() {
-                self.restraint.wanted = None;
+                self.speed_supervision.wanted = None;
             } else {
-                self.restraint.wanted.get_or_insert(told);
+                self.speed_supervision.wanted.get_or_insert(told);
             }
             self.say_restrained(step, zone, out);
             self.interrupt_line();
             self.tell_at_once(now, step, out);
         } else if let Some(step) = faster {
             if Some(step) == wanted {
-                self.restraint.wanted = None;
+                self.speed_supervision.wanted = None;
             }
             self.resume_line(now, step);
             self.tell_at_once(now, step, out);
         } else if by.is_none() && leaves.is_none() {
-            self.restraint.said = None;
+            self.speed_supervision.said = None;
         }
     }
 
     /// Whether a train should get faster that is under way to a place: only if it can stop from the faster step as surely.
-    fn is_worth_it(&self, ground: Ground<'_>, now: Timestamp, step: SpeedStep) -> bool {
+    fn is_worth_it(&self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep) -> bool {
         let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };
         let is_running = matches!(self.task.map(|task| task.phase), Some(Phase::Running { .. }));
-        let located = self.located(ground, now);
-        is_running && located.is_some_and(|located| self.settles_before(ground, &located, at, step))
+        let located = self.located(context, now);
+        is_running && located.is_some_and(|located| self.settles_before(context, &located, at, step))
     }
 }
 
 impl<'t> Prospect<'t> {
     fn of(train: &'t DrivenTrain, now: Timestamp) -> Self {
         let k = Aim::NotBeyond(TOO_FAST).margin();
-        let here = train.locator.foresight();
+        let here = train.locator.reachable_set();
         let [ahead, behind] = train.reach.map(Length::as_m);
         let ends = [here.place(&train.model, now, k) + ahead, here.place(&train.model, now, -k) - behind];
         let beyond = here.unsettled(&train.model, now + SOONEST);
@@ -263,10 +263,10 @@ impl<'t> Prospect<'t> {
 
     /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
     /// slowest of all, wherever it goes.
-    fn ways<'g>(&self, ground: Ground<'g>, step: SpeedStep) -> Vec<Slow<'g>> {
+    fn ways<'g>(&self, context: TrackContext<'g>, step: SpeedStep) -> Vec<Slow<'g>> {
         let slow = |way: RestrictedWay<'g>| Slow { way, step: self.within(way.zone.limit.as_m_per_s()) };
         let Some(node) = self.here.node() else {
-            let zones = ground.layout.zones().iter();
+            let zones = context.layout.zones().iter();
             let slowest =
                 zones.min_by(|one, other| one.limit.as_m_per_s().total_cmp(&other.limit.as_m_per_s()));
             let everywhere = |zone| RestrictedWay { zone, from: f64::NEG_INFINITY, to: f64::INFINITY };
@@ -278,7 +278,7 @@ impl<'t> Prospect<'t> {
         let soon = SOONEST + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
         let [front, rear] = self.ends;
         let ahead = front + (model.steady_speed(step, Approach::Above) * soon).as_m() * (1.0 + SPARED);
-        let ways = RestrictedWay::about(ground, model, node, -rear, ahead);
+        let ways = RestrictedWay::about(context, model, node, -rear, ahead);
         ways.into_iter().filter(|way| way.to >= rear && way.from <= ahead).map(slow).collect()
     }
 
@@ -330,7 +330,7 @@ impl<'t> Prospect<'t> {
     }
 
     /// Whether a train is within the limit when it comes to a zone ahead if it is told the slower step at a time.
-    fn slows_for(&self, mut told: Foresight, slow: &Slow<'_>, at: Timestamp) -> bool {
+    fn slows_for(&self, mut told: ReachableSet, slow: &Slow<'_>, at: Timestamp) -> bool {
         let model = &self.train.model;
         told.tell(model, at, slow.step);
         let told = told.after_all(model);
