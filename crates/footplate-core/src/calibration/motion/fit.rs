@@ -17,7 +17,7 @@ use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
 use super::model::{MotionModel, StepUse};
 use super::parameters::SPEEDS;
-use super::priors::{TRIP_DEVIATION, section_variance};
+use super::priors::section_variance;
 use super::rows::{Point, Source, TripAt};
 use super::scatter::{Scatter, ScatterSums};
 use super::trip::{Own, Trip};
@@ -31,7 +31,7 @@ use crate::track::{Layout, TurnoutStates};
 
 /// Promises are watched once so many stops are known: those of a train that is hardly known yet are broken because numbers
 /// that are far off do not change evenly, which says nothing of how its stops scatter.
-const WATCHED_FROM: u32 = 12;
+const WATCHED_FROM: u32 = 4;
 /// Steps after which an iteration that has not settled is taken as it is.
 const MOST_ITERATIONS: usize = 15;
 /// A step is shortened by half so often before the point counts as the best.
@@ -333,24 +333,17 @@ impl MotionFit {
             // Where the stop began is known by a fit; the start behind it has not been seen by any.
             let is_new = before.own.is_some() && after.own.is_none() && after.continues;
             let Some(next) = self.trip_at(values, place + 1).filter(|_| is_new) else { continue };
-            let rows = point.rows(next, false);
-            let Some(first) = rows.iter().find(|row| row.source == Source::Sensor) else { continue };
+            let Some(foreseen) =
+                self.trip_at(values, place).and_then(|last| point.foreseen(&self.model, last, next))
+            else {
+                continue;
+            };
             let stop_speed = before.told.iter().rev().nth(1).map_or(0.0, |told| point.speed(told.to));
-            let start_speed = after.told.first().map_or(0.0, |told| point.speed(told.to));
             // Residuals of a young fit scatter too little: it has much to explain them by.
-            let Scatter { stops, starts, .. } = self.model.scatter;
-            let usual = Scatter { stops: stops.max(1.0), starts: starts.max(1.0), floor: 0.0 };
-            let known = [
-                usual.of_stop(stop_speed),
-                start_speed * usual.of_start(),
-                self.model.stop_doubt(stop_speed),
-                self.model.start_doubt(start_speed),
-            ];
-            let delay = start_speed * start_speed * self.model.start_delay_variance();
-            let run = TRIP_DEVIATION * after.contacts.first().map_or(0.0, |contact| contact.way);
-            let explained =
-                known.iter().map(|known| known * known).sum::<f64>() + delay + run * run + first.variance;
-            scatter.take_promise(first.residual * first.residual, explained);
+            let stops = self.model.scatter.stops.max(1.0);
+            let usual = Scatter { stops, floor: 0.0, ..self.model.scatter }.of_stop(stop_speed);
+            let explained = foreseen.variance + usual * usual;
+            scatter.take_promise(foreseen.residual * foreseen.residual, explained);
         }
         self.prior.scatter = scatter;
     }

@@ -13,6 +13,7 @@ mod course;
 mod decoder_kind;
 mod doubts;
 mod fit;
+mod foreseen;
 mod hindsight;
 mod learn;
 mod marginal_prior;

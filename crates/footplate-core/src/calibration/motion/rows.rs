@@ -46,6 +46,8 @@ pub(super) struct Linear {
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) residual: f64,
     pub(super) variance: f64,
+    /// Variance of one such measurement by itself, which does not count what errors of a law's shape have in common.
+    pub(super) once: f64,
     pub(super) source: Source,
 }
 
@@ -157,7 +159,8 @@ impl Point<'_> {
             );
             terms
         };
-        let row = |terms, residual, variance, source| Linear { terms, residual, variance, source };
+        let row =
+            |terms, residual, variance, source| Linear { terms, residual, variance, once: variance, source };
         let mut surveyed = 0.0;
         for (index, contact) in trip.contacts.iter().enumerate() {
             surveyed += contact.way;
@@ -166,12 +169,13 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.at[index]);
             subtract(&mut terms, &sections);
             let Error { speed, law, step } = errors[index];
-            let variance = speed * speed * contact.variance + law * law + SENSOR_SCATTER * SENSOR_SCATTER;
-            let residual = own.place + here.at[index] - surveyed - longer;
+            let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+            let variance = own + SYSTEMATIC * SYSTEMATIC * law * law;
+            let residual = at.own.place + here.at[index] - surveyed - longer;
             if with_slopes {
                 self.scaled(&mut terms, residual, step);
             }
-            rows.push(row(terms, residual, variance, Source::Sensor));
+            rows.push(Linear { once: own + law * law, ..row(terms, residual, variance, Source::Sensor) });
         }
         let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
         let beyond_last = own.place + here.rest - surveyed - longer;
@@ -223,7 +227,7 @@ impl Point<'_> {
         let mut rows = Vec::new();
         let mut add = |terms: Vec<(usize, f64)>, residual: f64, deviation: f64, source: Source| {
             let variance = deviation * deviation;
-            rows.push(Linear { terms, residual, variance, source });
+            rows.push(Linear { terms, residual, variance, once: variance, source });
         };
         if !trip.continues {
             add(vec![(columns.place(), 1.0)], own.place, ANYWHERE, Source::Usual);
@@ -285,7 +289,7 @@ impl Point<'_> {
     }
 }
 
-fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
+pub(super) fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
     match terms.iter_mut().find(|(known, _)| *known == column) {
         Some((_, slope)) => *slope += by,
         None => terms.push((column, by)),
@@ -316,7 +320,7 @@ fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -
             walk.way(contact.time);
             let (middle, displacement) = walk.in_change(contact.time);
             let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
-            let law = SYSTEMATIC * shape_error * middle * displacement.abs();
+            let law = shape_error * middle * displacement.abs();
             Error { speed: walk.speed(contact.time), law, step: trip.step_of(walk.segment()) }
         })
         .collect()
