@@ -250,11 +250,37 @@ fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_
         watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
     };
     assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
-    assert!(watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) }).is_err());
+    let stop = StopOrder::at(FIRST, Landmark { node: NodeId(0), offset: Length::from_mm(100.0) });
+    assert_eq!(
+        watched.dog.order(watched.world.now, Order::Stop(stop)),
+        Err(Refusal::InDanger { train: FIRST })
+    );
     watched.put_first_down();
     watched.go(FIRST, 8);
     watched.run(10.0);
     assert!(!watched.dog.is_held(FIRST));
+}
+
+#[test]
+fn a_train_that_is_alone_and_could_not_be_brought_back_is_found_by_letting_it_run() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 8);
+    watched.run(4.0);
+    watched.world.trains.clear();
+    let asks = |watched: &Watched| {
+        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
+    // A hand puts it down somewhere else, and says nothing.
+    watched.world.put(24, "B1", 50.0);
+    watched.go(FIRST, 8);
+    watched.run(12.0);
+    assert!(!watched.dog.is_held(FIRST));
+    let believed = watched.dog.position(FIRST, watched.world.now).expect("it is located");
+    let truth = watched.world.train().at;
+    assert_eq!(believed.edge, truth.edge);
+    let off = (believed.offset - truth.offset).as_mm();
+    assert!(off.abs() < 15.0, "{off} mm");
 }
 
 #[test]

@@ -166,7 +166,8 @@ impl fmt::Display for WatchdogNotice {
             }
             Self::NeedsPerson { train, while_it } => write!(
                 f,
-                "train {train} could not be brought back {while_it}: see to it, put it on the track and say where"
+                "train {train} could not be brought back {while_it}: see to it, put it on the track and say where; \
+                 if no other train is there, let it run over a contact"
             ),
         }
     }

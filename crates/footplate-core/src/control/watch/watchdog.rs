@@ -139,11 +139,7 @@ impl Watchdog {
     /// with that, as it was before. When nobody is in danger then, those that were held are not any more; what they were
     /// doing is dropped, and said to be.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
-        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
-        if let Some(base) = given_up.map(|danger| danger.base().clone()) {
-            self.driver.set_model(base);
-            self.forget(train);
-        }
+        self.trust_again(train);
         self.driver.place(now, train, at, uncertainty);
         self.vigils.entry(train).or_default().place();
         self.note_place(now, train);
@@ -221,6 +217,10 @@ impl Watchdog {
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Some(train) = order.train() {
             let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
+            if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
+                // There is nothing to run into: a person lets it run over a contact, which says where it is.
+                self.trust_again(train);
+            }
             if !stops && (self.is_held(train) || self.could_meet(now, train)) {
                 return Err(Refusal::InDanger { train });
             }
@@ -244,6 +244,15 @@ impl Watchdog {
         }
         self.act(now);
         Ok(id)
+    }
+
+    /// A train that could not be brought back counts as it was before: a person has seen to it.
+    fn trust_again(&mut self, train: TrainId) {
+        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
+        if let Some(base) = given_up.map(|danger| danger.base().clone()) {
+            self.driver.set_model(base);
+            self.forget(train);
+        }
     }
 
     /// An order of the watchdog's own.
