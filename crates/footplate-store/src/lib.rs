@@ -48,7 +48,7 @@ pub use layout_file::{
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
 pub use motion_file::{
     ExactForm, KeptModel, MOTION_MODEL_VERSION, MotionFile, MotionFileError, MotionSectionForm,
-    MotionStepForm, UseForm,
+    MotionStepForm, StopOffsetForm, UseForm,
 };
 pub use motion_replay::MotionReplay;
 pub use published_table::{

@@ -13,6 +13,7 @@ use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::latency::{ContactWindow, TruncatedNormal};
 use crate::time::{TimeSpan, Timestamp};
+use crate::track::HopId;
 use crate::units::{Length, Speed};
 
 /// Contacts close a little earlier or later from one passage to the next (m).
@@ -164,10 +165,10 @@ impl Locator {
 
     /// A command to the train has left the line. Other entries say nothing here.
     pub fn handle_command(&mut self, context: TrackContext<'_>, model: &MotionModel, event: &Event) {
-        let _ = context;
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
                 self.following.tell(model, self.seconds(event.time), step.get());
+                self.following.stop_on(self.stops_on(context, model, &self.following));
             }
             // It faces the other way now; how far its pickup reaches on that side is not known here.
             EventKind::Reverse { train } if train == self.train => self.lose(),
@@ -372,7 +373,7 @@ impl Locator {
     ) -> Option<Rest> {
         let mut stopped = self.following;
         stopped.tell(model, self.seconds(at), 0);
-        self.rest_of(context, &stopped, model)
+        self.rest_of(context, stopped, model)
     }
 
     /// The same for a train at rest that is first told a step at `start`: what a short move is made of.
@@ -388,16 +389,37 @@ impl Locator {
         let mut moved = self.following;
         moved.tell(model, self.seconds(start), step.get());
         moved.tell(model, self.seconds(stop.max(start)), 0);
-        self.rest_of(context, &moved, model)
+        self.rest_of(context, moved, model)
+    }
+
+    /// The hop on which a train that was told to stop comes to rest, as far as is known before that is told apart by hops.
+    fn stops_on(
+        &self,
+        context: TrackContext<'_>,
+        model: &MotionModel,
+        following: &MotionFilter,
+    ) -> Option<HopId> {
+        let mut anywhere = *following;
+        anywhere.stop_on(None);
+        let (rest, ..) = anywhere.rest(model)?;
+        let mut way = 0.0;
+        for hop in context.hops_ahead(self.node?).take(MOST_HOPS) {
+            way += felt_reach(context, model, &hop).mean;
+            if rest.mean < way {
+                return Some(hop.id);
+            }
+        }
+        None
     }
 
     fn rest_of(
         &self,
         context: TrackContext<'_>,
-        following: &MotionFilter,
+        mut following: MotionFilter,
         model: &MotionModel,
     ) -> Option<Rest> {
         let node = self.node?;
+        following.stop_on(self.stops_on(context, model, &following));
         let (place, scatter, time) = following.rest(model)?;
         let at = WayPoint { node, way: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, at);

@@ -14,6 +14,7 @@ const MAX_TABLE_WORK: usize = 1 << 20;
 
 /// A hop by its place in the layout's table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HopId(pub(crate) u32);
 
 impl HopId {

@@ -2,7 +2,7 @@
 
 use footplate_core::calibration::SectionIndex;
 use footplate_core::calibration::motion::MotionFit;
-use footplate_core::{Approach, Command, Event, EventKind, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Approach, Command, EdgeId, Event, EventKind, Length, SpeedStep, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, step, straight};
 
@@ -93,4 +93,35 @@ fn after_three_hundred_stops_a_model_is_as_true_as_it_says() {
         assert!(off.abs() < 0.01, "step {number}: {off}");
         assert!(speed.count >= 60, "all contacts count: {}", speed.count);
     }
+}
+
+/// How much further a train rolls that comes to rest on the falling hop (mm).
+const DOWNHILL_MM: f64 = 25.0;
+
+#[test]
+fn stops_that_end_downhill_are_learnt_to_be_longer_there_and_nowhere_else() {
+    // Given a circuit of three hops, of which one falls,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    let falls = EdgeId(12);
+    for number in [8, 12, 5, 10, 6, 9, 7].into_iter().cycle().take(150) {
+        trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        let at = world.trains[0].at;
+        let further =
+            world.layout.advance(at, Length::from_mm(DOWNHILL_MM), &world.turnouts).expect("a circuit");
+        if at.edge == falls && further.edge == falls {
+            world.trains[0].at = further;
+        }
+        fit.refit(&sections);
+    }
+    // then the stops that end there are longer by so much than those that end elsewhere.
+    let offsets = fit.model().numbers().stop_offsets;
+    let downhill = world.layout.hops().find(|hop| hop.edges == [falls]).expect("it is a hop").id.index();
+    let (there, elsewhere): (Vec<_>, Vec<_>) = offsets.iter().partition(|(hop, ..)| *hop == downhill);
+    let mean = |of: &[(usize, f64, f64)]| {
+        of.iter().map(|(_, offset, _)| 1e3 * offset).sum::<f64>() / of.len() as f64
+    };
+    let difference = mean(&there) - mean(&elsewhere);
+    assert!((difference - DOWNHILL_MM).abs() < 8.0, "{difference} mm: {offsets:?}");
 }

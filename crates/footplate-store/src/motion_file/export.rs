@@ -5,7 +5,9 @@ use footplate_core::calibration::motion::{MotionModel, MotionNumbers, NumbersErr
 use footplate_core::track::{Hop, Layout};
 use footplate_core::{Approach, Length, SpeedStep, Timestamp};
 
-use super::form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
+use super::form::{
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
+};
 use crate::quantity::Quantity;
 
 impl MotionFile {
@@ -28,6 +30,7 @@ impl MotionFile {
                 .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
                 .collect(),
+            stop_offsets: layout.hops().filter_map(|hop| stop_offset_form(layout, &numbers, &hop)).collect(),
             exact: exact(&numbers, measured_at_s),
         }
     }
@@ -38,12 +41,19 @@ impl MotionFile {
     /// The numbers make no model.
     pub fn model(&self, layout: &Layout) -> Result<MotionModel, NumbersError> {
         let index = SectionIndex::of(layout);
+        let hop_between = |from: &str, to: &str| {
+            let (from, to) = (layout.node_named(from)?, layout.node_named(to)?);
+            layout.hops_from(from).find(|hop| hop.to == to)
+        };
         let sections = self.sections.iter().filter_map(|form| {
-            let (from, to) = (layout.node_named(&form.from)?, layout.node_named(&form.to)?);
-            let hop = layout.hops_from(from).find(|hop| hop.to == to)?;
+            let hop = hop_between(&form.from, &form.to)?;
             // The layout may have been surveyed anew since.
             let longer_mm = form.surveyed_mm + form.add.value - hop.length.as_mm();
             Some((index.section(hop.id)?, 1e-3 * longer_mm, 1e-6 * form.add.uncertainty.powi(2)))
+        });
+        let offsets = self.stop_offsets.iter().filter_map(|form| {
+            let hop = hop_between(&form.from, &form.to)?;
+            Some((hop.id.index(), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
         });
         let exact = &self.exact;
         MotionModel::from_numbers(&MotionNumbers {
@@ -52,6 +62,8 @@ impl MotionFile {
             values: exact.values.clone(),
             covariance: exact.covariance.clone(),
             sections: sections.collect(),
+            stop_offsets: offsets.collect(),
+            stop_offset_deviation: exact.stop_offset_deviation,
             uses: exact.uses.iter().map(|form| form.step_use()).collect(),
             counts: exact
                 .counts
@@ -119,12 +131,29 @@ fn section_form(
     }
 }
 
+fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> Option<StopOffsetForm> {
+    let (_, offset, variance) = numbers.stop_offsets.iter().find(|(known, ..)| *known == hop.id.index())?;
+    Some(StopOffsetForm {
+        from: layout.node_name(hop.from).to_owned(),
+        to: layout.node_name(hop.to).to_owned(),
+        add: Quantity {
+            value: 1e3 * offset,
+            uncertainty: 1e3 * variance.sqrt(),
+            unit: "mm".to_owned(),
+            // As of sections.
+            measurements: 0,
+            measured_at_s: None,
+        },
+    })
+}
+
 fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
     let counts = numbers.counts.iter().map(|[below, above]| [below.0, below.1, above.0, above.1]);
     ExactForm {
         measured_at_s,
         scatter_scale: numbers.scatter_scale,
         scatter_floor: numbers.scatter_floor,
+        stop_offset_deviation: numbers.stop_offset_deviation,
         start_scale: numbers.start_scale,
         scale: numbers.scale.clone(),
         counts: counts.collect(),

@@ -8,7 +8,7 @@ use crate::quantity::Quantity;
 /// Names the formulas that made the numbers. Raise it when the same events come to other numbers: with every change of what
 /// `calibration::motion` of core makes of them, or of what [`MotionReplay`](crate::MotionReplay) tells it. Models and replays
 /// that stores keep are then made anew from the events; a test knows the numbers of every version.
-pub const MOTION_MODEL_VERSION: &str = "3";
+pub const MOTION_MODEL_VERSION: &str = "4";
 
 /// All that is known of how one train moves on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,6 +29,9 @@ pub struct MotionFile {
     /// How much longer than surveyed the ways between contacts are for it, where it was there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<MotionSectionForm>,
+    /// By how much stops that end between two contacts are longer for it than elsewhere, by direction, where it stopped.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stop_offsets: Vec<StopOffsetForm>,
     /// What the model is made of, for programs.
     pub exact: ExactForm,
 }
@@ -45,6 +48,9 @@ pub struct ExactForm {
     /// What they scatter by besides (m), whatever their speed.
     #[serde(default)]
     pub scatter_floor: f64,
+    /// One standard deviation of the offsets of stops from place to place (m).
+    #[serde(default)]
+    pub stop_offset_deviation: f64,
     /// How late or early starts from rest are against what trains usually do.
     pub start_scale: f64,
     /// What each of `values` is off by for one standard deviation of the scale of the survey.
@@ -106,5 +112,16 @@ pub struct MotionSectionForm {
     /// Surveyed length (mm).
     pub surveyed_mm: f64,
     /// What to add to it for this train (mm).
+    pub add: Quantity,
+}
+
+/// What stops are longer by that end between two contacts, run over in this direction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StopOffsetForm {
+    /// The contact passed last, by name.
+    pub from: String,
+    /// The one that would come next.
+    pub to: String,
+    /// What to add to a stop from 300 mm/s (mm).
     pub add: Quantity,
 }

@@ -9,6 +9,8 @@ mod form;
 mod kept;
 mod read;
 
-pub use form::{ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, UseForm};
+pub use form::{
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
+};
 pub use kept::KeptModel;
 pub use read::MotionFileError;

@@ -16,7 +16,8 @@
 
 use super::course::{Course, E, H, N};
 use super::model::MotionModel;
-use super::motion_filter::{MotionFilter, run_variance};
+use super::motion_filter::MotionFilter;
+use super::priors::run_variance;
 use super::segment::{Pace, Segment, Told};
 
 /// By so much, as ln, speeds differ between which slopes are taken.

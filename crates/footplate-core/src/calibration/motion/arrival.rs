@@ -9,7 +9,14 @@
 
 use super::course::{B, E, N};
 use super::model::MotionModel;
-use super::motion_filter::{BISECTIONS, Gaussian, LONGEST_WAIT, MotionFilter, SLOWEST};
+use super::motion_filter::{Gaussian, MotionFilter};
+
+/// A train that has not arrived after this long (s) does not arrive: the longest hop at the lowest step takes a minute.
+pub(super) const LONGEST_WAIT: f64 = 200.0;
+/// Halvings of half a second that leave less than a microsecond.
+pub(super) const BISECTIONS: usize = 30;
+/// Below this (m/s) a place says nothing of a time.
+pub(super) const SLOWEST: f64 = 0.002;
 
 /// When a train reaches a place.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -118,6 +118,12 @@ impl Chain {
             self.trips.push(Trip::new(time, Some((self.step, self.above)), false));
             self.unbroken = true;
         }
+        if let (Some([hop]), [.., stopped, trip]) = (way.as_ref().map(Reach::hops), self.trips.as_mut_slice())
+            && trip.continues
+            && trip.contacts.is_empty()
+        {
+            stopped.rest_hop = Some(hop.index());
+        }
         let Some(trip) = self.trips.last_mut() else { return };
         let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
             (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())

@@ -31,7 +31,7 @@ use crate::track::{Layout, TurnoutStates};
 
 /// Promises are watched once so many stops are known: those of a train that is hardly known yet are broken because numbers
 /// that are far off do not change evenly, which says nothing of how its stops scatter.
-const WATCHED_FROM: u32 = 4;
+const WATCHED_FROM: u32 = 20;
 /// Steps after which an iteration that has not settled is taken as it is.
 const MOST_ITERATIONS: usize = 15;
 /// A step is shortened by half so often before the point counts as the best.
@@ -79,13 +79,13 @@ struct Reduced {
     trips: Vec<Vec<Eliminated>>,
 }
 
-/// What the survey of the layout says of the sections passed.
+/// What the survey of the layout says of the sections passed, and what is usual of stops for where they end.
 ///
 /// Speeds and lengths could all be longer by the same part, and no timing would tell: where the survey's scale is known, give
 /// or take a deviation, its total is the measure. All that is asked of a model, where a train comes to rest, is the same in
 /// any.
 struct Survey {
-    /// Sums of what sections are longer that are nothing, with their variance (m²).
+    /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
     rows: Vec<(Vec<(usize, f64)>, f64)>,
     scale: Option<f64>,
 }
@@ -176,6 +176,7 @@ impl MotionFit {
             lasting,
             highest: self.highest(),
             scatter: self.model.scatter,
+            stop_offset_variance: self.model.stop_offsets.variance(),
             stop_shape_error: self.model.stop_shape_error(),
         }
     }
@@ -184,10 +185,11 @@ impl MotionFit {
     pub fn refit(&mut self, sections: &SectionIndex) {
         let passed = self.chain.trips.iter().flat_map(|trip| &trip.contacts);
         self.prior.meet(passed.flat_map(|contact| &contact.sections));
+        self.prior.meet_stops(self.chain.trips.iter().filter_map(|trip| trip.rest_hop));
         let columns = self.prior.columns();
         let mut values = self.start(&columns);
         self.compare_promises(&columns, &values);
-        let survey = Survey::of(&columns, sections);
+        let survey = Survey::of(&columns, sections, self.model.stop_offsets.variance());
         let mut closed = None;
         for iteration in 0..MOST_ITERATIONS {
             let believes_all = iteration < ALL_BELIEVED;
@@ -252,6 +254,11 @@ impl MotionFit {
         for (section, column) in &columns.sections {
             if let (Some(slot), Some((by, _))) = (lasting.get_mut(*column), self.model.section(*section)) {
                 *slot = by;
+            }
+        }
+        for (hop, column) in &columns.stop_offsets {
+            if let Some(slot) = lasting.get_mut(*column) {
+                *slot = self.model.stop_offsets.of(Some(*hop)).mean;
             }
         }
         let point = self.point(columns, &lasting);
@@ -379,12 +386,14 @@ impl MotionFit {
 }
 
 impl Survey {
-    fn of(columns: &Columns, index: &SectionIndex) -> Self {
+    fn of(columns: &Columns, index: &SectionIndex, stop_offset_variance: f64) -> Self {
         let mut rows: Vec<(Vec<(usize, f64)>, f64)> = columns
             .sections
             .iter()
             .map(|(section, column)| (alloc::vec![(*column, 1.0)], section_variance(index, *section)))
             .collect();
+        let offsets = columns.stop_offsets.values();
+        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], stop_offset_variance)));
         let of_total = index.scale_variance(columns.sections.keys().copied());
         // What all lengths have in common does not keep their total from being a measure.
         let of_lengths = of_total - index.scale() * index.scale();

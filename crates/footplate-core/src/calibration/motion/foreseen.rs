@@ -6,6 +6,10 @@ use super::model::MotionModel;
 use super::priors::TRIP_DEVIATION;
 use super::rows::{Linear, Point, Source, TripAt, add_term};
 
+/// Where a train was at the last sensor before a stop is known from the whole run, which leaves this part of the variance of that
+/// sensor by itself (two or three sensors within the time in which a run's speed wanders).
+const LAST_SENSOR: f64 = 0.5;
+
 /// The first sensor behind a stop, before and after it was passed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Foreseen {
@@ -34,32 +38,37 @@ impl Point<'_> {
         let starting = self.rows(after, true);
         let first = starting.iter().find(|row| row.source == Source::Sensor)?;
         let mut terms: Vec<(usize, f64)> = Vec::new();
-        let mut residual = 0.0;
         let mut add = |row: &Linear, sign: f64| {
-            residual += sign * row.residual;
             for (column, slope) in row.terms.iter().filter(|(column, _)| *column < self.columns.lasting) {
                 add_term(&mut terms, *column, sign * slope);
             }
         };
-        add(stopping.get(stop)?, 1.0);
+        let stop = stopping.get(stop)?;
+        add(stop, 1.0);
         add(first, 1.0);
         if let Some(last) = last {
             add(last, -1.0);
         }
         let numbers = super::parameters::count(self.highest);
-        let (of_train, of_sections): (Vec<_>, Vec<_>) =
+        let (of_train, of_local): (Vec<_>, Vec<_>) =
             terms.iter().copied().partition(|(column, _)| *column < numbers);
         let mut variance = model.spread.variance_along(&of_train);
         for (section, column) in &self.columns.sections {
-            let slope = of_sections.iter().find(|(of, _)| of == column).map_or(0.0, |(_, slope)| *slope);
+            let slope = of_local.iter().find(|(of, _)| of == column).map_or(0.0, |(_, slope)| *slope);
             variance += slope * slope * model.section(*section).map_or(0.0, |(_, variance)| variance);
+        }
+        for (hop, column) in &self.columns.stop_offsets {
+            let slope = of_local.iter().find(|(of, _)| of == column).map_or(0.0, |(_, slope)| *slope);
+            variance += slope * slope * model.stop_offsets.of(Some(*hop)).variance;
         }
         let slope_at =
             |column: usize| first.terms.iter().find(|(of, _)| *of == column).map_or(0.0, |(_, slope)| *slope);
         let late = slope_at(self.columns.late_start()) * model.start_scatter();
         let pieces = (0..after.own.deviations.len()).map(|piece| slope_at(self.columns.deviation(piece)));
         let run = pieces.sum::<f64>() * TRIP_DEVIATION;
-        variance += late * late + run * run + first.once + last.map_or(0.0, |row| row.once);
+        let begin = last.map_or(0.0, |row| LAST_SENSOR * row.once);
+        variance += late * late + run * run + first.once + begin;
+        let residual = stop.residual + first.residual;
         Some(Foreseen { residual, variance })
     }
 }

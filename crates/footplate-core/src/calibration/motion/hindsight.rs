@@ -17,6 +17,9 @@ impl MotionModel {
         for (_, variance) in certain.sections.values_mut() {
             *variance = 0.0;
         }
+        for (_, variance) in certain.stop_offsets.of_hop.values_mut() {
+            *variance = 0.0;
+        }
         certain
     }
 

@@ -40,6 +40,10 @@ impl MotionModel {
         };
         self.sections = columns.sections.iter().map(|(section, column)| (*section, known(*column))).collect();
         self.scatter = scatter.scatter();
+        let offset =
+            |column: usize| (lasting.get(column).copied().unwrap_or(0.0), solution.variance(column).max(0.0));
+        let offsets = columns.stop_offsets.iter().map(|(hop, column)| (*hop, offset(*column)));
+        self.stop_offsets.learn(offsets.collect(), self.scatter.floor);
         self.date = date;
     }
 

@@ -18,14 +18,28 @@ use crate::linalg::NormalEquations;
 /// No place is farther (m) from the sensor passed last: what this adds to knowledge is nothing beside any measurement.
 const BOUND: f64 = 100.0;
 
-/// The numbers of a train, then by how much sections are longer than surveyed, then the place at which the first kept trip
-/// begins.
+/// A number that belongs to a place on the layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(untagged))]
+enum Local {
+    /// By how much a section is longer than surveyed.
+    Section(usize),
+    /// By how much stops that end on a hop are longer.
+    StopOffset {
+        /// The hop.
+        hop: usize,
+    },
+}
+
+/// The numbers of a train, then those of places in the order in which they were met, then the place at which the first kept
+/// trip begins.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MarginalPrior {
     pub(super) equations: NormalEquations,
-    /// The sections, in the order of their columns.
-    sections: Vec<usize>,
+    /// What belongs to places, in the order of the columns.
+    #[cfg_attr(feature = "serde", serde(rename = "sections"))]
+    local: Vec<Local>,
     /// What was counted of the trips that are no longer kept.
     pub(super) counts: Vec<[Counts; 2]>,
     pub(super) scatter: ScatterSums,
@@ -40,7 +54,7 @@ impl MarginalPrior {
         equations.append(1);
         Self {
             equations,
-            sections: Vec::new(),
+            local: Vec::new(),
             counts: vec![[Counts::default(); 2]; highest + 1],
             scatter: ScatterSums::default(),
             widened: 0.0,
@@ -51,20 +65,37 @@ impl MarginalPrior {
     /// later.
     pub(super) fn meet<'s>(&mut self, passed: impl Iterator<Item = &'s usize>) {
         for section in passed {
-            if self.sections.contains(section) {
-                continue;
-            }
-            self.sections.push(*section);
-            self.equations.append(1);
-            self.equations.swap_last_two();
+            self.meet_local(Local::Section(*section));
         }
+    }
+
+    /// Stops ended on hops, perhaps for the first time.
+    pub(super) fn meet_stops(&mut self, hops: impl Iterator<Item = usize>) {
+        for hop in hops {
+            self.meet_local(Local::StopOffset { hop });
+        }
+    }
+
+    fn meet_local(&mut self, local: Local) {
+        if self.local.contains(&local) {
+            return;
+        }
+        self.local.push(local);
+        self.equations.append(1);
+        self.equations.swap_last_two();
     }
 
     /// The columns of a fit.
     pub(super) fn columns(&self) -> Columns {
-        let first = self.equations.unknowns() - 1 - self.sections.len();
-        let sections = self.sections.iter().enumerate().map(|(place, section)| (*section, first + place));
-        Columns { sections: sections.collect::<BTreeMap<_, _>>(), lasting: self.equations.unknowns() - 1 }
+        let first = self.equations.unknowns() - 1 - self.local.len();
+        let (mut sections, mut stop_offsets) = (BTreeMap::new(), BTreeMap::new());
+        for (column, local) in (first..).zip(&self.local) {
+            match *local {
+                Local::Section(section) => sections.insert(section, column),
+                Local::StopOffset { hop } => stop_offsets.insert(hop, column),
+            };
+        }
+        Columns { sections, stop_offsets, lasting: self.equations.unknowns() - 1 }
     }
 
     /// Time has passed on a chain that goes on: trains get warm, rails get dirty.
@@ -81,8 +112,8 @@ impl MarginalPrior {
 
     fn widen(&mut self, highest: usize, by: &Variation) {
         let side = self.equations.unknowns();
-        // Where the first kept trip begins may not be known at all, nor a section; a covariance needs a bound.
-        for free in side - 1 - self.sections.len()..side {
+        // Where the first kept trip begins may not be known at all, nor a section or an offset; a covariance needs a bound.
+        for free in side - 1 - self.local.len()..side {
             self.equations.add(&[(free, 1.0)], 0.0, BOUND * BOUND);
         }
         let mut more = vec![0.0; side * (side + 1) / 2];

@@ -33,6 +33,7 @@ mod spread;
 #[cfg(feature = "serde")]
 mod square;
 mod standing_times;
+mod stop_offset;
 mod trip;
 mod unknowns;
 mod variation;

@@ -4,18 +4,21 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::doubts::END_OF_STOP;
+use super::motion_filter::Gaussian;
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, Told};
 use super::spread::Spread;
+use super::stop_offset::{StopOffsets, stop_offset_share};
 use super::variation::Variation;
 use crate::calibration::SectionIndex;
 use crate::estimate::Estimate;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Hop;
+use crate::track::{Hop, HopId};
 use crate::units::{Length, Speed};
 
 /// Whether a step moves the train.
@@ -58,6 +61,9 @@ pub struct MotionModel {
     pub(super) spread: Spread,
     /// By how much sections are longer than surveyed (m), with the variance.
     pub(super) sections: BTreeMap<usize, (f64, f64)>,
+    /// By how much stops are longer for where they end.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) stop_offsets: StopOffsets,
     uses: Vec<StepUse>,
     /// Contacts passed and stops made at each step, from below and from above.
     pub(super) counts: Vec<[Counts; 2]>,
@@ -90,6 +96,7 @@ impl MotionModel {
             values: prior_means(steps),
             spread: Spread::prior(steps),
             sections: BTreeMap::new(),
+            stop_offsets: StopOffsets::default(),
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
             scatter: Scatter::USUAL,
@@ -197,8 +204,14 @@ impl MotionModel {
         let speed = self.answers().speed(usize::from(step.get()), above);
         StopForecast {
             distance: Length::from_m(distance.max(0.0)),
-            doubt: Length::from_m(self.deviation_with_scale(|answers| stop(answers).0)),
-            scatter: Length::from_m(self.scatter(speed)),
+            doubt: Length::from_m(libm::hypot(
+                self.deviation_with_scale(|answers| stop(answers).0),
+                END_OF_STOP,
+            )),
+            scatter: Length::from_m(libm::hypot(
+                self.scatter(speed),
+                libm::sqrt(self.stop_offset(None, speed).variance),
+            )),
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
             count: self.counts_at(step, approach).stops,
         }
@@ -207,6 +220,12 @@ impl MotionModel {
     /// One standard deviation (m) of stops from a speed (m/s).
     pub(crate) fn scatter(&self, speed: f64) -> f64 {
         self.scatter.of_stop(speed)
+    }
+
+    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop; or nobody knows where.
+    pub(crate) fn stop_offset(&self, hop: Option<HopId>, speed: f64) -> Gaussian {
+        let (share, offset) = (stop_offset_share(speed), self.stop_offsets.of(hop.map(HopId::index)));
+        Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
     }
 
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.

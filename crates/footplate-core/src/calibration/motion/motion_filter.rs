@@ -6,10 +6,12 @@
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::apart::STEP_AGAIN;
+use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
 use super::course::{B, Course, E, H, LATER, N, Told, Z};
 use super::decoder_kind::SHAPE_ERROR;
 use super::model::MotionModel;
-use super::priors::{TRIP_DEVIATION, WANDER, change_error};
+use super::priors::{WANDER, change_error, run_variance};
+use crate::track::HopId;
 
 /// Over this time (s) a run's speed wanders by [`WANDER`].
 const WANDERS_IN: f64 = 4.0;
@@ -60,6 +62,9 @@ pub(crate) struct MotionFilter<const L: usize = N> {
     wandered: f64,
     /// What of the variance of ln of a speed is not believed to be learnt for every single moment.
     local: f64,
+    /// Where a stop would end, as far as its owner knows.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    stops_on: Option<HopId>,
 }
 
 impl<const L: usize> MotionFilter<L> {
@@ -67,7 +72,7 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
-        Self { course: Course::at_rest(time, place.mean), p, wandered: time, local: 0.0 }
+        Self { course: Course::at_rest(time, place.mean), p, wandered: time, local: 0.0, stops_on: None }
     }
 
     /// Running steadily at a step for long.
@@ -96,6 +101,11 @@ impl<const L: usize> MotionFilter<L> {
         }
         self.settle(model, sent);
         self.course.tell(sent, step);
+    }
+
+    /// A stop that has not begun yet would end on a hop.
+    pub(crate) const fn stop_on(&mut self, hop: Option<HopId>) {
+        self.stops_on = hop;
     }
 
     /// Whether a train that was told to stop stands by a time.
@@ -157,8 +167,10 @@ impl<const L: usize> MotionFilter<L> {
         let carried = unshaped * self.course.segment.delay();
         self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
         if told.to == 0 {
-            let scatter = model.scatter(speed * self.course.grown());
-            self.p[Z][Z] += scatter * scatter;
+            let speed = speed * self.course.grown();
+            let (scatter, offset) = (model.scatter(speed), model.stop_offset(self.stops_on, speed));
+            self.p[Z][Z] += scatter * scatter + offset.variance;
+            self.course.x[Z] = offset.mean;
         }
     }
 
@@ -452,19 +464,6 @@ impl<const L: usize> MotionFilter<L> {
         Some((high, doubt))
     }
 }
-
-/// Variance of ln of a speed by which a run differs from all others. A speed that is known for certain is that of the run: an
-/// oracle was told it.
-pub(super) fn run_variance(of_step: f64) -> f64 {
-    if of_step > 0.0 { TRIP_DEVIATION * TRIP_DEVIATION } else { 0.0 }
-}
-
-/// A train that has not arrived after this long (s) does not arrive: the longest hop at the lowest step takes a minute.
-pub(super) const LONGEST_WAIT: f64 = 200.0;
-/// Halvings of half a second that leave less than a microsecond.
-pub(super) const BISECTIONS: usize = 30;
-/// Below this (m/s) a place says nothing of a time.
-pub(super) const SLOWEST: f64 = 0.002;
 
 #[cfg(test)]
 mod tests {

@@ -7,6 +7,7 @@ use core::fmt;
 use super::model::{Counts, MotionModel, StepUse};
 use super::scatter::Scatter;
 use super::spread::Spread;
+use super::stop_offset::StopOffsets;
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::Timestamp;
 
@@ -23,6 +24,10 @@ pub struct MotionNumbers {
     pub covariance: Vec<f64>,
     /// By [section](crate::calibration::SectionIndex), by how much it is longer than surveyed (m), with the variance.
     pub sections: Vec<(usize, f64, f64)>,
+    /// By [hop](crate::track::HopId) on which stops ended, by how much they are longer there (m), with the variance.
+    pub stop_offsets: Vec<(usize, f64, f64)>,
+    /// One standard deviation of that from hop to hop (m).
+    pub stop_offset_deviation: f64,
     /// By step from 0 on, what experience says of it.
     pub uses: Vec<StepUse>,
     /// By step from 0 on, contacts passed and stops made from below and then from above.
@@ -72,12 +77,19 @@ impl fmt::Display for NumbersError {
 
 impl core::error::Error for NumbersError {}
 
+fn of_places(places: &BTreeMap<usize, (f64, f64)>) -> Vec<(usize, f64, f64)> {
+    places.iter().map(|(place, (by, variance))| (*place, *by, *variance)).collect()
+}
+
+fn by_place(places: &[(usize, f64, f64)]) -> BTreeMap<usize, (f64, f64)> {
+    places.iter().map(|(place, by, variance)| (*place, (*by, *variance))).collect()
+}
+
 impl MotionModel {
     /// The model as plain numbers; [`from_numbers`](Self::from_numbers) makes the same model of them.
     #[must_use]
     pub fn numbers(&self) -> MotionNumbers {
         let side = self.values.len();
-        let sections = self.sections.iter().map(|(section, (by, variance))| (*section, *by, *variance));
         let counts = |one: &Counts| (one.contacts, one.stops);
         let steps = (0..=self.highest().get()).filter_map(SpeedStep::new);
         MotionNumbers {
@@ -85,7 +97,9 @@ impl MotionModel {
             highest: self.highest(),
             values: self.values.clone(),
             covariance: (0..side).flat_map(|i| (0..=i).map(move |j| self.spread.between(i, j))).collect(),
-            sections: sections.collect(),
+            sections: of_places(&self.sections),
+            stop_offsets: of_places(&self.stop_offsets.of_hop),
+            stop_offset_deviation: self.stop_offsets.deviation,
             uses: steps.map(|step| self.uses(step)).collect(),
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
             scatter_scale: self.scatter.stops,
@@ -127,22 +141,29 @@ impl MotionModel {
         {
             return wrong("covariances");
         }
-        let sections = || numbers.sections.iter();
-        let is_section = |(_, by, variance): &(usize, f64, f64)| {
+        let is_known = |(_, by, variance): &(usize, f64, f64)| {
             by.is_finite() && variance.is_finite() && *variance >= 0.0
         };
-        if !sections().all(is_section) {
+        if !numbers.sections.iter().all(is_known) {
             return wrong("sections");
         }
-        let scatters = [numbers.scatter_scale, numbers.scatter_floor, numbers.start_scale];
+        if !numbers.stop_offsets.iter().all(is_known) {
+            return wrong("offsets of stops");
+        }
+        let scatters = [
+            numbers.scatter_scale,
+            numbers.scatter_floor,
+            numbers.start_scale,
+            numbers.stop_offset_deviation,
+        ];
         if scatters.iter().any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
             return wrong("scatters");
         }
         model.values.clone_from(&numbers.values);
         model.spread = Spread::of_lower_triangle(side, &numbers.covariance);
-        model.sections = sections()
-            .map(|(section, by, variance)| (*section, (*by, *variance)))
-            .collect::<BTreeMap<_, _>>();
+        model.sections = by_place(&numbers.sections);
+        model.stop_offsets =
+            StopOffsets { of_hop: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
         for (step, found) in (0..=numbers.highest.get()).filter_map(SpeedStep::new).zip(&numbers.uses) {
             model.note_use(step, *found);
         }
@@ -172,6 +193,8 @@ mod tests {
         model.note_use(SpeedStep::new(1).unwrap(), StepUse::Unreliable);
         model.note_use(SpeedStep::new(9).unwrap(), StepUse::Moves);
         model.sections.insert(3, (0.012, 1e-6));
+        model.stop_offsets.of_hop.insert(5, (-0.02, 1e-5));
+        model.stop_offsets.deviation = 0.015;
         model.counts[9][1] = Counts { contacts: 41, stops: 7 };
         model.scatter = Scatter { stops: 1.25, floor: 0.002, ..Scatter::USUAL };
         model.date = Timestamp::from_ns(5);
@@ -205,6 +228,7 @@ mod tests {
             ("numbers", refused(&|numbers| numbers.values[0] = f64::NAN)),
             ("covariances", refused(&|numbers| numbers.covariance[0] = -1.0)),
             ("sections", refused(&|numbers| numbers.sections[0].2 = -1.0)),
+            ("offsets of stops", refused(&|numbers| numbers.stop_offsets[0].1 = f64::NAN)),
             ("scatters", refused(&|numbers| numbers.scatter_scale = f64::INFINITY)),
         ] {
             assert_eq!(error, NumbersError::NoNumber { what });

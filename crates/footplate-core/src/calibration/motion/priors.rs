@@ -38,6 +38,12 @@ pub(super) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
 }
 
+/// Variance of ln of a speed by which a run differs from all others. A speed that is known for certain is that of the run: an
+/// oracle was told it.
+pub(super) fn run_variance(of_step: f64) -> f64 {
+    if of_step > 0.0 { TRIP_DEVIATION * TRIP_DEVIATION } else { 0.0 }
+}
+
 /// What is known of the numbers of any train: the equations that a fit begins with.
 pub(super) fn prior(highest: usize) -> NormalEquations {
     let mut equations = NormalEquations::new(count(highest));

@@ -12,6 +12,7 @@ use super::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use super::robust::Belief;
 use super::scatter::Scatter;
 use super::segment::Segment;
+use super::stop_offset::stop_offset_share;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
 
@@ -103,6 +104,8 @@ pub(super) struct Point<'p> {
     pub(super) highest: usize,
     /// How far stops and starts scatter.
     pub(super) scatter: Scatter,
+    /// Variance of what stops are longer by for where they end (m²).
+    pub(super) stop_offset_variance: f64,
     /// Part of a stop's displacement by which its shape is not true in its middle.
     pub(super) stop_shape_error: f64,
 }
@@ -186,10 +189,14 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.rest);
             subtract(&mut terms, &sections);
             terms.push((columns.next_place(), -1.0));
+            let (offset, free) = self.stop_offset(trip, stop_speed);
+            terms.extend(offset);
+            let longer: f64 = offset.map_or(0.0, |(column, share)| share * self.lasting[column]);
+            let residual = beyond_last + longer - next_place;
             if with_slopes {
-                self.scaled(&mut terms, beyond_last - next_place, stop_step);
+                self.scaled(&mut terms, residual, stop_step);
             }
-            rows.push(row(terms, beyond_last - next_place, scatter, Source::Stop));
+            rows.push(row(terms, residual, scatter + free, Source::Stop));
         }
         if let Some(rest) = &trip.measured {
             let counted = || trip.contacts.iter().take(rest.contacts);
@@ -211,6 +218,17 @@ impl Point<'_> {
             rows.push(row(terms, at_rest - taped - taped_longer, variance, Source::Sensor));
         }
         rows
+    }
+
+    /// The column of what a trip's stop is longer by for where it ended, with its slope, or the variance (m²) of that where nobody
+    /// knows on which hop it did.
+    fn stop_offset(&self, trip: &Trip, speed: f64) -> (Option<(usize, f64)>, f64) {
+        let share = stop_offset_share(speed);
+        let column = trip.rest_hop.and_then(|hop| self.columns.stop_offsets.get(&hop));
+        match column {
+            Some(column) => (Some((*column, share)), 0.0),
+            None => (None, share * share * self.stop_offset_variance),
+        }
     }
 
     /// A residual in m that noise of time makes is as large as the train is fast: its slope in ln speed is no error of speed.

@@ -57,7 +57,7 @@ const WILD_PROMISE: f64 = 16.0;
 /// Bounds of what is believed at all.
 const SCALES: (f64, f64) = (0.4, 6.0);
 /// How many promises that were kept it is worth, beforehand, that stops have no floor.
-const NO_FLOOR: f64 = 4.0;
+const NO_FLOOR: f64 = 3.0;
 /// Promises are weighted as if the floor were at least this (m), about what is not known of the next sensor anyway: by the
 /// weights of none at all, no promise would ever count against those that are worth beforehand.
 const LEAST_FLOOR: f64 = 0.015;

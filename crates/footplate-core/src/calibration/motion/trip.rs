@@ -49,6 +49,9 @@ pub(super) struct Trip {
     pub(super) pieces: Vec<f64>,
     /// Whether it ended at rest by the train's own law.
     pub(super) came_to_rest: bool,
+    /// The hop on which it did, once the next trip has told.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub(super) rest_hop: Option<usize>,
     /// Where it did, if a person measured that.
     pub(super) measured: Option<MeasuredRest>,
     /// What the last fit found of it.
@@ -107,6 +110,7 @@ impl Trip {
             contacts: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
+            rest_hop: None,
             measured: None,
             own: None,
         }

@@ -9,6 +9,8 @@ use super::trip::{Own, Trip};
 pub(super) struct Columns {
     /// Sections that were run over, with their columns behind the numbers of the train.
     pub(super) sections: BTreeMap<usize, usize>,
+    /// Hops on which a stop ended, with the columns of what stops there are longer by.
+    pub(super) stop_offsets: BTreeMap<usize, usize>,
     /// How many numbers last.
     pub(super) lasting: usize,
 }
