@@ -89,6 +89,7 @@ export const ENGLISH = {
   // alarms
   "alarm-drifts-slower": "contacts close later and later: it has become slower than it was",
   "alarm-drifts-faster": "contacts close earlier and earlier: it has become faster than it was",
+  "alarm-promises-broken": "comes to rest elsewhere than promised: promises are wider by ±{0} mm from now on; if its load, the train or the track has changed, calibrate it anew",
   "alarm-not-sent": "not sent: {0}",
   "alarm-line-answers": "the station answers again",
   "alarm-line-silent": "the station has answered nothing for {0} s: check its power, the cable and the port",

@@ -89,6 +89,7 @@ export const GERMAN = {
   // alarms
   "alarm-drifts-slower": "Kontakte schließen immer später: er ist langsamer geworden als er war",
   "alarm-drifts-faster": "Kontakte schließen immer früher: er ist schneller geworden als er war",
+  "alarm-promises-broken": "kommt anderswo zum Stehen als versprochen: Versprechen sind ab jetzt um ±{0} mm weiter; haben sich Last, Zug oder Gleis geändert, neu kalibrieren",
   "alarm-not-sent": "nicht gesendet: {0}",
   "alarm-line-answers": "die Zentrale antwortet wieder",
   "alarm-line-silent": "die Zentrale antwortet seit {0} s nicht: Strom, Kabel und Anschluss prüfen",

@@ -1,12 +1,15 @@
 //! What is not as it should be, with which of the sentences of the pages says it.
 
-use footplate_core::TrainId;
 use footplate_core::calibration::Drift;
 use footplate_core::control::calibrate::Mishap;
 use footplate_core::control::{Alarm as Noticed, DispatchNotice, DriveNotice, WatchdogNotice};
 use footplate_core::track::Layout;
+use footplate_core::{HALF_95, Length, TrainId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;
+
+/// The sentence of a train that breaks its promises.
+const BROKEN_PROMISES: &str = "promises-broken";
 
 /// How bad it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -56,6 +59,17 @@ impl Alarm {
             }
         };
         Self { text: text.to_owned(), ..Self::new(Grade::Warning, what, train, Vec::new()) }
+    }
+
+    /// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
+    pub(crate) fn promises_broken(train: TrainId, by: Length) -> Self {
+        let by = format!("{:.0}", HALF_95 * by.as_mm());
+        Self::new(Grade::Warning, BROKEN_PROMISES, train, vec![by])
+    }
+
+    /// Whether it says that a train came to rest elsewhere than promised too often.
+    pub(crate) fn is_of_promises(&self) -> bool {
+        self.what == BROKEN_PROMISES
     }
 
     /// A command that the session did not take.

@@ -228,6 +228,13 @@ impl MotionModel {
         Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
     }
 
+    /// One standard deviation of what stops scatter by that nothing in the model explains, as promises that were broken show:
+    /// loads, wear, laws that are none of ours. It is part of every stop's scatter.
+    #[must_use]
+    pub const fn unexplained_scatter(&self) -> Length {
+        Length::from_m(self.scatter.floor)
+    }
+
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.
     #[must_use]
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {

@@ -57,6 +57,8 @@ pub(crate) struct ScriptRunner {
     promises: BTreeMap<OrderId, Promise>,
     /// Trains that are not as they were when the session began.
     changed: BTreeSet<TrainId>,
+    /// Trains of which it was said that they break their promises.
+    unreliable: BTreeSet<TrainId>,
     /// When a journey was asked for, begun or ended last.
     stirred: Timestamp,
     /// How each train came to rest last.
@@ -95,6 +97,7 @@ impl ScriptRunner {
             pending: BTreeMap::new(),
             promises: BTreeMap::new(),
             changed: BTreeSet::new(),
+            unreliable: BTreeSet::new(),
             stirred: Timestamp::ZERO,
             rests: BTreeMap::new(),
             outputs: VecDeque::new(),

@@ -5,7 +5,7 @@ use footplate_core::control::{
 };
 use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
-use footplate_core::{HALF_95, SensorId, Timestamp, TrainId};
+use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
 
@@ -275,6 +275,15 @@ impl Tongue<'_> {
         }
         Some(line)
     }
+}
+
+/// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
+pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
+    format!(
+        "train {train} comes to rest elsewhere than promised: promises are wider by ±{:.0} mm from now on; if its load, the train or \
+         the track has changed, measure it again with `footplate calibrate --link ... --train {train} --afresh`",
+        HALF_95 * by.as_mm()
+    )
 }
 
 /// Trains one after the other, as in a sentence.

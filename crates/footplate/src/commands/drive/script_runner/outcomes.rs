@@ -4,14 +4,18 @@ use footplate_core::control::{
     Achieved, DispatchNotice, DriveNotice, Finished, Order, Outcome, Output, Refusal, WatchdogNotice,
 };
 use footplate_core::track::Landmark;
-use footplate_core::{Timestamp, TrainId};
+use footplate_core::{Length, Timestamp, TrainId};
 
 use super::ScriptRunner;
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
-use crate::commands::drive::told::{trains, verb};
+use crate::commands::drive::told::{promises_broken, trains, verb};
 use crate::dashboard::{Alarm, TrainPassed};
+
+/// A train is said to break its promises once they are wider by this, one standard deviation (chosen: ±30 mm are seen beside a
+/// platform, and no train of the usual worlds comes to it).
+const UNRELIABLE_FROM: Length = Length::from_mm(15.0);
 
 impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
@@ -171,7 +175,14 @@ impl ScriptRunner {
         if trains.iter().all(|train| self.driver().stands(*train, now))
             && let Some(model) = self.learning.model(finished.train)
         {
+            let unexplained = model.unexplained_scatter();
             self.dispatcher.set_model(model);
+            if unexplained >= UNRELIABLE_FROM && self.unreliable.insert(finished.train) {
+                let line = promises_broken(finished.train, unexplained);
+                let alarm = Alarm::promises_broken(finished.train, unexplained).said(&line);
+                self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm)));
+                self.say(line);
+            }
         }
     }
 }

@@ -65,6 +65,8 @@ pub(super) struct ScoredWorld {
     /// Stops asked for that were refused, or did not end.
     pub(super) failures: Vec<String>,
     pub(super) mishaps: usize,
+    /// Sessions in which it was said that the train breaks its promises.
+    pub(super) sessions_warned: usize,
     /// Track time of the calibration, in s, and why it ended.
     pub(super) calibration_s: f64,
     pub(super) ending: String,
@@ -91,6 +93,7 @@ pub(super) fn score(
         stops: Vec::new(),
         failures: Vec::new(),
         mishaps: 0,
+        sessions_warned: 0,
         calibration_s: calibrated.seconds,
         ending: calibrated.ending,
         taken: Duration::ZERO,
@@ -241,6 +244,9 @@ impl Driven<'_, '_> {
                     machine.handle_word(now, &Input::Link(news));
                 }
             })?;
+            if matches!(&spoken, Spoken::Alarm(alarm) if alarm.is_of_promises()) {
+                self.scored.sessions_warned += 1;
+            }
             if is_waited_for(&spoken) {
                 return Some(spoken);
             }
