@@ -16,6 +16,7 @@ mod motion_file;
 mod motion_replay;
 pub mod odometry;
 mod poll_rhythm;
+mod position_series;
 mod published_table;
 mod quantity;
 mod railtoolkit;
@@ -51,6 +52,7 @@ pub use motion_file::{
     MotionStepForm, StopOffsetForm, UseForm,
 };
 pub use motion_replay::MotionReplay;
+pub use position_series::{PositionSeries, PositionSeriesError};
 pub use published_table::{
     CheckedFigure, CountedFrom, CrossCheck, NothingToCompare, PublishedFigure, PublishedQuantity,
     PublishedTableError, TeamSummary, read_published_table,

@@ -4,6 +4,7 @@
 mod explain;
 mod live;
 mod picture;
+mod series;
 mod table;
 
 use std::io::Write;
@@ -40,11 +41,13 @@ Examples:
   footplate calibrate --link sim:track-a?seed=7&speed=5 --layout track-a --train 24 --serve
   footplate calibrate --link marklin-serial:/dev/ttyUSB0 --layout track-a --train 24 --budget 5m --store railway.db
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
+  footplate calibrate --from testdata/position-series/cs452_2015_stop_1.csv
   footplate calibrate --from session.csv --layout track-a --store railway.db
   footplate calibrate --store railway.db --layout track-a --train 24 --plot train24.svg
   footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
 pub(crate) struct Arguments {
-    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
+    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md; or series of positions of one start or stop
+    /// each, docs/formats/position-series.md, which need no layout.
     #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present_any = ["store", "link"])]
     from: Vec<PathBuf>,
     /// Drive the train over this link: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or
@@ -63,7 +66,7 @@ pub(crate) struct Arguments {
     afresh: bool,
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
-    layout: String,
+    layout: Option<String>,
     /// Only this train; also the train of logs that name none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
@@ -90,10 +93,20 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if let Some(series) = series::read(&self.from)? {
+            self.check_series()?;
+            series::write(&series, self.json, output)?;
+            return Ok(Outcome::Done);
+        }
+        let Some(layout) = &self.layout else {
+            bail!(
+                "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b) or a layout file"
+            );
+        };
         if let (Some(link), Some(train)) = (&self.link, self.train) {
             let session = live::Session {
                 link,
-                layout: &self.layout,
+                layout,
                 train: TrainId(train),
                 budget: self.budget,
                 is_afresh: self.afresh,
@@ -105,7 +118,7 @@ impl Arguments {
             };
             return session.run(output);
         }
-        let layout = layout_named(&self.layout)?.layout;
+        let layout = layout_named(layout)?.layout;
         let train = self.train.map(TrainId);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
         check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
@@ -146,6 +159,24 @@ impl Arguments {
             None => table::write(&report, output)?,
         }
         Ok(Outcome::Done)
+    }
+
+    /// A series is of no layout and no train, so that most options mean nothing for it.
+    fn check_series(&self) -> anyhow::Result<()> {
+        let given = [
+            ("--layout", self.layout.is_some()),
+            ("--train", self.train.is_some()),
+            ("--store", self.store.is_some()),
+            ("--out", self.out.is_some()),
+            ("--plot", self.plot.is_some()),
+            ("--explain", self.explain.is_some()),
+        ];
+        if let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) {
+            bail!(
+                "{option} does not work with a series of positions, which names no train and no sensors: leave it out"
+            );
+        }
+        Ok(())
     }
 
     fn import(&self, layout: &Layout, logs: &[LogFile], store: &mut Store) -> anyhow::Result<()> {

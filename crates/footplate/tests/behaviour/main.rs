@@ -18,6 +18,7 @@ mod odometry;
 mod odometry_report;
 mod other_layouts;
 mod plot;
+mod position_series;
 mod predict;
 mod program;
 mod replay;

@@ -111,6 +111,16 @@ impl Segment {
         Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
     }
 
+    /// A start or a stop of which its law is known: from one steady speed to another, with friction (m/s²) where it ends
+    /// at rest.
+    pub(super) fn by_law(begins: f64, speeds: [f64; 2], shape: RampedLag, friction: Option<f64>) -> Self {
+        let [from, to] = speeds;
+        let from = Pace::steady(from);
+        let mut segment = Self { begins, from, to, shape, residual: 0.0, braking: None };
+        segment.braking = friction.map(|friction| segment.rolling(friction));
+        segment
+    }
+
     /// Whether its speed is and stays the same.
     pub(super) fn is_steady(&self) -> bool {
         self.from == Pace::steady(self.to)
