@@ -220,7 +220,7 @@ impl Series {
         let moved = last.position - first.position;
         let most = points.iter().map(|point| (point.position - first.position).as_m().abs());
         let most = most.fold(0.0, f64::max);
-        if !(moved.as_m().abs() >= NO_MOTION) {
+        if moved.as_m().is_nan() || moved.as_m().abs() < NO_MOTION {
             return Err(SeriesError::Standing { moved: Length::from_m(most) });
         }
         let sense = moved.as_m().signum();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use footplate_core::calibration::motion::{SeriesChange, SeriesFit};
-use footplate_core::{Estimate, TimeSpan};
+use footplate_core::{Acceleration, Estimate, TimeSpan};
 use footplate_store::PositionSeries;
 use serde_json::{Value, json};
 
@@ -58,7 +58,7 @@ fn write_text(series: &PositionSeries, fit: &SeriesFit, output: &mut dyn Write) 
         span("stopping time", time)?;
     }
     if let Some(friction) = fit.friction {
-        let [value, deviation] = [friction.value, friction.uncertainty].map(|a| a.as_mm_per_s2());
+        let [value, deviation] = [friction.value, friction.uncertainty].map(Acceleration::as_mm_per_s2);
         line("friction", value, deviation, "mm/s²", 1)?;
     }
     if let Some(way) = fit.stopping_distance {
