@@ -68,9 +68,10 @@ impl RunPassages {
             }
             match event.kind {
                 EventKind::Speed { train: told, step } if told == train => {
-                    standing = (step == SpeedStep::STAND)
-                        .then_some((event.time, tracker.drive().from))
-                        .or(standing.filter(|_| step == SpeedStep::STAND));
+                    // Who ends a session tells trains that stand to stand: the stop was the first time.
+                    standing = standing
+                        .or_else(|| Some((event.time, tracker.drive().from)))
+                        .filter(|_| step == SpeedStep::STAND);
                 }
                 EventKind::Stopped { train: told, landmark, offset } if told == train => {
                     if let Some((commanded, from)) = standing {

@@ -78,6 +78,24 @@ fn a_second_reading_of_the_same_stop_replaces_the_first_and_a_misread_one_is_poi
 }
 
 #[test]
+fn a_tape_is_right_although_all_trains_were_told_to_stand_again_at_the_end() {
+    // Given a demonstration, at whose end trains that stand are told to, and the true place of its last stop,
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("measure-demo");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir(&folder).unwrap();
+    let store = folder.join("railway.db");
+    let demo = footplate(&["demo", "--store", store.to_str().unwrap()]);
+    let table = demo.output.lines().rev().find(|line| line.ends_with("inside")).unwrap();
+    let columns: Vec<&str> = table.split_whitespace().collect();
+    // then that place is what the model expected, from the step of the stop.
+    for reading in 1..=2 {
+        let run = measure(&store, &["--train", columns[0], "--at", columns[3]]);
+        assert!(run.output.contains(&format!("stop from step {}: ", columns[2])), "{table}: {run:?}");
+        assert!(!run.output.contains("standard deviations"), "{table}: reading {reading}: {run:?}");
+    }
+}
+
+#[test]
 fn what_cannot_be_is_refused_and_nothing_is_kept() {
     let store = store("measure-wrong");
     let path = store.to_str().unwrap();
