@@ -19,6 +19,7 @@ fn main() -> Result<(), TwoSensorError> {
         // Known as well as a tape, a poll of 65 ms and a speed table know them.
         let run = TwoSensorRun {
             distance: known(distance, Length::from_mm(3.0)),
+            before_command: known(TimeSpan::ZERO, TimeSpan::ZERO),
             time: known(time + command_delay, TimeSpan::from_ms(19)),
             from: known(from, Speed::from_mm_per_s(2.0)),
             to: known(to, Speed::from_mm_per_s(4.0)),

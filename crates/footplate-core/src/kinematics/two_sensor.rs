@@ -1,7 +1,8 @@
-//! Measuring an acceleration with two sensors: the change of speed is commanded at the first, and the time to
-//! the second tells how long it took.
+//! Measuring an acceleration with two sensors: the change of speed is commanded at the first or soon after it, and the
+//! time to the second tells how long it took.
 //!
-//! Letters: `d` from the first sensor to the second, `t` the time between them, `v₁` and `v₂` the speeds before
+//! Letters: `b` from the first sensor to the command, `d` from where the train is at the command to the second sensor, which
+//! is v₁ b less than the distance between the two, `t` the time from the command to the second, `v₁` and `v₂` the speeds before
 //! and after the change, `vₐ` their mean, `τ₂` from the command until the change begins, `a` the acceleration.
 //! While the change runs the train covers vₐ per second, before and after it v₁ and v₂; so either
 //!
@@ -27,7 +28,9 @@ const DECISIVE: f64 = 2.0;
 pub struct TwoSensorRun {
     /// From the first sensor to the second.
     pub distance: Estimate<Length>,
-    /// From the one to the other. The change was commanded at the first.
+    /// From the first sensor to the command; zero if the change was commanded at the first.
+    pub before_command: Estimate<TimeSpan>,
+    /// From the command to the second sensor.
     pub time: Estimate<TimeSpan>,
     /// Steady speed before.
     pub from: Estimate<Speed>,
@@ -63,7 +66,8 @@ pub enum TwoSensorVerdict {
     },
     /// It was over so soon that it cannot be told from one that took no time: take sensors that are nearer.
     TooQuick,
-    /// The speed had not noticeably changed by the second sensor: take sensors farther apart.
+    /// The speed had not noticeably changed by the second sensor: take sensors farther apart. Nor may a change at once
+    /// show over so short a distance.
     NotNoticed,
 }
 
@@ -89,7 +93,7 @@ pub enum TwoSensorError {
     },
     /// The second sensor came before the change can have begun.
     BeforeTheChange {
-        /// Time between the sensors.
+        /// Time from the command to the second sensor.
         time: TimeSpan,
         /// Delay of the command.
         command_delay: TimeSpan,
@@ -117,7 +121,7 @@ impl core::fmt::Display for TwoSensorError {
                 let (time, delay) = (time.as_ms(), command_delay.as_ms());
                 write!(
                     f,
-                    "the second sensor came after {time} ms, before the command took effect after {delay} ms: take sensors farther apart"
+                    "the second sensor came {time} ms after the command, which takes effect after {delay} ms: take sensors farther apart"
                 )
             }
         }
@@ -158,8 +162,8 @@ impl TwoSensorRun {
     /// If the run cannot say anything whatever its sensors saw.
     pub fn verdict(&self) -> Result<TwoSensorVerdict, TwoSensorError> {
         self.check()?;
-        let (d, t, delay) =
-            (self.distance.value.as_m(), self.time.value.as_s(), self.command_delay.value.as_s());
+        let (t, delay) = (self.time.value.as_s(), self.command_delay.value.as_s());
+        let d = (self.distance.value - self.from.value * self.before_command.value).as_m();
         let (v1, v2) = (self.from.value.as_m_per_s(), self.to.value.as_m_per_s());
         let (gain, mean, changing) = (v2 - v1, 0.5 * (v1 + v2), t - delay);
         // From here on every way is counted in the sense of the change, so that slowing down needs no mirror.
@@ -170,11 +174,13 @@ impl TwoSensorRun {
             Slopes { distance: -1.0, time: v2, from: delay, to: changing, command_delay: v1 - v2 };
         let won = d - v1 * t;
         let won_slopes = Slopes { distance: 1.0, time: -v1, from: -t, to: 0.0, command_delay: 0.0 };
-        if sense * lost <= DECISIVE * self.deviation(lost_slopes) {
-            return Ok(TwoSensorVerdict::TooQuick);
-        }
+        // Nothing is noticeable right behind the command: neither what was won over the old speed nor what was lost to
+        // the new one. Only a train that is seen to have changed its speed can have done so too quickly.
         if sense * won <= DECISIVE * self.deviation(won_slopes) {
             return Ok(TwoSensorVerdict::NotNoticed);
+        }
+        if sense * lost <= DECISIVE * self.deviation(lost_slopes) {
+            return Ok(TwoSensorVerdict::TooQuick);
         }
 
         // a = gain²/2g, and da/a = 2 d(gain)/gain − dg/g
@@ -222,7 +228,9 @@ impl TwoSensorRun {
         let speeds = [self.from, self.to]
             .iter()
             .all(|speed| known(speed.value.as_m_per_s(), speed.uncertainty.as_m_per_s()));
-        let spans = [self.time, self.command_delay].iter().all(|span| span.uncertainty >= TimeSpan::ZERO);
+        let spans = [self.before_command, self.time, self.command_delay]
+            .iter()
+            .all(|span| span.uncertainty >= TimeSpan::ZERO);
         if !(lengths && speeds && spans) {
             return Err(TwoSensorError::NotFinite);
         }
@@ -240,12 +248,15 @@ impl TwoSensorRun {
         Ok(())
     }
 
-    /// Standard deviation of a quantity with these slopes.
+    /// Standard deviation of a quantity with these slopes. That of `d` counts for the time before the command, too,
+    /// which the train ran at its old speed.
     fn deviation(&self, slopes: Slopes) -> f64 {
+        let before = self.before_command.value.as_s();
         let parts = [
+            slopes.distance * self.from.value.as_m_per_s() * self.before_command.uncertainty.as_s(),
             slopes.distance * self.distance.uncertainty.as_m(),
             slopes.time * self.time.uncertainty.as_s(),
-            slopes.from * self.from.uncertainty.as_m_per_s(),
+            (slopes.from - slopes.distance * before) * self.from.uncertainty.as_m_per_s(),
             slopes.to * self.to.uncertainty.as_m_per_s(),
             slopes.command_delay * self.command_delay.uncertainty.as_s(),
         ];

@@ -16,6 +16,7 @@ fn known<Q>(value: Q, uncertainty: Q) -> Estimate<Q> {
 fn run(distance: f64, time: f64, from: f64, to: f64, command_delay: f64) -> TwoSensorRun {
     TwoSensorRun {
         distance: known(Length::from_mm(distance), Length::from_mm(3.0)),
+        before_command: known(TimeSpan::ZERO, TimeSpan::ZERO),
         time: known(TimeSpan::from_s(time), TimeSpan::from_ms(10)),
         from: known(Speed::from_mm_per_s(from), Speed::from_mm_per_s(1.5)),
         to: known(Speed::from_mm_per_s(to), Speed::from_mm_per_s(1.5)),
@@ -96,6 +97,54 @@ fn a_change_too_quick_or_too_slow_to_see_is_not_measured() {
     assert_eq!(run(1000.0, 6.0, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::NotNoticed));
 }
 
+/// How long a train takes from a command over a distance (mm) when it changes its speed evenly (mm/s, mm/s²) after a delay
+/// (s): stepped through in microseconds, with none of the formulas that are tested.
+fn stepped(distance: f64, from: f64, to: f64, delay: f64, acceleration: f64) -> f64 {
+    const STEP_S: f64 = 1e-6;
+    let (mut time, mut place, mut speed) = (0.0, 0.0, from);
+    while place < distance {
+        if time >= delay {
+            speed = (speed + acceleration * STEP_S).min(to);
+        }
+        place += speed * STEP_S;
+        time += STEP_S;
+    }
+    time
+}
+
+#[test]
+fn a_change_that_has_hardly_begun_is_not_called_too_quick() {
+    // 18 mm are run before the command takes effect; 7 mm on, the train is at 205 mm/s of 500 and 0.1 mm ahead.
+    let time = stepped(25.0, 200.0, 500.0, 0.09, 150.0);
+    let near = TwoSensorRun {
+        time: known(TimeSpan::from_s(time), TimeSpan::from_ms(19)),
+        ..run(25.0, time, 200.0, 500.0, 0.09)
+    };
+    assert_eq!(near.verdict(), Ok(TwoSensorVerdict::NotNoticed));
+    // A change that takes no time at all, seen from far enough: 1000 mm in 2.09 s.
+    let quick = run(1000.0, stepped(1000.0, 200.0, 500.0, 0.09, 1e9), 200.0, 500.0, 0.09);
+    assert_eq!(quick.verdict(), Ok(TwoSensorVerdict::TooQuick));
+}
+
+#[test]
+fn a_command_some_time_after_the_first_sensor_is_found_as_well() {
+    // 0.8 s at 200 mm/s from the first sensor to the command, then 700 mm to the second, 100 mm/s² after 0.15 s.
+    let at_command = run(700.0, stepped(700.0, 200.0, 400.0, 0.15, 100.0), 200.0, 400.0, 0.15);
+    let later = TwoSensorRun {
+        distance: known(Length::from_mm(860.0), Length::from_mm(3.0)),
+        before_command: known(TimeSpan::from_ms(800), TimeSpan::from_ms(10)),
+        ..at_command
+    };
+    let found = |run: TwoSensorRun| match run.verdict() {
+        Ok(TwoSensorVerdict::Completed { acceleration, .. }) => acceleration,
+        other => panic!("{other:?}"),
+    };
+    let (at_command, later) = (found(at_command), found(later));
+    assert!((later.value.as_mm_per_s2() - 100.0).abs() < 0.1, "{later:?}");
+    assert!((later.value - at_command.value).abs() < Acceleration::from_mm_per_s2(1e-9));
+    assert!(later.uncertainty > at_command.uncertainty, "the first sensor is dated by a poll, too");
+}
+
 #[test]
 fn a_run_that_says_nothing_is_refused() {
     let refused = run(1000.0, 3.0, 300.0, 303.0, 0.0).verdict().unwrap_err();
@@ -119,6 +168,7 @@ fn scattered(run: TwoSensorRun, draw: &mut Draw) -> TwoSensorRun {
         run.command_delay.value + TimeSpan::from_s(draw.normal() * run.command_delay.uncertainty.as_s());
     let [from, to] = [run.from, run.to].map(|speed| speed.value + draw.normal() * speed.uncertainty);
     TwoSensorRun {
+        before_command: run.before_command,
         distance: Estimate { value: distance, ..run.distance },
         time: Estimate { value: time, ..run.time },
         from: Estimate { value: from, ..run.from },
@@ -211,6 +261,7 @@ proptest! {
         let [time, time_by, delay, delay_by] = spans.map(TimeSpan::from_ns);
         let _ = TwoSensorRun {
             distance: known(Length::from_m(distance), Length::from_m(distance_by)),
+            before_command: known(time, time_by),
             time: known(time, time_by),
             from: known(Speed::from_m_per_s(from), Speed::from_m_per_s(from_by)),
             to: known(Speed::from_m_per_s(to), Speed::from_m_per_s(to_by)),
