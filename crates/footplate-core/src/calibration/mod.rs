@@ -20,6 +20,7 @@ mod survey_test;
 mod taped_stop;
 mod track_survey;
 mod transient;
+mod two_sensor_change;
 mod wheel_diameter;
 
 pub use balise_accuracy::BaliseAccuracy;
@@ -39,4 +40,5 @@ pub use survey_test::{OddSection, SurveyTest};
 pub use taped_stop::TapedStop;
 pub use track_survey::TrackSurvey;
 pub use transient::{Direction, Transient, TransientPoint};
+pub use two_sensor_change::{TwoSensorChange, TwoSensorMean};
 pub use wheel_diameter::{ForeignScale, PairVerdict, WheelDiameters, WheelScale};

@@ -115,10 +115,13 @@ impl SettledRunning {
         self.stretches.iter().flatten().filter(|passage| passage.suspicious)
     }
 
-    /// The speed of a run at the step of a drive: as the model has it, and as the contacts of the run itself show it as far
-    /// as they can.
-    pub(super) fn speed_in_run(&self, model: &MotionModel, run: usize, drive: Drive) -> Speed {
+    /// The speed of a run at the step of a drive, with one standard deviation: as the model has it, and as the contacts of
+    /// the run itself show it as far as they can.
+    pub(super) fn speed_in_run(&self, model: &MotionModel, run: usize, drive: Drive) -> [Speed; 2] {
         let usual = model.steady_speed(drive.step, drive.approach());
+        let is_above = drive.approach() == Approach::Above;
+        let usual_variance =
+            model.ln_speed_variance(drive.step.get(), is_above) + TRIP_DEVIATION * TRIP_DEVIATION;
         let is_of_drive = |stretch: &&Vec<SettledPassage>| {
             stretch.first().is_some_and(|first| first.run == run && first.passage.drive == drive)
         };
@@ -126,13 +129,11 @@ impl SettledRunning {
         let Some((shown, variance)) =
             longest.and_then(|stretch| speed_of(stretch, self.contact_scatter.as_m()))
         else {
-            return usual;
+            return [usual, usual * libm::sqrt(usual_variance)];
         };
-        let is_above = drive.approach() == Approach::Above;
-        let usual_variance =
-            model.ln_speed_variance(drive.step.get(), is_above) + TRIP_DEVIATION * TRIP_DEVIATION;
         let gain = usual_variance / (usual_variance + variance);
-        usual * libm::exp(gain * libm::log(shown / usual))
+        let speed = usual * libm::exp(gain * libm::log(shown / usual));
+        [speed, speed * libm::sqrt(gain * variance)]
     }
 }
 

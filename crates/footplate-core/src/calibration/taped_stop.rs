@@ -67,7 +67,7 @@ impl TapedStop {
             return None;
         }
         let known = model.speed(last.drive.step, last.drive.approach());
-        let speed = running.speed_in_run(model, run.run, last.drive).as_m_per_s();
+        let speed = running.speed_in_run(model, run.run, last.drive)[0].as_m_per_s();
         let run_on = (stop.commanded - last.window.middle()).as_s();
         let distance = path + stop.offset.as_m() - speed * run_on;
         let ran_on_uncertainty = run_on * known.uncertainty.as_m_per_s();

@@ -107,13 +107,13 @@ impl ChangeReader<'_> {
         let ends = settles_within(self.model, drive);
         let from = match before.filter(|before| before.step == drive.from) {
             _ if drive.from == SpeedStep::STAND => Speed::ZERO,
-            Some(before) => self.running.speed_in_run(self.model, run.run, before),
+            Some(before) => self.running.speed_in_run(self.model, run.run, before)[0],
             None => self.model.steady_speed(drive.from, crate::event::Approach::Below),
         };
         let to = if drive.step == SpeedStep::STAND {
             Speed::ZERO
         } else {
-            self.running.speed_in_run(self.model, run.run, drive)
+            self.running.speed_in_run(self.model, run.run, drive)[0]
         };
         let mut way = 0.0;
         let mut settled = 0;

@@ -6,12 +6,13 @@ mod live;
 mod picture;
 mod series;
 mod table;
+mod two_sensor;
 
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
 use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
@@ -28,6 +29,15 @@ pub(crate) use live::CalibrationBeginning;
 pub(super) use live::calibration_line;
 pub(super) use picture::draw_calibration;
 
+/// How a calibration from recordings finds out how trains change their speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// The motion model, fitted to everything a train did.
+    Motion,
+    /// The acceleration of each change of speed, from the time between two sensors, beside that of the motion model.
+    TwoSensor,
+}
+
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
 /// With --link, the train is found wherever it stands, driven by a plan that is made as it goes on, and left standing
@@ -43,6 +53,7 @@ Examples:
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
   footplate calibrate --from testdata/position-series/cs452_2015_stop_1.csv
   footplate calibrate --from session.csv --layout track-a --store railway.db
+  footplate calibrate --from session.csv --layout track-a --method two-sensor
   footplate calibrate --store railway.db --layout track-a --train 24 --plot train24.svg
   footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
 pub(crate) struct Arguments {
@@ -67,6 +78,9 @@ pub(crate) struct Arguments {
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
+    /// What to find in recordings: the motion model, or accelerations from pairs of sensors.
+    #[arg(long, value_enum, default_value_t = Method::Motion, conflicts_with_all = ["link", "plot", "explain"])]
+    method: Method,
     /// Only this train; also the train of logs that name none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
@@ -149,6 +163,10 @@ impl Arguments {
             };
             train.file(&layout).write(path)?;
         }
+        if self.method == Method::TwoSensor {
+            two_sensor::write(&layout, &batch, self.json, output)?;
+            return Ok(Outcome::Done);
+        }
         let report = Findings::of(&layout, &batch);
         if let Some(plot) = &self.plot {
             draw_calibration(&report, plot)?;
@@ -168,6 +186,7 @@ impl Arguments {
             ("--train", self.train.is_some()),
             ("--store", self.store.is_some()),
             ("--out", self.out.is_some()),
+            ("--method", self.method != Method::Motion),
             ("--plot", self.plot.is_some()),
             ("--explain", self.explain.is_some()),
         ];

@@ -32,5 +32,6 @@ mod simulate_zones;
 mod simulated;
 mod station;
 mod store;
+mod two_sensor;
 mod usage;
 mod wheel_scales;

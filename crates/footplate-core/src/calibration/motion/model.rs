@@ -19,7 +19,7 @@ use crate::event::Approach;
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Hop, HopId};
-use crate::units::{Length, Speed};
+use crate::units::{Acceleration, Length, Speed};
 
 /// Whether a step moves the train.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +84,9 @@ pub(super) struct Counts {
 
 /// A stop from rest takes no time; this long (s) is waited anyway before a train counts as standing.
 const LEAST_STOP_S: f64 = 0.5;
+
+/// How many standard deviations of its time a ramp has to last to be one (95 % of normal errors are smaller).
+const DECISIVE: f64 = 2.0;
 
 impl MotionModel {
     /// What all model trains have in common, and nothing of this one.
@@ -175,6 +178,45 @@ impl MotionModel {
     /// One standard deviation (s) by which starts from rest are late or early.
     pub(crate) fn start_scatter(&self) -> f64 {
         self.scatter.of_start()
+    }
+
+    /// By how much an even change of speed of a running train is late: the delay of the command, and the lag with which
+    /// the train follows its decoder.
+    #[must_use]
+    pub fn change_delay(&self, is_faster: bool) -> Estimate<TimeSpan> {
+        let late = |answers: &Answers<'_>| {
+            let (lag, _) = answers.lag_and_ramp(is_faster, 0.0, 0.0);
+            answers.delay(is_faster) + lag
+        };
+        Estimate {
+            value: TimeSpan::from_s(late(&self.answers()).max(0.0)),
+            uncertainty: TimeSpan::from_s(self.deviation_with_scale(late)),
+            count: self.contacts_passed(),
+            date: self.date,
+        }
+    }
+
+    /// The even acceleration of the train's decoder from one step to another, negative for slowing down: the speeds'
+    /// difference by the time of the ramp. `None` if the model cannot tell the ramp from a jump.
+    #[must_use]
+    pub fn ramp_acceleration(&self, from: SpeedStep, to: SpeedStep) -> Option<Estimate<Acceleration>> {
+        let gain = |answers: &Answers<'_>| {
+            answers.speed(usize::from(to.get()), to < from) - answers.speed(usize::from(from.get()), false)
+        };
+        let ramp = |answers: &Answers<'_>| {
+            let steps = f64::from(to.get()) - f64::from(from.get());
+            answers.lag_and_ramp(to > from, gain(answers), steps).1
+        };
+        // 1/a is as good as normal where the ramp is short, a is not.
+        let slowness = |answers: &Answers<'_>| ramp(answers) / gain(answers);
+        let (value, deviation) = (slowness(&self.answers()), self.deviation_with_scale(slowness));
+        let is_a_ramp = ramp(&self.answers()) > 0.0 && value.abs() > DECISIVE * deviation;
+        is_a_ramp.then(|| Estimate {
+            value: Acceleration::from_m_per_s2(1.0 / value),
+            uncertainty: Acceleration::from_m_per_s2(deviation / (value * value)),
+            count: self.contacts_passed(),
+            date: self.date,
+        })
     }
 
     /// What experience says of a step.
