@@ -209,6 +209,24 @@ fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() 
     assert_eq!(traffic.wrongs, Vec::<String>::new());
 }
 
+#[test]
+fn a_train_too_near_a_turnout_to_throw_it_backs_away_and_comes_again() {
+    // Given a train whose overhang is over turnout 1, which lies for the other leg,
+    let mut traffic = Traffic::with(Dispatcher::new, [("A1", 170.0), ("D1", 300.0)]);
+    // when it is sent over the leg for which it does not lie, and has to come from this side,
+    let target = traffic.world.layout.landmark("C1+150mm").expect("a place");
+    let journey = Journey { faces: true, ..Journey::to(target) };
+    traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey).expect("on the layout");
+    traffic.run(120.0);
+    // then it comes there, really, over the turnout thrown for it.
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    let at = traffic.world.trains[0].at;
+    let node = traffic.world.layout.node_named("C1").expect("a node");
+    assert_eq!(traffic.world.layout.edge(at.edge).map(|edge| edge.from), Some(node));
+    assert!((at.offset.as_mm() - 150.0).abs() < 15.0, "{at:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 

@@ -204,11 +204,17 @@ impl Dispatcher {
         obstacles: &Obstacles,
     ) -> Option<Proposal> {
         let search = self.search(start, obstacles);
-        let proposed = |search: Search<'_>| {
-            let reached = search.from(start.place, self.turned(start));
-            self.proposal(start, reached.to(targets.iter().copied())?)
+        let turned = self.turned(start);
+        let proposed = |search: Search<'_>, ahead: Option<Position>| {
+            let reached = search.from(ahead, turned);
+            // The soonest may need a turnout both ways at once where another does not.
+            reached.to(targets).into_iter().find_map(|itinerary| self.proposal(start, itinerary))
         };
-        proposed(search).or_else(|| proposed(Search { points_give_way: false, ..search }))
+        let ahead = Some(start.place);
+        // Where turnouts just ahead lie otherwise and cannot be thrown, it backs away from them first.
+        proposed(search, ahead)
+            .or_else(|| proposed(Search { points_give_way: false, ..search }, ahead))
+            .or_else(|| proposed(search, None))
     }
 
     pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {

@@ -75,10 +75,10 @@ enum By {
     Shunt(usize),
 }
 
-/// A way beyond a turnout on which the train turns around.
+/// A way beyond a node on which the train turns around.
 #[derive(Debug, Clone)]
 struct Shunt {
-    /// The turnout, met from a leg.
+    /// The turnout, met from a leg, or the node behind which the train backs away.
     merge: NodeId,
     out: Vec<EdgeId>,
     stop: Position,
@@ -123,12 +123,13 @@ impl Ord for Open {
 
 impl<'a> Search<'a> {
     /// Everything that a train at rest can reach: from its place as it faces, and from the place that it has when it has
-    /// turned around (Dijkstra, 1959).
-    pub(super) fn from(self, ahead: Position, turned: Option<Position>) -> Reached<'a> {
+    /// turned around (Dijkstra, 1959). One that does not go ahead may back away on plain track, from turnouts that cannot be
+    /// thrown under it, and come back.
+    pub(super) fn from(self, ahead: Option<Position>, turned: Option<Position>) -> Reached<'a> {
         let nodes = vec![None; self.layout.nodes().len()];
-        let mut reached = Reached { search: self, starts: [Some(ahead), turned], nodes, shunts: Vec::new() };
+        let mut reached = Reached { search: self, starts: [ahead, turned], nodes, shunts: Vec::new() };
         let mut open = BinaryHeap::new();
-        for (start, is_turned) in [(Some(ahead), false), (turned, true)] {
+        for (start, is_turned) in [(ahead, false), (turned, true)] {
             let Some((start, edge)) = start.and_then(|start| Some((start, self.layout.edge(start.edge)?)))
             else {
                 continue;
@@ -146,7 +147,7 @@ impl<'a> Search<'a> {
             // What the run needs so far matters only where it needs more.
             let asks = |edge| self.layout.needs_of(edge).next().is_some();
             let is_merge = self.is_merge(next.node);
-            let needs = if is_merge || self.layout.ways(next.node).edges().any(asks) {
+            let needs = if is_merge || ahead.is_none() || self.layout.ways(next.node).edges().any(asks) {
                 reached.needs_until(next.node)
             } else {
                 Vec::new()
@@ -158,7 +159,7 @@ impl<'a> Search<'a> {
                     open.push(Open { seconds: next.seconds + cost, node: edge.to, by });
                 }
             }
-            if is_merge {
+            if is_merge || ahead.is_none() && next.by == (By::Start { turned: true }) {
                 self.shunt(&mut reached, next, &needs, &mut open);
             }
         }
@@ -170,7 +171,7 @@ impl<'a> Search<'a> {
         self.layout.node(node).is_some_and(|node| matches!(node.kind, NodeKind::Merge(_)))
     }
 
-    /// Ways beyond a turnout that was met from a leg, each long enough to come back.
+    /// Ways beyond a node, as a turnout that was met from a leg, each long enough to come back.
     fn shunt(&self, reached: &mut Reached<'_>, at: Open, needs: &[TurnoutNeed], open: &mut BinaryHeap<Open>) {
         let mut paths: Vec<(Vec<EdgeId>, NodeId, Length, f64)> =
             vec![(Vec::new(), at.node, self.clears, 0.0)];
@@ -281,10 +282,11 @@ impl Reached<'_> {
         Some(until + self.search.seconds(target.edge, Length::ZERO, target.offset)? + self.search.pace.stop_s)
     }
 
-    /// The soonest way to rest at one of several places.
-    pub(super) fn to(&self, targets: impl Iterator<Item = Position>) -> Option<Itinerary> {
-        let found = targets.filter_map(|target| self.itinerary(target));
-        found.min_by(|one, other| one.seconds.total_cmp(&other.seconds))
+    /// The soonest way to rest at each of several places, the soonest of them first.
+    pub(super) fn to(&self, targets: &[Position]) -> Vec<Itinerary> {
+        let mut found: Vec<Itinerary> = targets.iter().filter_map(|target| self.itinerary(*target)).collect();
+        found.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
+        found
     }
 
     fn itinerary(&self, target: Position) -> Option<Itinerary> {

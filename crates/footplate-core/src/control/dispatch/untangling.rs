@@ -161,10 +161,10 @@ impl Dispatcher {
     fn elsewhere(&self, now: Timestamp, id: TrainId) -> Option<(Position, Proposal)> {
         let start = self.start(now, id)?;
         let obstacles = self.obstacles_of_others(id);
-        let reached = self.search(&start, &obstacles).from(start.place, self.turned(&start));
+        let reached = self.search(&start, &obstacles).from(Some(start.place), self.turned(&start));
         let train = self.trains.get(&id)?;
         let places = train.parking.iter().filter_map(|(place, is_clear)| {
-            let itinerary = reached.to(self.both_ways(*place).into_iter()).filter(|_| *is_clear)?;
+            let itinerary = reached.to(&self.both_ways(*place)).into_iter().next().filter(|_| *is_clear)?;
             let proposal = self.proposal(&start, itinerary)?;
             self.is_free(id, &proposal).then_some((*place, proposal))
         });
@@ -287,7 +287,7 @@ impl Dispatcher {
         let mut obstacles = fixed.clone();
         let others = || scene.standers.iter().filter(|other| other.id != mover.id);
         others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
-        let reached = self.search(&start, &obstacles).from(start.place, self.turned(&start));
+        let reached = self.search(&start, &obstacles).from(Some(start.place), self.turned(&start));
         let layout = self.driver.layout();
         let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
         let room = Room::of(train.lengths, PARKED, start.room.overrun);
@@ -310,7 +310,7 @@ impl Dispatcher {
         places.sort_by(|one, other| one.0.cmp(&other.0).then(one.3.total_cmp(&other.3)));
         // Where it comes to stand it needs the turnout whose leg that is on: its place is counted over that.
         let can_go = |(_, place, mut held, seconds): (bool, Position, Footprint, f64)| {
-            let itinerary = reached.to(self.both_ways(place).into_iter())?;
+            let itinerary = reached.to(&self.both_ways(place)).into_iter().next()?;
             let proposal = self.proposal(&start, itinerary)?;
             let stop = proposal.itinerary.runs.last()?.stop;
             let own = layout.needs_of(stop.edge).filter(|need| need.facing);
