@@ -11,12 +11,15 @@
 //! the other may be shorter. The covariance keeps that; what tells them apart are sensors passed in braking, tapes, and starts
 //! to other speeds. What is far off counts little ([`robust`](super::robust)): one outlier costs one outlier.
 
+mod refit;
+
 use alloc::vec::Vec;
+
+pub use refit::Refit;
 
 use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
 use super::model::{MotionModel, StepUse};
-use super::parameters::SPEEDS;
 use super::priors::section_variance;
 use super::rows::{Point, Source, TripAt};
 use super::scatter::{Scatter, ScatterSums};
@@ -72,6 +75,7 @@ struct Values {
 }
 
 /// The equations of all that is kept, the numbers of single trips taken out.
+#[derive(Debug, Clone)]
 struct Reduced {
     /// Of the numbers that last and the place at which a next trip would begin.
     equations: NormalEquations,
@@ -84,6 +88,7 @@ struct Reduced {
 /// Speeds and lengths could all be longer by the same part, and no timing would tell: where the survey's scale is known, give
 /// or take a deviation, its total is the measure. All that is asked of a model, where a train comes to rest, is the same in
 /// any.
+#[derive(Debug, Clone)]
 struct Survey {
     /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
     rows: Vec<(Vec<(usize, f64)>, f64)>,
@@ -91,6 +96,7 @@ struct Survey {
 }
 
 /// Equations of the numbers that last alone.
+#[derive(Debug, Clone)]
 struct Closed {
     equations: NormalEquations,
     /// The place at which a next trip would begin.
@@ -120,11 +126,6 @@ impl MotionFit {
                 self.chain.pass(layout, sections, turnouts, event);
             }
             EventKind::Speed { train, step } if train == self.model.train() => {
-                if self.chain.trips.len() >= MOST_TRIPS {
-                    let sections = self.sections.take().unwrap_or_else(|| SectionIndex::of(layout));
-                    self.refit(&sections);
-                    self.sections = Some(sections);
-                }
                 self.chain.tell(event.time, step, &self.model.answers());
             }
             EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
@@ -178,56 +179,6 @@ impl MotionFit {
             scatter: self.model.scatter,
             stop_offset_variance: self.model.stop_offsets.variance(),
             stop_shape_error: self.model.stop_shape_error(),
-        }
-    }
-
-    /// Fits anew to all that was seen. Takes milliseconds; not for between two reports.
-    pub fn refit(&mut self, sections: &SectionIndex) {
-        let passed = self.chain.trips.iter().flat_map(|trip| &trip.contacts);
-        self.prior.meet(passed.flat_map(|contact| &contact.sections));
-        self.prior.meet_stops(self.chain.trips.iter().filter_map(|trip| trip.rest_hop));
-        let columns = self.prior.columns();
-        let mut values = self.start(&columns);
-        self.compare_promises(&columns, &values);
-        let survey = Survey::of(&columns, sections, self.model.stop_offsets.variance());
-        let mut closed = None;
-        for iteration in 0..MOST_ITERATIONS {
-            let believes_all = iteration < ALL_BELIEVED;
-            let now = self.reduced(&columns, &values, believes_all, self.chain.trips.len());
-            let Some(now) = now.and_then(|now| now.closed(&survey)) else { break };
-            let Some(next) = now.solved(&columns, &self.chain.trips) else { break };
-            let before = self.cost(&columns, &values, believes_all) + survey.cost(&values.lasting);
-            let logarithms = SPEEDS..SPEEDS + self.highest();
-            let longest = values.lasting.get(logarithms.clone()).unwrap_or_default().iter();
-            let longest = longest.zip(next.lasting.get(logarithms).unwrap_or_default());
-            let longest = longest.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
-            let mut part = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
-            let mut moved = 0.0_f64;
-            for _ in 0..MOST_HALVINGS {
-                let tried = values.towards(&next, part);
-                if self.cost(&columns, &tried, believes_all) + survey.cost(&tried.lasting) < before {
-                    let lasting = values.lasting.iter().zip(&tried.lasting);
-                    moved = lasting.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
-                    values = tried;
-                    break;
-                }
-                part *= 0.5;
-            }
-            closed = Some(now);
-            if !believes_all && moved < SETTLED {
-                break;
-            }
-        }
-        // The last equations are those of a point less than a step away.
-        let Some(solution) = closed.and_then(|closed| closed.equations.solve()) else { return };
-        for (trip, own) in self.chain.trips.iter_mut().zip(&values.trips) {
-            trip.own = Some(own.clone());
-        }
-        let scatter = self.scatter_of(&columns, &values, self.chain.trips.len());
-        self.model.learn(&columns, &values.lasting, &solution, survey.scale, scatter, self.date);
-        self.model.recount(&self.prior.counts, &self.chain.trips);
-        if self.chain.trips.len() >= MOST_TRIPS {
-            self.condense(self.chain.trips.len() - KEPT_TRIPS);
         }
     }
 

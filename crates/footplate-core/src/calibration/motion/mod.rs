@@ -41,7 +41,7 @@ mod variation;
 
 pub(crate) use arrival::Arrival;
 pub(crate) use course::{Course, N as MOTION_LETTERS};
-pub use fit::MotionFit;
+pub use fit::{MotionFit, Refit};
 pub use model::{MotionModel, StepUse, StopForecast};
 pub(crate) use motion_filter::{Gaussian, INTERRUPTED, MotionFilter};
 pub use numbers::{MotionNumbers, NumbersError};
