@@ -70,6 +70,10 @@ pub(crate) struct Arguments {
     /// Lines to carry out, one after the other; a train ends one order before it begins the next.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
+    /// How long a script waits for a train that has to arrive or to be brought back, before it goes on without; 600 s unless
+    /// named.
+    #[arg(long, value_name = "SECONDS", requires = "script", value_parser = wait_limit)]
+    wait_limit: Option<f64>,
     /// Print a line of JSON for every finished order; all else goes to standard error.
     #[arg(long)]
     json: bool,
@@ -111,7 +115,15 @@ pub(crate) struct Railway {
 impl Arguments {
     /// Drives for browsers and programs alone.
     pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
-        Self { railway, script: None, json: false, serve: Some(at), plain: true, is_headless: true }
+        Self {
+            railway,
+            script: None,
+            wait_limit: None,
+            json: false,
+            serve: Some(at),
+            plain: true,
+            is_headless: true,
+        }
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -188,6 +200,7 @@ impl Arguments {
             giver,
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
+            wait_limit_s: self.wait_limit,
         })
     }
 
@@ -321,4 +334,10 @@ impl Arguments {
             lost => Err(anyhow!("{lost}")),
         }
     }
+}
+
+/// Seconds for which something may be waited: more than none, and no more than a day.
+fn wait_limit(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 86_400.0);
+    seconds.ok_or_else(|| format!("`{text}` is no number of seconds above 0 and up to 86400"))
 }

@@ -243,3 +243,63 @@ fn whoever_is_stopped_before_track_of_another_is_told_whose_it_is() {
     let told = told.unwrap_or_else(|| panic!("{}{}", run.output, run.errors));
     assert!(told.ends_with("told to stop; it is held by train 24"), "{told}");
 }
+
+/// The stops of a script, each of which says how far off it truly was and what had been promised.
+fn stops(run: &Run, verb: &str) -> Vec<[f64; 3]> {
+    let number =
+        |line: &Value, field: &str| line[field].as_f64().unwrap_or_else(|| panic!("{field}: {line}"));
+    let of = |line: &Value| {
+        ["true_error_mm", "promised_low_mm", "promised_high_mm"].map(|field| number(line, field))
+    };
+    lines(run).iter().filter(|line| line["command"] == verb).map(of).collect()
+}
+
+#[test]
+fn a_script_waits_for_a_train_that_is_lost_and_found_again() {
+    // Given slow stops, on the way to one of which the train is lost (a seed that was looked at),
+    let places = ["A3+86", "C13+69", "C6+21", "C16+85", "B15+65", "B15+38", "C13+47", "B15+128"];
+    let steps = [4, 3, 5, 5, 3, 4, 4, 3];
+    let orders = places.iter().zip(steps);
+    let orders: String =
+        orders.map(|(place, step)| format!("stop 24 at {place}mm at step {step} next round\n")).collect();
+    let script =
+        format!("turnout all straight\nspeed 24 8\nwait 24 located\nspeed 24 0\nwait 24 at rest\n{orders}");
+    let run = drive("lost", "sim:track-a?seed=39&trains=24", &script, &["--json"]);
+    // then that stop and those after it are made once it has been found, where they were promised.
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    assert!(run.errors.contains("train 24 is lost"), "{}", run.errors);
+    assert!(run.errors.contains("`stop 24 at C13+47mm at step 4 next round` waits"), "{}", run.errors);
+    let stops = stops(&run, "stop");
+    assert_eq!(stops.len(), places.len(), "{}", run.output);
+    assert!(stops.iter().all(|[error, low, high]| (low..=high).contains(&error)), "{stops:?}");
+}
+
+#[test]
+fn every_journey_of_a_script_is_carried_out_and_ends_where_it_was_promised_to() {
+    // Given a train that has been calibrated, and nobody says where it is,
+    let link = "sim:track-a?seed=9804&trains=24";
+    let store = folder("journeys").join("railway.db").display().to_string();
+    let calibrated =
+        footplate(&["calibrate", "--link", link, "--layout", "track-a", "--train", "24", "--store", &store]);
+    assert_eq!(calibrated.status, 0, "{}", calibrated.errors);
+    // when it is sent here and there,
+    let places =
+        ["D5+40", "A3+60", "C13+120", "E8+50", "B15+80", "C6+100", "D7+30", "E7+60", "C16+90", "A4+50"];
+    let journeys: String = places.iter().map(|place| format!("go 24 to {place}mm\n")).collect();
+    let script = format!("turnout all straight\n{journeys}");
+    let run = drive("twelve", link, &script, &["--json", "--store", &store]);
+    // then it is looked for first, and comes everywhere, turning around and backing away from turnouts as needed.
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    assert!(run.errors.contains("train 24 is looked for first"), "{}", run.errors);
+    let stops = stops(&run, "go");
+    assert_eq!(stops.len(), places.len(), "{}", run.output);
+    let kept = stops.iter().filter(|[error, low, high]| (low..=high).contains(&error)).count();
+    assert!(kept + 1 >= stops.len(), "{stops:?}");
+}
+
+#[test]
+fn a_limit_of_waiting_is_a_number_of_seconds() {
+    let run = drive("limit", LINK, "where\n", &["--wait-limit", "0"]);
+    assert_eq!(run.status, 2);
+    assert!(run.errors.contains("no number of seconds above 0 and up to 86400"), "{}", run.errors);
+}

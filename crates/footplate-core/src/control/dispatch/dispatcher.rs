@@ -138,6 +138,12 @@ impl Dispatcher {
         &self.driver
     }
 
+    /// See [`Watchdog::is_interrupted`].
+    #[must_use]
+    pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
+        self.driver.is_interrupted(now, train)
+    }
+
     /// What a train holds: nobody else is let onto it.
     #[must_use]
     pub fn holds(&self, train: TrainId) -> Option<&Footprint> {

@@ -134,6 +134,12 @@ impl Driver {
         self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.told)
     }
 
+    /// The step at which a train that nobody has seen is let run over a contact; 0 for one that is not driven here.
+    #[must_use]
+    pub fn finding_step(&self, train: TrainId) -> SpeedStep {
+        self.trains.get(&train).map_or(SpeedStep::STAND, DrivenTrain::finding_step)
+    }
+
     /// The order that a train is busy with.
     #[must_use]
     pub fn busy(&self, train: TrainId) -> Option<OrderId> {

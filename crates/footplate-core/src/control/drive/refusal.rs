@@ -106,8 +106,8 @@ pub enum Refusal {
         /// The train that nobody has seen yet.
         other: TrainId,
     },
-    /// No way to its destination has come free for so long.
-    NoFreeWay {
+    /// It has not come to its destination for so long.
+    NotArrived {
         /// The train.
         train: TrainId,
         /// How long it was waited for.
@@ -264,10 +264,10 @@ impl fmt::Display for Refusal {
                 "train {train} can be kept clear of train {other} only once that has been found: let it run over a \
                  contact, as with `speed {other} 6`, or say where it stands, as with `place {other} at C13`"
             ),
-            Self::NoFreeWay { train, within } => write!(
+            Self::NotArrived { train, within } => write!(
                 f,
-                "no way has come free for train {train} within {:.0} s: move what stands in its way, or let trains \
-                 pass a contact whose places are uncertain",
+                "train {train} has not come there within {:.0} s: move what stands in its way, or let trains pass a \
+                 contact whose places are uncertain",
                 within.as_s()
             ),
             Self::TrackEnds { train, end } => {

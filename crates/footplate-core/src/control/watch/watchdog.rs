@@ -184,6 +184,14 @@ impl Watchdog {
         self.dangers.contains_key(&train)
     }
 
+    /// Whether orders to a train are refused for something that may yet end by itself: a danger that is seen to, a station
+    /// that is silent.
+    #[must_use]
+    pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
+        let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
+        self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
+    }
+
     /// Somebody above keeps trains apart: from now on a train in danger asks before it crawls, see
     /// [`permit`](Self::permit), and nothing that was interrupted is gone on with by itself.
     pub const fn ask_before_crawling(&mut self) {

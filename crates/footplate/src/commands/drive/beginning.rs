@@ -4,7 +4,7 @@ use anyhow::Context;
 use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::Driver;
 use footplate_core::track::{Leg, TurnoutStates};
-use footplate_core::{SpeedStep, TrainId, TurnoutId};
+use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
 use serde::{Deserialize, Serialize};
 
 use super::learning::Learning;
@@ -29,6 +29,9 @@ pub(crate) struct DriveBeginning {
     pub(super) script: Vec<String>,
     /// ... and whether more may come.
     pub(super) is_complete: bool,
+    /// Seconds for which it waits at most, if that was said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) wait_limit_s: Option<f64>,
 }
 
 impl DriveBeginning {
@@ -49,6 +52,7 @@ impl DriveBeginning {
             giver: Giver::Person,
             script: Vec::new(),
             is_complete: false,
+            wait_limit_s: None,
         }
     }
 
@@ -75,6 +79,9 @@ impl DriveBeginning {
         self.models.into_iter().for_each(|model| driver.add_train(model));
         let mut script_runner =
             ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.giver, steps);
+        if let Some(seconds) = self.wait_limit_s {
+            script_runner.set_wait_limit(TimeSpan::from_s(seconds));
+        }
         if self.is_complete {
             script_runner.complete();
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::calibration::motion::{MotionFit, MotionModel, Refit};
 use footplate_core::control::Driver;
 use footplate_core::estimation::PassedContact;
 use footplate_core::track::Layout;
@@ -14,6 +14,8 @@ use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
 pub(super) struct Learning {
     fits: BTreeMap<TrainId, MotionFit>,
     sections: SectionIndex,
+    /// Fits under way.
+    under_way: BTreeMap<TrainId, Refit>,
     /// Steps told to a train since it stood last.
     changes: BTreeMap<TrainId, usize>,
 }
@@ -25,7 +27,12 @@ const MOST_CHANGES: usize = 16;
 impl Learning {
     pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
         let fits = fits.into_iter().map(|fit| (fit.model().train(), fit)).collect();
-        Self { fits, sections: SectionIndex::of(layout), changes: BTreeMap::new() }
+        Self {
+            fits,
+            sections: SectionIndex::of(layout),
+            under_way: BTreeMap::new(),
+            changes: BTreeMap::new(),
+        }
     }
 
     /// A command to a train has left.
@@ -75,6 +82,7 @@ impl Learning {
     /// A train is not what it was: nothing is learnt of it any more in this session, and what was is not kept.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.fits.remove(&train);
+        self.under_way.remove(&train);
     }
 
     /// All fits, with the chain of what trains did broken: nobody knows what becomes of them until they are driven again.
@@ -87,8 +95,39 @@ impl Learning {
         .collect()
     }
 
+    /// Begins to fit to all that a train did so far.
+    pub(super) fn begin_fit(&mut self, train: TrainId) {
+        if let Some(fit) = self.fits.get(&train) {
+            self.under_way.insert(train, fit.begin_refit(&self.sections));
+        }
+    }
+
+    /// Whether any fit is under way.
+    pub(super) fn is_fitting(&self) -> bool {
+        !self.under_way.is_empty()
+    }
+
+    /// Whether that of a train is.
+    pub(super) fn is_fitting_to(&self, train: TrainId) -> bool {
+        self.under_way.contains_key(&train)
+    }
+
+    /// Does the next part of a fit under way, which takes milliseconds; gives the model if that was the last part.
+    pub(super) fn go_on(&mut self) -> Option<MotionModel> {
+        let mut first = self.under_way.first_entry()?;
+        first.get_mut().go_on();
+        if !first.get().is_over() {
+            return None;
+        }
+        let (train, refit) = first.remove_entry();
+        let fit = self.fits.get_mut(&train)?;
+        fit.adopt(refit);
+        Some(fit.model().clone())
+    }
+
     /// What is known of a train by now. Takes a while: not for between two reports.
     pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
+        self.under_way.remove(&train);
         let fit = self.fits.get_mut(&train)?;
         fit.refit(&self.sections);
         Some(fit.model().clone())

@@ -19,6 +19,8 @@ pub(super) struct Step {
     pub(super) instruction: Instruction,
     /// Only a part of what was written, and not the last: nothing is said when it has been done.
     pub(super) is_part: bool,
+    /// Whether it has been tried before, and waited for its train to be found.
+    pub(super) is_again: bool,
 }
 
 /// Reads a script.
@@ -49,5 +51,10 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
 /// Reads one line.
 pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::words::Mistake> {
     let text = line.split('#').next().unwrap_or_default().trim();
-    Ok(parse(line, known)?.map(|instruction| Step { text: text.to_owned(), instruction, is_part: false }))
+    Ok(parse(line, known)?.map(|instruction| Step {
+        text: text.to_owned(),
+        instruction,
+        is_part: false,
+        is_again: false,
+    }))
 }

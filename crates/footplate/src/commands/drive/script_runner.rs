@@ -2,6 +2,7 @@
 //! of it.
 
 mod outcomes;
+mod waiting;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -14,6 +15,7 @@ use footplate_core::track::Landmark;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
+use self::waiting::{LOOK_AGAIN, Wait, runs_on};
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
@@ -23,11 +25,10 @@ use super::told::Tongue;
 use crate::dashboard::{Painter, TrainTask};
 use crate::witness::{Input, Listener};
 
-/// What waits longer than this waits for nothing: a train at a crawl goes once round within it.
-const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
-/// How often it is looked whether a train stands.
-const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
-
+/// What waits longer than this waits for nothing, unless another limit is set: a train at a crawl goes once round within it.
+pub(super) const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
+/// Between two parts of a fit, so that everything else has its turn.
+const BETWEEN_PARTS: TimeSpan = TimeSpan::from_ms(5);
 /// How well a person sees where the end of a shoe is beside a contact, whose own place is known to 5 mm.
 const SEEN_BY_HAND: Length = Length::from_mm(12.0);
 
@@ -46,12 +47,18 @@ pub(super) enum Giver {
 pub(crate) struct ScriptRunner {
     dispatcher: Dispatcher,
     learning: Learning,
+    /// Models that wait for their trains to stand.
+    taught: BTreeMap<TrainId, MotionModel>,
     giver: Giver,
     steps: VecDeque<Step>,
     /// No more will come.
     complete: bool,
     trains: BTreeMap<TrainId, SpeedStep>,
     wait: Option<Wait>,
+    /// What is waited for longer than this is waited for in vain.
+    wait_limit: TimeSpan,
+    /// Since when the next line has waited for a train that cannot be driven now.
+    interrupted: Option<Timestamp>,
     pending: BTreeMap<OrderId, Step>,
     /// What was promised last of orders that are under way.
     promises: BTreeMap<OrderId, Promise>,
@@ -59,8 +66,8 @@ pub(crate) struct ScriptRunner {
     changed: BTreeSet<TrainId>,
     /// Trains of which it was said that they break their promises.
     unreliable: BTreeSet<TrainId>,
-    /// When a journey was asked for, begun or ended last.
-    stirred: Timestamp,
+    /// When journeys were asked for.
+    journeys: BTreeMap<OrderId, Timestamp>,
     /// How each train came to rest last.
     rests: BTreeMap<TrainId, Finished>,
     outputs: VecDeque<Output<Spoken>>,
@@ -69,13 +76,6 @@ pub(crate) struct ScriptRunner {
     looked: Timestamp,
     is_over: bool,
     fell_short: bool,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Wait {
-    until: Until,
-    since: Timestamp,
-    is_met: bool,
 }
 
 impl ScriptRunner {
@@ -89,16 +89,19 @@ impl ScriptRunner {
         Self {
             dispatcher: Dispatcher::watched(Timestamp::ZERO, driver),
             learning,
+            taught: BTreeMap::new(),
             giver,
             steps: steps.into(),
             complete: false,
             trains,
             wait: None,
+            wait_limit: WAIT_LIMIT,
+            interrupted: None,
             pending: BTreeMap::new(),
             promises: BTreeMap::new(),
             changed: BTreeSet::new(),
             unreliable: BTreeSet::new(),
-            stirred: Timestamp::ZERO,
+            journeys: BTreeMap::new(),
             rests: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
@@ -157,6 +160,11 @@ impl ScriptRunner {
         self.go_on(now);
     }
 
+    /// Waits no longer than this for anything but time.
+    pub(super) const fn set_wait_limit(&mut self, limit: TimeSpan) {
+        self.wait_limit = limit;
+    }
+
     /// No more lines will come: what is under way is ended.
     pub(super) const fn complete(&mut self) {
         self.complete = true;
@@ -180,9 +188,12 @@ impl ScriptRunner {
         self.began.get_or_insert(now);
         self.looked = now;
         self.hand_on(now);
+        self.learn_on(now);
         while !self.is_over && self.may_go_on(now) {
-            let Some(step) = self.steps.front() else { break };
-            if self.giver == Giver::Script && self.must_wait(step) {
+            let Some(instruction) = self.steps.front().map(|step| step.instruction) else { break };
+            if self.waits_for_model(now, instruction)
+                || self.giver == Giver::Script && self.must_wait(now, instruction)
+            {
                 break;
             }
             if let Some(step) = self.steps.pop_front() {
@@ -197,89 +208,9 @@ impl ScriptRunner {
         }
     }
 
-    /// When journeys are given up because nothing has come of them, if nothing else is waited for.
-    fn tires(&self) -> Option<Timestamp> {
-        let only_journeys = self
-            .pending
-            .values()
-            .all(|step| runs_on(step) || matches!(step.instruction, Instruction::Go(..)));
-        let waits = self.complete
-            && self.steps.is_empty()
-            && self.wait.is_none()
-            && only_journeys
-            && !self.pending.is_empty();
-        waits.then(|| self.stirred + WAIT_LIMIT)
-    }
-
-    fn tire_of_waiting(&mut self, now: Timestamp) {
-        if self.tires().is_none_or(|at| now < at) {
-            return;
-        }
-        for train in self.trains.keys().copied().collect::<Vec<_>>() {
-            let Some((order, _)) = self.dispatcher.journey(train) else { continue };
-            self.dispatcher.call_off(now, train);
-            if let Some(step) = self.pending.remove(&order) {
-                self.refuse(now, &step, &Refusal::NoFreeWay { train, within: WAIT_LIMIT });
-            }
-        }
-        self.hand_on(now);
-    }
-
-    /// In a script a train ends one order before it begins the next, and what follows a turnout follows it.
-    fn must_wait(&self, step: &Step) -> bool {
-        let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
-        let train = match step.instruction {
-            Instruction::Order(order) => order.train(),
-            Instruction::Go(train, _) => Some(train),
-            _ => return false,
-        };
-        let is_busy = train.is_some_and(|train| self.must_end(train));
-        is_busy || !is_turnout(step) && self.pending.values().any(is_turnout)
-    }
-
-    /// Whether a train is busy with something that ends by itself.
-    fn must_end(&self, train: TrainId) -> bool {
-        let order = self.driver().busy(train);
-        let runs_on = order.and_then(|order| self.pending.get(&order)).is_some_and(runs_on);
-        self.dispatcher.journey(train).is_some() || order.is_some() && !runs_on
-    }
-
-    /// Whether a train has nothing to do.
-    fn is_idle(&self, train: TrainId) -> bool {
-        self.driver().busy(train).is_none() && self.dispatcher.journey(train).is_none()
-    }
-
     fn end(&mut self) {
         self.is_over = true;
         self.outputs.push_back(Output::Notice(Spoken::Over));
-    }
-
-    fn may_go_on(&mut self, now: Timestamp) -> bool {
-        let Some(wait) = self.wait else { return true };
-        let met = wait.is_met
-            || match wait.until {
-                Until::Passed(span) => now - wait.since >= span,
-                Until::AtRest(train) => self.is_idle(train) && self.driver().stands(train, now),
-                Until::Located(train) => self.driver().locate(train, now).is_some(),
-                Until::At(..) => false,
-            };
-        if met {
-            self.wait = None;
-        } else if let Until::AtRest(train) = wait.until
-            && self.is_idle(train)
-            && self.driver().told(train) > SpeedStep::STAND
-        {
-            self.wait = None;
-            self.fell_short = true;
-            self.say(format!("train {train} has been told nothing that would bring it to rest; going on"));
-            return true;
-        } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= WAIT_LIMIT {
-            self.wait = None;
-            self.fell_short = true;
-            self.say(format!("waited {:.0} s in vain; going on", WAIT_LIMIT.as_s()));
-            return true;
-        }
-        met
     }
 
     fn carry_out(&mut self, now: Timestamp, step: Step) {
@@ -293,6 +224,7 @@ impl ScriptRunner {
                     }
                     self.pending.insert(id, step);
                 }
+                Err(Refusal::Lost { train }) if !step.is_again => self.find_first(train, step),
                 Err(why) => self.refuse(now, &step, &why),
             },
             Instruction::Go(train, journey) => self.send(now, step, train, journey),
@@ -301,7 +233,8 @@ impl ScriptRunner {
                     self.driver().layout().turnouts().map(|(turnout, _)| turnout).collect();
                 for (place, turnout) in turnouts.into_iter().rev().enumerate() {
                     let instruction = Instruction::Order(Order::Turnout { turnout, curved: false });
-                    let part = Step { text: step.text.clone(), instruction, is_part: place > 0 };
+                    let part =
+                        Step { text: step.text.clone(), instruction, is_part: place > 0, is_again: false };
                     self.steps.push_front(part);
                 }
             }
@@ -354,9 +287,12 @@ impl ScriptRunner {
                 if let Some((before, _)) = before {
                     self.pending.remove(&before);
                 }
-                self.stirred = now;
+                self.journeys.insert(id, now);
                 self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
                 self.pending.insert(id, step);
+            }
+            Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_again => {
+                self.find_first(train, step);
             }
             Err(why) => self.refuse(now, &step, &why),
         }
@@ -432,11 +368,6 @@ impl ScriptRunner {
     }
 }
 
-/// Whether what a line asks for goes on until something else is asked for.
-fn runs_on(step: &Step) -> bool {
-    matches!(step.instruction, Instruction::Order(Order::Hold { .. } | Order::Follow { .. }))
-}
-
 impl Machine for ScriptRunner {
     type Notice = Spoken;
 
@@ -462,9 +393,15 @@ impl Machine for ScriptRunner {
         let now_and_then = self.wait.map(|wait| match wait.until {
             Until::Passed(span) => wait.since + span,
             Until::AtRest(_) => self.looked + LOOK_AGAIN,
-            Until::At(..) | Until::Located(_) => wait.since + WAIT_LIMIT,
+            Until::At(..) | Until::Located(_) => wait.since + self.wait_limit,
         });
-        [self.dispatcher.next_timeout(), now_and_then, self.tires()].into_iter().flatten().min()
+        let learns = self.learning.is_fitting().then(|| self.looked + BETWEEN_PARTS);
+        let tried_again =
+            self.interrupted.map(|since| (self.looked + LOOK_AGAIN).min(since + self.wait_limit));
+        [self.dispatcher.next_timeout(), now_and_then, self.tires(), tried_again, learns]
+            .into_iter()
+            .flatten()
+            .min()
     }
 }
 

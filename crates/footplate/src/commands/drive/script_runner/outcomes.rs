@@ -1,10 +1,11 @@
 //! What comes of instructions: refusals, notices of the driver and the dispatcher, orders that have ended, and what trains taught.
 
+use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
-    Achieved, DispatchNotice, DriveNotice, Finished, Order, Outcome, Output, Refusal, WatchdogNotice,
+    Achieved, DispatchNotice, DriveNotice, Finished, Machine, Order, Outcome, Output, Refusal, WatchdogNotice,
 };
 use footplate_core::track::Landmark;
-use footplate_core::{Length, Timestamp, TrainId};
+use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
 use super::ScriptRunner;
 use crate::commands::drive::instruction::{Instruction, Until};
@@ -16,6 +17,9 @@ use crate::dashboard::{Alarm, TrainPassed};
 /// A train is said to break its promises once they are wider by this, one standard deviation (chosen: ±30 mm are seen beside a
 /// platform, and no train of the usual worlds comes to it).
 const UNRELIABLE_FROM: Length = Length::from_mm(15.0);
+
+/// Nothing is learnt when something has to be done so soon: a part of a fit takes less.
+const DUE_SOON: TimeSpan = TimeSpan::from_ms(50);
 
 impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
@@ -70,10 +74,8 @@ impl ScriptRunner {
         }
         match notice {
             DispatchNotice::Drive(notice) => self.driven(now, notice),
-            DispatchNotice::Watch(notice) => self.warned(now, notice),
-            DispatchNotice::RouteSet { .. } => self.stirred = now,
+            DispatchNotice::Watch(notice) => self.warned(notice),
             DispatchNotice::Arrived { order, train, error, .. } => {
-                self.stirred = now;
                 let Some(step) = self.pending.remove(order) else { return };
                 let rest = self.rests.remove(train);
                 let at = rest.as_ref().and_then(|rest| rest.achieved).map(|achieved| achieved.at);
@@ -86,14 +88,14 @@ impl ScriptRunner {
         }
     }
 
-    fn warned(&mut self, now: Timestamp, notice: &WatchdogNotice) {
+    fn warned(&mut self, notice: &WatchdogNotice) {
         match notice {
             WatchdogNotice::Danger { train, .. } => self.learning.interrupt(*train),
             // What it was measured as is what is learnt from now on; what it taught before was another train's.
             WatchdogNotice::Recovered { train, outcome, .. } => {
-                self.stirred = now;
                 if *outcome != Outcome::AsBefore {
                     self.learning.forget(*train);
+                    self.taught.remove(train);
                     self.changed.insert(*train);
                 }
             }
@@ -117,7 +119,7 @@ impl ScriptRunner {
             }
             DriveNotice::Done(finished) => {
                 self.done(finished);
-                self.learn(now, finished);
+                self.learn(finished);
             }
             DriveNotice::Lost { train } | DriveNotice::TurnoutLiesOtherwise { train, .. } => {
                 self.learning.interrupt(*train);
@@ -130,8 +132,13 @@ impl ScriptRunner {
             }
             DriveNotice::GivenUp { order, why, .. } => {
                 self.promises.remove(order);
-                if let Some(step) = self.pending.remove(order) {
-                    self.refuse(now, &step, why);
+                match self.pending.remove(order) {
+                    Some(step) if self.takes_up_again(&step, why) => {
+                        self.say(format!("`{}` waits: {why}", step.text));
+                        self.steps.push_front(Step { is_again: true, ..step });
+                    }
+                    Some(step) => self.refuse(now, &step, why),
+                    None => {}
                 }
             }
             DriveNotice::Replaced { order, .. } => {
@@ -145,7 +152,7 @@ impl ScriptRunner {
     fn done(&mut self, finished: &Finished) {
         self.promises.remove(&finished.order);
         self.rests.insert(finished.train, *finished);
-        let Some(step) = self.pending.remove(&finished.order) else { return };
+        let Some(step) = self.pending.remove(&finished.order).filter(|step| !step.is_part) else { return };
         self.fell_short |= finished.unseen.is_some();
         let ended = Ended {
             error: finished.achieved.and_then(|achieved| achieved.error),
@@ -166,23 +173,36 @@ impl ScriptRunner {
         }
     }
 
-    /// What trains taught is used from the next order on. Only while all of them stand, so that nobody waits for it.
-    fn learn(&mut self, now: Timestamp, finished: &Finished) {
+    /// What a train taught is used from the next order on.
+    fn learn(&mut self, finished: &Finished) {
         if finished.unseen.is_some() {
             self.learning.interrupt(finished.train);
         }
-        let trains: Vec<TrainId> = self.trains.keys().copied().collect();
-        if trains.iter().all(|train| self.driver().stands(*train, now))
-            && let Some(model) = self.learning.model(finished.train)
-        {
-            let unexplained = model.unexplained_scatter();
-            self.dispatcher.set_model(model);
-            if unexplained >= UNRELIABLE_FROM && self.unreliable.insert(finished.train) {
-                let line = promises_broken(finished.train, unexplained);
-                let alarm = Alarm::promises_broken(finished.train, unexplained).said(&line);
-                self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm)));
-                self.say(line);
-            }
+        self.learning.begin_fit(finished.train);
+    }
+
+    /// Goes on with what is learnt, unless something is due: nobody waits for it. A train that moves is driven to the end as
+    /// it began.
+    pub(super) fn learn_on(&mut self, now: Timestamp) {
+        let is_free = self.dispatcher.next_timeout().is_none_or(|due| due > now + DUE_SOON);
+        if is_free && let Some(model) = self.learning.go_on() {
+            self.taught.insert(model.train(), model);
+        }
+        let stands = |train: &TrainId| self.driver().stands(*train, now);
+        let standing: Vec<TrainId> = self.taught.keys().copied().filter(stands).collect();
+        for model in standing.iter().filter_map(|train| self.taught.remove(train)).collect::<Vec<_>>() {
+            self.use_model(model);
+        }
+    }
+
+    fn use_model(&mut self, model: MotionModel) {
+        let (train, unexplained) = (model.train(), model.unexplained_scatter());
+        self.dispatcher.set_model(model);
+        if unexplained >= UNRELIABLE_FROM && self.unreliable.insert(train) {
+            let line = promises_broken(train, unexplained);
+            let alarm = Alarm::promises_broken(train, unexplained).said(&line);
+            self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm)));
+            self.say(line);
         }
     }
 }
