@@ -92,12 +92,10 @@ impl ScriptRunner {
         match notice {
             WatchdogNotice::Danger { train, .. } => self.learning.interrupt(*train),
             // What it was measured as is what is learnt from now on; what it taught before was another train's.
-            WatchdogNotice::Recovered { train, outcome, .. } => {
-                if *outcome != Outcome::AsBefore {
-                    self.learning.forget(*train);
-                    self.taught.remove(train);
-                    self.changed.insert(*train);
-                }
+            WatchdogNotice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
+                self.learning.forget(*train);
+                self.taught.remove(train);
+                self.changed.insert(*train);
             }
             WatchdogNotice::NeedsPerson { .. } => self.fell_short = true,
             _ => {}
