@@ -9,7 +9,7 @@ use footplate_core::control::{
     TrainLengths, WatchdogNotice,
 };
 use footplate_core::estimation::WayPoint;
-use footplate_core::track::{Layout, Position};
+use footplate_core::track::{Layout, Leg, Position};
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
@@ -212,15 +212,21 @@ fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() 
 #[test]
 fn a_train_too_near_a_turnout_to_throw_it_backs_away_and_comes_again() {
     // Given a train whose overhang is over turnout 1, which lies for the other leg,
-    let mut traffic = Traffic::with(Dispatcher::new, [("A1", 170.0), ("D1", 300.0)]);
+    let mut traffic = Traffic::with(Dispatcher::new, [("D1", 500.0), ("B1", 250.0)]);
+    let go = |traffic: &mut Traffic, place: &str| {
+        let journey =
+            Journey { faces: true, ..Journey::to(traffic.world.layout.landmark(place).expect("a place")) };
+        traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey).expect("on the layout");
+        traffic.run(60.0);
+    };
+    go(&mut traffic, "A1+160mm");
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    assert_eq!(traffic.world.turnouts.get(TurnoutId(1)), Some(Leg::Straight));
     // when it is sent over the leg for which it does not lie, and has to come from this side,
-    let target = traffic.world.layout.landmark("C1+150mm").expect("a place");
-    let journey = Journey { faces: true, ..Journey::to(target) };
-    traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey).expect("on the layout");
-    traffic.run(120.0);
+    go(&mut traffic, "C1+150mm");
     // then it comes there, really, over the turnout thrown for it.
     assert_eq!(traffic.wrongs, Vec::<String>::new());
-    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
     let at = traffic.world.trains[0].at;
     let node = traffic.world.layout.node_named("C1").expect("a node");
     assert_eq!(traffic.world.layout.edge(at.edge).map(|edge| edge.from), Some(node));

@@ -64,6 +64,8 @@ pub(super) struct DispatchedTrain {
     pub(super) purpose: Purpose,
     /// The journey that its runs were granted for; another may have been asked for since.
     pub(super) granted_for: Option<OrderId>,
+    /// The last run to its destination, of a train that comes to rest before the end of it.
+    pub(super) last_run: Option<GrantedRun>,
     /// The runs granted, the present one first.
     pub(super) course: VecDeque<GrantedRun>,
     pub(super) state: State,
@@ -107,6 +109,7 @@ impl DispatchedTrain {
             asked: None,
             purpose: Purpose::Journey,
             granted_for: None,
+            last_run: None,
             course: VecDeque::new(),
             state: State::Resting,
             held: Footprint::empty(),

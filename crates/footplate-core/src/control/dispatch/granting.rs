@@ -77,6 +77,9 @@ pub(super) struct Start {
     /// and behind only if that leads nowhere: it may have come less far, and nothing is thrown then of all that it holds.
     /// Who stands on points that gave way to it goes on: they would not give way to it when it comes back.
     pub(super) turned: Option<Position>,
+    /// Whether it may back away from turnouts that it stands too near to throw: not twice without a contact between, or its
+    /// place would become ever less sure.
+    pub(super) may_back_away: bool,
 }
 
 impl Dispatcher {
@@ -193,7 +196,8 @@ impl Dispatcher {
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
         let turned = self.driver.turned_place(id, now).filter(|_| may_turn);
         let came = train.came.clone();
-        Some(Start { place, came, room, pace: self.pace(id), frozen, turned })
+        let may_back_away = train.seen_since_turn;
+        Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })
     }
 
     /// The soonest way past obstacles, with what it takes.
@@ -214,7 +218,7 @@ impl Dispatcher {
         // Where turnouts just ahead lie otherwise and cannot be thrown, it backs away from them first.
         proposed(search, ahead)
             .or_else(|| proposed(Search { points_give_way: false, ..search }, ahead))
-            .or_else(|| proposed(search, None))
+            .or_else(|| start.may_back_away.then(|| proposed(search, None))?)
     }
 
     pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {
@@ -297,6 +301,7 @@ impl Dispatcher {
         if purpose == Purpose::Journey {
             train.rooms_made = 0;
         }
+        train.last_run = None;
         train.state = State::Setting { ready: None, since: now };
         train.skipped.clear();
         self.hold(now, id);

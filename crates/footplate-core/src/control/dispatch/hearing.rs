@@ -12,9 +12,6 @@ use super::dispatcher::Dispatcher;
 use super::notice::DispatchNotice;
 use super::way::Way;
 
-/// A train that was stopped no further than this from its destination has arrived: to come nearer it would have to go
-/// away first.
-const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 /// A train that was stopped for its limit is given so many times as much room the next time, up to this many times.
 const MORE_CAUTION: f64 = 1.5;
 const MOST_CAUTION: f64 = 4.0;
@@ -74,11 +71,11 @@ impl Dispatcher {
         }
     }
 
-    /// The driver gave up a run. Near the destination that is as good as having arrived.
+    /// The driver gave up a run. Near the destination that is as good as having arrived, once it stands.
     fn stopped_on_the_way(&mut self, now: Timestamp, id: TrainId, why: &Refusal) {
         let is_last = self.trains.get(&id).is_some_and(|train| train.course.len() == 1);
         if is_last && matches!(why, Refusal::AtLimit { .. }) {
-            self.forgive(now, id);
+            self.ends_near(now, id);
         }
         if let Some(train) = self.trains.get_mut(&id).filter(|_| matches!(why, Refusal::AtLimit { .. })) {
             train.caution = (train.caution * MORE_CAUTION).min(MOST_CAUTION);
@@ -86,17 +83,13 @@ impl Dispatcher {
         self.gives_up(id);
     }
 
-    /// A train that comes to rest near its destination has arrived.
-    fn forgive(&mut self, now: Timestamp, id: TrainId) {
-        let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
+    /// Whether a train that was told to stop comes to rest near its destination is seen when it stands.
+    fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
-        if self.driver.unseen(id, now).is_some() {
-            return;
-        }
-        let rest = self.driver.rest_if_stopped(id, now).and_then(|at| self.driver.position_at(id, at));
-        let error = rest.and_then(|rest| Some(run.way.find(rest, run.start)? - run.stop));
-        if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
-            self.arrived(now, id, Some(error));
+        if self.driver.unseen(id, now).is_none()
+            && let Some(train) = self.trains.get_mut(&id)
+        {
+            train.last_run = train.course.front().cloned();
         }
     }
 

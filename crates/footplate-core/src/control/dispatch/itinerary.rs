@@ -159,11 +159,19 @@ impl<'a> Search<'a> {
                     open.push(Open { seconds: next.seconds + cost, node: edge.to, by });
                 }
             }
-            if is_merge || ahead.is_none() && next.by == (By::Start { turned: true }) {
+            let backs_away = ahead.is_none()
+                && next.by == (By::Start { turned: true })
+                && turned.is_some_and(|turned| self.is_plain(turned.edge));
+            if is_merge || backs_away {
                 self.shunt(&mut reached, next, &needs, &mut open);
             }
         }
         reached
+    }
+
+    /// Whether an edge is no leg of a turnout.
+    fn is_plain(&self, edge: EdgeId) -> bool {
+        self.layout.needs_of(edge).next().is_none()
     }
 
     /// Whether a turnout is met from one of its legs at a node.
@@ -175,6 +183,9 @@ impl<'a> Search<'a> {
     fn shunt(&self, reached: &mut Reached<'_>, at: Open, needs: &[TurnoutNeed], open: &mut BinaryHeap<Open>) {
         let mut paths: Vec<(Vec<EdgeId>, NodeId, Length, f64)> =
             vec![(Vec::new(), at.node, self.clears, 0.0)];
+        let is_contact =
+            self.layout.node(at.node).is_some_and(|node| matches!(node.kind, NodeKind::Sensor(_)));
+        let is_sure = is_contact || self.is_merge(at.node);
         let mut looked_at = 0;
         while let Some((path, node, left, cost)) = paths.pop() {
             looked_at += 1;
@@ -183,6 +194,10 @@ impl<'a> Search<'a> {
             }
             for id in self.layout.ways(node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(needs, id)) else { continue };
+                // Where it only backs away it comes over turnouts only behind a contact, which says where it is.
+                if !is_sure && !self.is_plain(id) {
+                    continue;
+                }
                 let Some(more) = self.seconds(id, Length::ZERO, edge.length.min(left)) else { continue };
                 let mut longer = path.clone();
                 longer.push(id);

@@ -27,6 +27,10 @@ const SURE: Length = Length::from_mm(10.0);
 /// A train that was stopped on the way goes on after this.
 const AFTER_HALT: TimeSpan = TimeSpan::from_s(1.0);
 
+/// A train that was stopped no further than this from its destination has arrived: to come nearer it would have to go
+/// away first.
+const NEAR_ENOUGH: Length = Length::from_mm(80.0);
+
 impl Dispatcher {
     /// Does what is due for every train.
     pub(super) fn go_on(&mut self, now: Timestamp) {
@@ -220,7 +224,18 @@ impl Dispatcher {
         if is_sure && confirmed {
             self.stand(now, id);
         }
+        self.forgive(now, id);
         self.is_stirred = true;
+    }
+
+    /// A train that was stopped on its last run and rests near its destination has arrived.
+    fn forgive(&mut self, now: Timestamp, id: TrainId) {
+        let Some(run) = self.trains.get_mut(&id).and_then(|train| train.last_run.take()) else { return };
+        let Some(rest) = self.driver.position(id, now) else { return };
+        let error = run.way.find(rest, run.start).map(|at| at - run.stop);
+        if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
+            self.arrived(now, id, Some(error));
+        }
     }
 
     /// Whether a train at rest is on points that lie for another leg than it came from: they gave way to it.

@@ -78,10 +78,17 @@ impl ScriptRunner {
             DispatchNotice::Arrived { order, train, error, .. } => {
                 let Some(step) = self.pending.remove(order) else { return };
                 let rest = self.rests.remove(train);
-                let at = rest.as_ref().and_then(|rest| rest.achieved).map(|achieved| achieved.at);
-                let faced = at.zip(*error).map(|(at, error)| Landmark { offset: at.offset - error, ..at });
+                let achieved = match &rest {
+                    Some(rest) => rest.achieved,
+                    None => self.stands_at(now, *train),
+                };
+                let faced = achieved.zip(*error);
+                let faced =
+                    faced.map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
                 let ended = Ended { error: *error, faced, ..self.ended(now, &step) };
+                let achieved = achieved.map(|achieved| self.tongue().place(achieved.at));
                 let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
+                let ended = Ended { achieved, ..ended };
                 self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
             }
             _ => {}
@@ -128,8 +135,9 @@ impl ScriptRunner {
                     self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
                 }
             }
-            DriveNotice::GivenUp { order, why, .. } => {
+            DriveNotice::GivenUp { order, train, why } => {
                 self.promises.remove(order);
+                self.rests.remove(train);
                 match self.pending.remove(order) {
                     Some(step) if self.takes_up_again(&step, why) => {
                         self.say(format!("`{}` waits: {why}", step.text));
@@ -158,6 +166,13 @@ impl ScriptRunner {
         };
         let ended = self.at_rest(finished, ended);
         self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+    }
+
+    /// Where a train stands that was stopped before the end of its run.
+    fn stands_at(&self, now: Timestamp, train: TrainId) -> Option<Achieved> {
+        let located = self.driver().locate(train, now)?;
+        let at = self.driver().landmark(train, located.at)?;
+        Some(Achieved { at, uncertainty: located.uncertainty, error: None })
     }
 
     /// With the place where a train came to rest, and what had been promised of that.
