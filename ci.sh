@@ -142,7 +142,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@3183c8d467a003c169d19f13b956783b0e35d606 --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@f82e7a4a8e4038fdfc06a7216d81924a431d6cb7 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown

@@ -135,6 +135,8 @@ impl KnownTrains {
         let at = now();
         for model in models {
             MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;
+            // What this session added is gone through now that all trains stand, and not when the next one is to begin.
+            MotionReplay::of_store(layout, &mut store, model.train(), highest(), at)?;
         }
         Ok(())
     }
