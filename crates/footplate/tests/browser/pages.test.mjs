@@ -24,7 +24,7 @@ const text = (page, selector) => page.locator(selector).textContent();
 async function runsAround(contacts) {
   for (;;) {
     const { t_s: times } = await (await fetch(`${running.url}api/trains/24/history`)).json();
-    if (times.length > contacts) return;
+    if (times?.length > contacts) return;
     await new Promise((resolve) => setTimeout(resolve, 500));
   }
 }
