@@ -207,6 +207,15 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         self.pending = Some((step, self.train.start_dead_time.as_s()));
     }
 
+    /// How far the wheels roll within a time, in mm.
+    pub(crate) fn way_within_mm(&mut self, within: TimeSpan) -> f64 {
+        let steps = (within.as_s().clamp(0.0, 600.0) / STEP_S) as usize;
+        (0..steps).fold(0.0, |way, _| {
+            let before = self.wheel_speed;
+            way + 0.5 * (before + self.advance()) * STEP_S
+        })
+    }
+
     /// How far the wheels still roll until they rest, on level straight track and without scatter, in mm.
     pub(crate) fn way_to_rest_mm(mut self) -> f64 {
         let mut way = 0.0;

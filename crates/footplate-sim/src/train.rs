@@ -4,7 +4,7 @@ use footplate_core::{Acceleration, Approach, Length, Ratio, Speed, SpeedStep, Ti
 
 use crate::draws::{Draws, Purpose};
 use crate::law::{Law, LawFamily};
-use crate::motor::{Motor, STEP_S};
+use crate::motor::Motor;
 use crate::speed_table::{Shape, SpeedTable};
 use crate::traits::Traits;
 
@@ -160,14 +160,18 @@ impl Train {
             motor.command_without_scatter(to);
             motor
         };
-        let steps = (within.as_s().clamp(0.0, 600.0) / STEP_S) as usize;
-        let mut speed = motor.wheel_speed();
-        let way = (0..steps).fold(0.0, |way, _| {
-            let before = speed;
-            speed = motor.advance();
-            way + 0.5 * (before + speed) * STEP_S
-        });
-        Length::from_mm(way)
+        Length::from_mm(motor.way_within_mm(within))
+    }
+
+    /// The distance of a short move from rest to rest, its stop reaching the decoder `run` after its start, on level straight
+    /// track and without scatter; integrated, not looked up.
+    #[must_use]
+    pub fn short_move(&self, step: SpeedStep, run: TimeSpan) -> Length {
+        let mut motor = Motor::at_rest(self);
+        motor.start_without_scatter(step);
+        let before = motor.way_within_mm(run);
+        motor.command_without_scatter(SpeedStep::STAND);
+        Length::from_mm(before + motor.way_to_rest_mm())
     }
 }
 

@@ -28,6 +28,7 @@ mod session_check;
 mod store;
 mod table;
 mod tachometer;
+mod taped_moves;
 mod train_file;
 mod ttobench;
 mod vehicle_file;
@@ -74,6 +75,7 @@ pub use tachometer::{
     RowPlace, TachometerBlock, TachometerColumns, TachometerError, TachometerNote, TachometerOddity,
     TachometerReader, TachometerWriter, TimeFaults, Truth, WrittenColumns,
 };
+pub use taped_moves::{TapedMoves, TapedMovesError};
 pub use train_file::{TrainFile, TrainFileForm, parse_train, read_train, write_train};
 pub use vehicle_file::{
     DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,

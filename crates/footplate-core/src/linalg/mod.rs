@@ -1,6 +1,8 @@
 //! Linear algebra as small as the estimators need it.
 
 mod cholesky;
+mod curve_fit;
 mod normal_equations;
 
+pub(crate) use curve_fit::{CurveFit, FittedCurve, Unknown};
 pub use normal_equations::{Eliminated, NormalEquations, Solution};

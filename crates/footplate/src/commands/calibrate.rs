@@ -5,11 +5,12 @@ mod explain;
 mod live;
 mod picture;
 mod series;
+mod short_moves;
 mod table;
 mod two_sensor;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -36,6 +37,8 @@ enum Method {
     Motion,
     /// The acceleration of each change of speed, from the time between two sensors, beside that of the motion model.
     TwoSensor,
+    /// Short moves: when to command the stop so that the train gets so far.
+    ShortMoves,
 }
 
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
@@ -52,13 +55,15 @@ Examples:
   footplate calibrate --link marklin-serial:/dev/ttyUSB0 --layout track-a --train 24 --budget 5m --store railway.db
   footplate calibrate --from testdata/sensor-logs/*train24*.csv --layout track-a
   footplate calibrate --from testdata/position-series/cs452_2015_stop_1.csv
+  footplate calibrate --from testdata/short-moves/cs452_2023_train58_step8.csv
   footplate calibrate --from session.csv --layout track-a --store railway.db
   footplate calibrate --from session.csv --layout track-a --method two-sensor
+  footplate calibrate --store railway.db --layout track-a --train 24 --method short-moves
   footplate calibrate --store railway.db --layout track-a --train 24 --plot train24.svg
   footplate calibrate --store railway.db --layout track-a --explain SPEED:14")]
 pub(crate) struct Arguments {
-    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md; or series of positions of one start or stop
-    /// each, docs/formats/position-series.md, which need no layout.
+    /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md; or, without a layout, series of positions of
+    /// one start or stop each (docs/formats/position-series.md) or measured short moves (docs/formats/short-moves.md).
     #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present_any = ["store", "link"])]
     from: Vec<PathBuf>,
     /// Drive the train over this link: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or
@@ -78,7 +83,7 @@ pub(crate) struct Arguments {
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
-    /// What to find in recordings: the motion model, or accelerations from pairs of sensors.
+    /// What to find in recordings: the motion model, accelerations from pairs of sensors, or short moves.
     #[arg(long, value_enum, default_value_t = Method::Motion, conflicts_with_all = ["link", "plot", "explain"])]
     method: Method,
     /// Only this train; also the train of logs that name none.
@@ -90,7 +95,8 @@ pub(crate) struct Arguments {
     /// Calibrate as of this date: from what the store held then.
     #[arg(long, value_name = "DATE", requires = "store", conflicts_with = "from")]
     as_of: Option<Moment>,
-    /// Write the motion model of the train to a file, TOML or JSON by its ending.
+    /// Write the motion model to a file, TOML or JSON by its ending; models of several trains to a file each, as
+    /// model-24.toml.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Draw speeds and stops by step to this file, SVG or PNG by its ending.
@@ -108,8 +114,13 @@ pub(crate) struct Arguments {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         if let Some(series) = series::read(&self.from)? {
-            self.check_series()?;
+            self.check_measured_by_hand("a series of positions", None)?;
             series::write(&series, self.json, output)?;
+            return Ok(Outcome::Done);
+        }
+        if let Some(files) = short_moves::read(&self.from)? {
+            self.check_measured_by_hand("a file of short moves", Some(Method::ShortMoves))?;
+            short_moves::write_measured(&files, self.json, output)?;
             return Ok(Outcome::Done);
         }
         let Some(layout) = &self.layout else {
@@ -154,17 +165,16 @@ impl Arguments {
             }
         }
         if let Some(path) = &self.out {
-            let [train] = batch.trains.as_slice() else {
-                bail!(
-                    "{}: a motion model is of one train, and there are {}; choose one with --train",
-                    path.display(),
-                    batch.trains.len()
-                );
-            };
-            train.file(&layout).write(path)?;
+            for (train, path) in batch.trains.iter().zip(Self::model_files(path, &batch)) {
+                train.file(&layout).write(&path)?;
+            }
         }
         if self.method == Method::TwoSensor {
             two_sensor::write(&layout, &batch, self.json, output)?;
+            return Ok(Outcome::Done);
+        }
+        if self.method == Method::ShortMoves {
+            short_moves::write_calibrated(&batch, self.json, output)?;
             return Ok(Outcome::Done);
         }
         let report = Findings::of(&layout, &batch);
@@ -179,21 +189,31 @@ impl Arguments {
         Ok(Outcome::Done)
     }
 
-    /// A series is of no layout and no train, so that most options mean nothing for it.
-    fn check_series(&self) -> anyhow::Result<()> {
+    /// Where models of the batch's trains go: one train's to the file itself, several to a file each with the train's number
+    /// before the ending.
+    fn model_files(path: &Path, batch: &Batch) -> Vec<PathBuf> {
+        if let [_] = batch.trains.as_slice() {
+            return vec![path.to_path_buf()];
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = path.extension().map_or_else(String::new, |of| format!(".{}", of.to_string_lossy()));
+        let name = |train: TrainId| path.with_file_name(format!("{stem}-{train}{ending}"));
+        batch.trains.iter().map(|train| name(train.replay.fit.model().train())).collect()
+    }
+
+    /// What is measured by hand is of no layout, so that most options mean nothing for it.
+    fn check_measured_by_hand(&self, what: &str, method: Option<Method>) -> anyhow::Result<()> {
         let given = [
             ("--layout", self.layout.is_some()),
             ("--train", self.train.is_some()),
             ("--store", self.store.is_some()),
             ("--out", self.out.is_some()),
-            ("--method", self.method != Method::Motion),
+            ("--method", self.method != Method::Motion && Some(self.method) != method),
             ("--plot", self.plot.is_some()),
             ("--explain", self.explain.is_some()),
         ];
         if let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) {
-            bail!(
-                "{option} does not work with a series of positions, which names no train and no sensors: leave it out"
-            );
+            bail!("{option} does not work with {what}, which names no sensors: leave it out");
         }
         Ok(())
     }

@@ -66,6 +66,28 @@ fn speeds_and_stops_are_true_within_their_uncertainty() {
 }
 
 #[test]
+fn short_moves_end_within_their_uncertainty() {
+    let layout = layout_named("track-a").expect("built in").layout;
+    let mut errors = Vec::new();
+    for_each(&layout, "calibration", 2, |_, recording| {
+        let batch = batch_of(&layout, recording);
+        let model = batch.trains[0].replay.fit.model();
+        for step in (4..=10).step_by(2).filter_map(SpeedStep::new) {
+            for run in (2..=10).map(|quarters| TimeSpan::from_ms(250 * quarters)) {
+                let forecast = model.short_move(step, run);
+                let missed = forecast.distance - recording.train.short_move(step, run);
+                errors.push(missed / forecast.uncertainty);
+                if let Some(again) = model.short_move_time(step, forecast.distance) {
+                    assert!((again - run).as_s().abs() < 1e-6, "{again:?} is not {run:?}");
+                }
+            }
+        }
+    });
+    println!("short moves: {:.3} inside, rms {:.2}", inside_95(&errors), rms(&errors));
+    assert!(inside_95(&errors) > 0.9, "{:.3}, rms {:.2}", inside_95(&errors), rms(&errors));
+}
+
+#[test]
 fn a_lag_and_a_constant_rate_are_recognised() {
     let layout = layout_named("track-a").expect("built in").layout;
     for_each(&layout, "changes", 2, |_, recording| {

@@ -24,6 +24,7 @@ mod program;
 mod replay;
 mod report;
 mod seeds_that_failed;
+mod short_moves;
 mod simulate;
 mod simulate_driving;
 mod simulate_line;

@@ -30,6 +30,7 @@ mod robust;
 mod rows;
 mod scatter;
 mod segment;
+mod short_moves;
 mod spread;
 #[cfg(feature = "serde")]
 mod square;
@@ -50,4 +51,5 @@ pub use position_series::{PositionPoint, SeriesChange, SeriesError, SeriesFit};
 pub(crate) use priors::{FELT, TRIP_DEVIATION, section_variance};
 pub use prospect::Prospect;
 pub use rescaled::{MeasuredRatio, Rescaling};
+pub use short_moves::ShortMoveForecast;
 pub(crate) use standing_times::StandingTimes;

@@ -160,7 +160,7 @@ impl MotionModel {
 
     /// One standard deviation of what follows from the model's numbers, in the measure of a tape: the scale of the survey
     /// may be off, too.
-    fn deviation_with_scale(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
+    pub(super) fn deviation_with_scale(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
         let slopes = self.spread.slopes(&self.values, self.steps(), of);
         let by_scale: f64 =
             slopes.iter().filter_map(|(place, slope)| Some(slope * self.scale.get(*place)?)).sum();

@@ -8,7 +8,6 @@
 use super::apart::STEP_AGAIN;
 use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
 use super::course::{B, Course, E, H, LATER, N, Told, Z};
-use super::decoder_kind::SHAPE_ERROR;
 use super::model::MotionModel;
 use super::priors::{WANDER, change_error, run_variance};
 use crate::track::HopId;
@@ -34,12 +33,9 @@ const LATER_CHANGE: f64 = 0.03;
 /// the state in which a train was told something fades over some dozens of changes (chosen by how well speeds are held).
 const LATER_WALK: f64 = 0.004;
 const STEP_WALK: f64 = 0.0005;
-/// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
-/// (3τ² − 2τ³) and an even one are apart by up to 0.096.
-const SHAPE_SPEED_ERROR: f64 = 0.07;
 /// By how much more than it is thought to a single change differs from its law in forecasts: shapes of decoders that the law
 /// does not have (chosen on simulated decoders of six laws, so that nine in ten intervals of 90 % hold).
-const OTHER_SHAPES: f64 = 2.0;
+pub(super) const OTHER_SHAPES: f64 = 2.0;
 
 /// A mean and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -305,14 +301,11 @@ impl<const L: usize> MotionFilter<L> {
 
     /// One standard deviation (m/s) of the speed in the middle of a change.
     fn shape_speed_error(&self, time: f64) -> f64 {
-        let segment = self.course.segment;
-        let share = segment.share(time);
-        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (segment.to - segment.from.speed).abs()
+        self.course.segment.shape_speed_error(time)
     }
 
     pub(super) fn shape_error(&self, time: f64) -> f64 {
-        let share = self.course.segment.share(time);
-        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.course.segment.displacement().abs()
+        self.course.segment.shape_error(time)
     }
 
     /// Where it is at a time, with the slopes of that.

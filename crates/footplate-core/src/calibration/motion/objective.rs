@@ -11,7 +11,8 @@
 use alloc::vec::Vec;
 
 use super::model::MotionModel;
-use super::prospect::{Prospect, Seen, move_way, stop_way};
+use super::prospect::{Prospect, Seen, stop_way};
+use super::short_moves::move_way;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 

@@ -11,14 +11,14 @@
 //!
 //! Residuals of a tracker are alike from picture to picture. Counted as independent, a hundred of them would promise far
 //! too much; the factor is that of the mean of a series whose correlation falls geometrically (Bartlett, 1946).
-#![expect(clippy::indexing_slicing, reason = "every index is below the number of unknowns")]
+#![expect(clippy::indexing_slicing, reason = "every index is below the number of unknowns or of points")]
 
 use alloc::vec::Vec;
 
 use super::segment::Segment;
 use crate::estimate::Estimate;
 use crate::kinematics::RampedLag;
-use crate::linalg::{NormalEquations, Solution};
+use crate::linalg::{CurveFit, FittedCurve, Unknown};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Acceleration, Length, Speed};
 
@@ -32,6 +32,8 @@ const N: usize = 6;
 
 /// Steps of the numerical derivatives, as fine as the law is smooth: m, s, m/s, 1, 1, 1.
 const STEP: [f64; N] = [1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3];
+/// Spreads (m, s, m/s) far beyond any layout: they only keep the equations from being singular.
+const WIDE: [f64; 3] = [1e3, 1e4, 1e2];
 /// Before anything is known: a lag of 0.3 s and friction of 15 mm/s² as in `parameters.rs`, each within a factor of 4.5.
 const LN_LAG: (f64, f64) = (-1.2, 1.5);
 const LN_FRICTION: (f64, f64) = (-4.2, 1.5);
@@ -49,9 +51,6 @@ const NO_FRICTION: f64 = 1e-4;
 /// of positions narrows it, so that it is added to where a stop begins and how long it is.
 const SHAPE: f64 = 0.04;
 
-const MOST_ITERATIONS: usize = 80;
-/// A step that lowers the cost by less than this share is the last.
-const CONVERGED: f64 = 1e-9;
 /// Positions below which six unknowns and the noise are not found.
 const FEWEST_POINTS: usize = 10;
 /// The part of the series at either end from which the two speeds are read.
@@ -196,11 +195,10 @@ struct Series {
     speed: f64,
 }
 
-/// Values of all unknowns, and how those that were free are known.
+/// A fitted law and what it leaves over.
 struct Fitted {
-    x: [f64; N],
-    free: Vec<usize>,
-    solution: Solution,
+    curve: FittedCurve,
+    unknowns: [Unknown; N],
     rms: f64,
     correlation: f64,
 }
@@ -253,7 +251,7 @@ impl Series {
         }
     }
 
-    fn law(&self, x: &[f64; N]) -> Segment {
+    fn law(&self, x: &[f64]) -> Segment {
         let shape = RampedLag::new(libm::exp(x[RAMP]), libm::exp(x[LAG]));
         match self.change {
             SeriesChange::Stop => {
@@ -263,7 +261,7 @@ impl Series {
         }
     }
 
-    fn residuals(&self, x: &[f64; N]) -> Vec<f64> {
+    fn residuals(&self, x: &[f64]) -> Vec<f64> {
         let law = self.law(x);
         let pairs = self.times.iter().zip(&self.positions);
         pairs.map(|(time, position)| position - x[POSITION] - law.way(*time)).collect()
@@ -286,156 +284,63 @@ impl Series {
         [position, effect, self.speed, lag, ramp, friction]
     }
 
-    /// Gauss's and Newton's iteration with steps damped until they lower the cost (Levenberg, 1944).
     fn fitted(&self, free: &[usize]) -> Option<Fitted> {
         let is_even = !free.contains(&LAG);
-        let mut x = self.first(is_even);
-        let mut noise = self.noise(&x);
-        let (mut damping, mut cost) = (1e-3, self.cost(&x, noise, is_even));
-        for _ in 0..MOST_ITERATIONS {
-            let step = self.equations(&x, noise, free, is_even, damping).values()?;
-            let mut next = x;
-            for (unknown, by) in free.iter().zip(&step) {
-                next[*unknown] += by;
-            }
-            let next_cost = self.cost(&next, noise, is_even);
-            if next_cost < cost {
-                let gained = cost - next_cost;
-                x = next;
-                damping = (0.2 * damping).max(1e-9);
-                let settled = gained < CONVERGED * cost;
-                noise = self.noise(&x);
-                cost = self.cost(&x, noise, is_even);
-                if settled {
-                    break;
-                }
-            } else {
-                damping *= 8.0;
-                if damping > 1e9 {
-                    break;
-                }
-            }
-        }
-        let residuals = self.residuals(&x);
-        let (rms, correlation) = spread(&residuals);
-        let solution = self.equations(&x, noise, free, is_even, 0.0).solve()?;
-        let is_finite = x.iter().all(|value| value.is_finite()) && rms.is_finite();
-        is_finite.then(|| Fitted { x, free: free.to_vec(), solution, rms, correlation })
+        let unknowns = self.priors(free, is_even);
+        let curve = CurveFit {
+            unknowns: &unknowns,
+            residuals: |x: &[f64]| self.residuals(x),
+            variance: |residuals: &[f64]| noise(residuals),
+        };
+        let curve = curve.fitted(&self.first(is_even))?;
+        let (rms, correlation) = spread(&self.residuals(&curve.x));
+        rms.is_finite().then_some(Fitted { curve, unknowns, rms, correlation })
     }
 
-    /// Variance that one position counts with: what is left over, times how much alike neighbours are.
-    fn noise(&self, x: &[f64; N]) -> f64 {
-        let residuals = self.residuals(x);
-        let (rms, correlation) = spread(&residuals);
-        let freedom = residuals.len() as f64 / (residuals.len().saturating_sub(N).max(1)) as f64;
-        (rms * rms * freedom).max(LEAST_NOISE * LEAST_NOISE) * (1.0 + correlation) / (1.0 - correlation)
-    }
-
-    /// Priors of the unknowns: which, value, standard deviation. The rest is bounded by its unit only.
-    fn priors(&self, is_even: bool) -> [(usize, f64, f64); N] {
-        // Metres, seconds and m/s, far beyond any layout: they only keep the equations from being singular.
-        let wide = [(POSITION, 0.0, 1e3), (EFFECT, 0.0, 1e4), (SPEED, self.speed, 1e2)];
+    /// What is known of the unknowns beforehand.
+    fn priors(&self, free: &[usize], is_even: bool) -> [Unknown; N] {
         let ramp = if is_even { ANY_LN_RAMP } else { LN_RAMP.1 };
-        [
-            wide[0],
-            wide[1],
-            wide[2],
-            (LAG, LN_LAG.0, LN_LAG.1),
-            (RAMP, LN_RAMP.0, ramp),
-            (FRICTION, LN_FRICTION.0, LN_FRICTION.1),
-        ]
-    }
-
-    fn cost(&self, x: &[f64; N], noise: f64, is_even: bool) -> f64 {
-        let squares: f64 = self.residuals(x).iter().map(|r| r * r).sum();
-        let priors = self.priors(is_even);
-        let offs = priors.iter().map(|(unknown, value, by)| (x[*unknown] - value) / by);
-        let prior: f64 = offs.map(|off| off * off).sum();
-        let cost = squares / noise + prior;
-        if cost.is_finite() { cost } else { f64::INFINITY }
-    }
-
-    /// For the step from `x`, so that a prior counts with how far `x` is from it.
-    fn equations(
-        &self,
-        x: &[f64; N],
-        noise: f64,
-        free: &[usize],
-        is_even: bool,
-        damping: f64,
-    ) -> NormalEquations {
-        let residuals = self.residuals(x);
-        let slopes: Vec<Vec<f64>> = free.iter().map(|unknown| self.slopes(x, *unknown)).collect();
-        let mut equations = NormalEquations::new(free.len());
-        for (row, residual) in residuals.iter().enumerate() {
-            let terms: Vec<(usize, f64)> =
-                slopes.iter().enumerate().map(|(unknown, slope)| (unknown, slope[row])).collect();
-            equations.add(&terms, *residual, noise);
-        }
-        let priors = self.priors(is_even);
-        for (place, unknown) in free.iter().enumerate() {
-            let (_, value, by) = priors[*unknown];
-            equations.add(&[(place, 1.0)], value - x[*unknown], by * by);
-            if damping > 0.0 {
-                let information: f64 = slopes[place].iter().map(|slope| slope * slope).sum::<f64>() / noise;
-                equations.add(&[(place, 1.0)], 0.0, 1.0 / (damping * information.max(1e-12)));
-            }
-        }
-        equations
-    }
-
-    /// Derivative of each position by one unknown.
-    fn slopes(&self, x: &[f64; N], unknown: usize) -> Vec<f64> {
-        let (mut up, mut down) = (*x, *x);
-        up[unknown] += STEP[unknown];
-        down[unknown] -= STEP[unknown];
-        let width = up[unknown] - down[unknown];
-        let pairs = self.residuals(&down).into_iter().zip(self.residuals(&up));
-        pairs.map(|(below, above)| (below - above) / width).collect()
-    }
-
-    /// A figure that follows from the unknowns, with its standard deviation to first order.
-    fn derived(&self, fit: &Fitted, of: impl Fn(&Segment) -> f64) -> (f64, f64) {
-        let terms: Vec<(usize, f64)> = fit
-            .free
-            .iter()
-            .enumerate()
-            .map(|(place, unknown)| {
-                let mut up = fit.x;
-                up[*unknown] += STEP[*unknown];
-                (place, (of(&self.law(&up)) - of(&self.law(&fit.x))) / STEP[*unknown])
-            })
-            .collect();
-        (of(&self.law(&fit.x)), libm::sqrt(fit.solution.variance_of(&terms)))
+        let of = [
+            (0.0, WIDE[POSITION]),
+            (0.0, WIDE[EFFECT]),
+            (self.speed, WIDE[SPEED]),
+            LN_LAG,
+            (LN_RAMP.0, ramp),
+            LN_FRICTION,
+        ];
+        core::array::from_fn(|unknown| Unknown {
+            prior: of[unknown].0,
+            spread: of[unknown].1,
+            step: STEP[unknown],
+            is_free: free.contains(&unknown),
+        })
     }
 
     fn report(&self, fit: &Fitted, even: &Fitted) -> SeriesFit {
         let count = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
-        let deviation = |unknown: usize| {
-            let place = fit.free.iter().position(|free| *free == unknown);
-            place.map_or(0.0, |place| libm::sqrt(fit.solution.variance(place)))
-        };
+        let (x, deviation) = (&fit.curve.x, |unknown| fit.curve.deviation(unknown));
+        let derived = |of: fn(&Segment) -> f64| fit.curve.derived(&fit.unknowns, |x| of(&self.law(x)));
         let span = |(value, deviation): (f64, f64)| Estimate {
             value: TimeSpan::from_s(value),
             uncertainty: TimeSpan::from_s(deviation),
             count,
             date: Timestamp::ZERO,
         };
-        let (lag, is_stop) = (libm::exp(fit.x[LAG]), self.change == SeriesChange::Stop);
-        let (ramp, friction) = (libm::exp(fit.x[RAMP]), libm::exp(fit.x[FRICTION]));
-        let (way, way_deviation) = self.derived(fit, Segment::way_to_rest);
-        let (time, time_deviation) = self.derived(fit, |law| law.settled() - law.begins);
-        let shape = SHAPE * self.law(&fit.x).delay() * fit.x[SPEED];
-        let shape_time = SHAPE * self.law(&fit.x).delay();
+        let (lag, is_stop) = (libm::exp(x[LAG]), self.change == SeriesChange::Stop);
+        let (ramp, friction) = (libm::exp(x[RAMP]), libm::exp(x[FRICTION]));
+        let (way, way_deviation) = derived(Segment::way_to_rest);
+        let (time, time_deviation) = derived(|law| law.settled() - law.begins);
+        let shape = SHAPE * self.law(x).delay() * x[SPEED];
+        let shape_time = SHAPE * self.law(x).delay();
         SeriesFit {
             change: self.change,
             speed: Estimate {
-                value: Speed::from_m_per_s(fit.x[SPEED]),
+                value: Speed::from_m_per_s(x[SPEED]),
                 uncertainty: Speed::from_m_per_s(deviation(SPEED)),
                 count,
                 date: Timestamp::ZERO,
             },
-            effect: span((fit.x[EFFECT], libm::hypot(deviation(EFFECT), shape_time))),
+            effect: span((x[EFFECT], libm::hypot(deviation(EFFECT), shape_time))),
             lag: span((lag, lag * deviation(LAG))),
             ramp: span((ramp, ramp * deviation(RAMP))),
             friction: is_stop.then(|| Estimate {
@@ -465,6 +370,13 @@ fn slope(times: &[f64], positions: &[f64]) -> f64 {
     let products: f64 = times.iter().zip(positions).map(|(time, position)| (time - mean) * position).sum();
     let squares: f64 = times.iter().map(|time| (time - mean) * (time - mean)).sum();
     products / squares
+}
+
+/// Variance that one position counts with: what is left over, times how much alike neighbours are.
+fn noise(residuals: &[f64]) -> f64 {
+    let (rms, correlation) = spread(residuals);
+    let freedom = residuals.len() as f64 / (residuals.len().saturating_sub(N).max(1)) as f64;
+    (rms * rms * freedom).max(LEAST_NOISE * LEAST_NOISE) * (1.0 + correlation) / (1.0 - correlation)
 }
 
 /// Root mean square of residuals, and the correlation of neighbours, at least zero.

@@ -7,6 +7,7 @@ use super::model::MotionModel;
 use super::parameters::Answers;
 use super::priors::{LATE_START, TRIP_DEVIATION};
 use super::segment::{Pace, Segment, Told};
+use super::short_moves::move_way;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
@@ -46,28 +47,16 @@ pub(super) fn stop_way(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
     speed * segment.begins + segment.way_to_rest()
 }
 
-/// The way of a short move (m): a start, and a stop some seconds later.
-pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
-    let start = start_to(answers, step);
-    let mut told = Told { sent: run, from: step, to: 0, at_rest: false };
-    let effect = told.effect(answers);
-    if effect <= start.begins {
-        return 0.0;
-    }
-    told.sent = 0.0;
-    start.way(effect) + Segment::of(&told, answers, start.pace(effect)).way_to_rest()
-}
-
 fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
     Segment::of(&Told { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
 }
 
-fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
+pub(super) fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
     Segment::of(&Told { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
 }
 
 /// The time (s) at which something that only grows reaches a value, by halving.
-fn time_of(value: f64, of: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn time_of(value: f64, of: impl Fn(f64) -> f64) -> f64 {
     let (mut early, mut late) = (0.0, 60.0);
     for _ in 0..40 {
         let middle = 0.5 * (early + late);

@@ -1,5 +1,6 @@
 //! What a train does between one command's effect and the next: a change of speed and the run behind it.
 
+use super::decoder_kind::SHAPE_ERROR;
 use super::parameters::Answers;
 use crate::kinematics::RampedLag;
 
@@ -103,6 +104,10 @@ impl Rolling {
 
 /// Share of a change that counts as none: 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
 const SETTLED: f64 = 0.03;
+
+/// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
+/// (3τ² − 2τ³) and an even one are apart by up to 0.096.
+const SHAPE_SPEED_ERROR: f64 = 0.07;
 
 impl Segment {
     /// A train at rest, or running steadily since ever.
@@ -248,5 +253,17 @@ impl Segment {
     pub(super) fn displacement(&self) -> f64 {
         let Pace { speed, set } = self.from;
         (set - self.to) * self.shape.delay() + (speed - set) * self.shape.lag() + self.residual
+    }
+
+    /// One standard deviation of where the train is within a change, as no shape is true of all decoders (m).
+    pub(super) fn shape_error(&self, time: f64) -> f64 {
+        let share = self.share(time);
+        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.displacement().abs()
+    }
+
+    /// The same of the speed (m/s).
+    pub(super) fn shape_speed_error(&self, time: f64) -> f64 {
+        let share = self.share(time);
+        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.to - self.from.speed).abs()
     }
 }
