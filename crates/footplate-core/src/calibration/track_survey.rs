@@ -2,8 +2,8 @@
 //!
 //! Letters: `x` length of an edge less what was thought of it, `l` what train `t` makes of a section, `m` what was thought of
 //! that, `g` factor by which the train feels everything longer. Each section that a train ran over says
-//! `Σ x − g l = l − m`, give or take what the train does not know of it, what trains feel of curves and slopes, and where
-//! contacts close. Each `g` is free, so that trains tell how long sections are against each other; how long all of them are
+//! `Σ x + c − g l = l − m`, give or take what the train does not know of it and what it alone feels. `c` is what all trains
+//! feel of the section's curves and slopes, and where its contacts close: no second train tells more of that. Each `g` is free, so that trains tell how long sections are against each other; how long all of them are
 //! the measured edges tell. All unknowns are found together, with edges as they were known before as measurements of their
 //! own (Gauss, 1821); rows that are off count less (Huber, 1964).
 
@@ -20,6 +20,9 @@ use crate::units::Length;
 /// Contacts close within this of where a tape would be laid, one standard deviation (m): half a pickup's springiness and a
 /// contact track's own length.
 const CONTACT_PLACE: f64 = 0.005;
+/// The part of its variance that what trains feel of a section, and where its contacts close, have in common: curves and contacts
+/// are the same, bogies and pickups are not.
+const IN_COMMON: f64 = 0.5;
 /// An edge that nobody measured is held to the usual lengths of edges by so much less than one of known length: what is usual
 /// elsewhere is no measure of this layout's scale.
 const LOOSER: f64 = 3.0;
@@ -69,13 +72,19 @@ impl TrackSurvey {
         let terms = |row: &Row| {
             let mut terms = edges(row.section).map(terms_of).unwrap_or_default();
             terms.push((count + row.train, -row.felt));
+            terms.push((count + models.len() + row.section, 1.0));
             terms
         };
         let mut known = prior(layout, models.len());
+        known.extend((0..sections.len()).map(|section| {
+            let length = sections.surveyed_length(section);
+            let felt = rows.iter().find(|row| row.section == section).map_or(length, |row| row.felt);
+            (0.0, IN_COMMON * felt_variance(felt))
+        }));
         let mut weights = vec![1.0; rows.len()];
         let mut solution: Option<Solution> = None;
         for _ in 0..WEIGHED {
-            let mut equations = NormalEquations::new(count + models.len());
+            let mut equations = NormalEquations::new(known.len());
             for (unknown, (value, variance)) in known.iter().enumerate() {
                 equations.add(&[(unknown, 1.0)], *value, *variance);
             }
@@ -223,11 +232,16 @@ fn rows_of(sections: &SectionIndex, train: usize, model: &MotionModel) -> Vec<Ro
             return None;
         }
         let felt = length + longer / (own * information);
-        let feels = FELT * felt;
-        let variance = 1.0 / information + feels * feels + 2.0 * CONTACT_PLACE * CONTACT_PLACE;
+        let variance = 1.0 / information + (1.0 - IN_COMMON) * felt_variance(felt);
         Some(Row { section: *section, train, felt, variance })
     });
     rows.collect()
+}
+
+/// Variance (m²) of what a train makes of a section of this length (m), however often it runs over it.
+fn felt_variance(felt: f64) -> f64 {
+    let feels = FELT * felt;
+    feels * feels + 2.0 * CONTACT_PLACE * CONTACT_PLACE
 }
 
 /// What is known beforehand of each unknown, edges and then factors, with the variance.

@@ -28,6 +28,9 @@ const FINDING_SPEED: Speed = Speed::from_mm_per_s(180.0);
 /// The part of all steps at which most trains move and none is fast (the published tables: step 5 of 14).
 const FINDING_STEP: f64 = 0.36;
 
+/// No slower than this: below it many trains stall (the published tables).
+const SLOWEST_STEP: u8 = 3;
+
 /// Turned around this often without getting onto a circuit, a train cannot be calibrated where it is.
 const MOST_TURNS: u8 = 3;
 
@@ -68,7 +71,7 @@ impl Calibrator<'_> {
         self.pushed_from = None;
         let step = self.finding_step();
         self.tell(now, step);
-        self.activity = Activity::Finding { push_at: now + PUSH_UP_AFTER };
+        self.activity = Activity::Finding { push_at: now + self.push_up_after() };
         self.say_progress(now);
     }
 
@@ -78,7 +81,24 @@ impl Calibrator<'_> {
         let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FINDING_SPEED;
         let known = usable.iter().rev().find(slow).or(usable.first()).copied();
         let first = libm::ceil(FINDING_STEP * f64::from(model.highest().get())) as u8;
-        known.or(SpeedStep::new(first)).unwrap_or(model.highest())
+        let step = known.or(SpeedStep::new(first)).unwrap_or(model.highest());
+        let slower = step.get().saturating_sub(self.slowed_by()).max(SLOWEST_STEP.min(step.get()));
+        SpeedStep::new(slower).unwrap_or(step)
+    }
+
+    /// By how many steps slower it runs after it was turned around. Where lengths are unknown, a turnout or the end of the
+    /// track may be near; a slower train needs less room for either.
+    fn slowed_by(&self) -> u8 {
+        if self.layout.is_measured() { 0 } else { self.turns.min(MOST_TURNS) }
+    }
+
+    fn most_turns(&self) -> u8 {
+        if self.layout.is_measured() { MOST_TURNS } else { 2 * MOST_TURNS }
+    }
+
+    /// How long it may take to the next contact; longer at a slower step.
+    fn push_up_after(&self) -> TimeSpan {
+        TimeSpan::from_ns(PUSH_UP_AFTER.as_ns() * i64::from(1 + self.slowed_by()))
     }
 
     /// No contact for a while: up a step; at the highest the other way.
@@ -90,7 +110,7 @@ impl Calibrator<'_> {
             let patience = if next == highest { GIVE_UP_AFTER } else { PUSH_UP_AFTER };
             self.tell(now, next);
             self.activity = Activity::Finding { push_at: now + patience };
-        } else if self.turns < MOST_TURNS {
+        } else if self.turns < self.most_turns() {
             self.turn_around(now);
         } else {
             self.end(now, Ending::NotFound);
@@ -147,7 +167,7 @@ impl Calibrator<'_> {
         if is_safe && self.layout.circuit_from(node, &BTreeMap::new(), &self.settings.avoid).is_some() {
             // Only turnouts that are too near are in the way: the next contact tells how they lie.
             self.activity = Activity::Joining;
-        } else if self.turns < MOST_TURNS {
+        } else if self.turns < self.most_turns() {
             self.say(CalibrationNotice::TurnsAround { node });
             self.turn_around(now);
         } else {
