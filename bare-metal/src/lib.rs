@@ -32,3 +32,18 @@ fn on_panic(_: &PanicInfo<'_>) -> ! {
         core::hint::spin_loop();
     }
 }
+
+/// What a controller without floating point asks before every stop; linked whether or not anybody calls it.
+#[unsafe(no_mangle)]
+pub extern "C" fn footplate_command_in(stop: &footplate_core::kinematics::IntegerStop, distance: i32) -> i64 {
+    stop.command_in(distance)
+}
+
+/// Where it has got to since.
+#[unsafe(no_mangle)]
+pub extern "C" fn footplate_run_since_command(
+    stop: &footplate_core::kinematics::IntegerStop,
+    ticks: i64,
+) -> i32 {
+    stop.run_since_command(ticks)
+}

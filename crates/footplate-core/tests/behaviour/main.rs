@@ -11,6 +11,7 @@ mod driving_any_orders;
 mod federated_filters;
 mod following;
 mod inertial;
+mod integer_stops;
 mod lasting_fits;
 mod motion_checks;
 mod motion_models;
