@@ -1,206 +1,146 @@
-//! A stop from a steady speed in whole numbers, for controllers without floating point.
+//! A stop from a steady speed in integers, for controllers without floating point.
 //!
-//! Lengths are whole tenths of a millimetre, times whole ticks of any length. The constants are made of a [`StoppingLaw`] once,
-//! with floating point, on a computer or at start; everything asked of them later takes integers alone. Letters: `v` speed,
-//! `τ` delay, `a` deceleration, `θ` time constant, `t` ticks since braking began.
+//! Lengths are whole units of 0.1 mm, times whole ticks of any length. [`IntegerStop::new`] and [`IntegerStop::with_shape`]
+//! calculate the constants once, with floating point, on a computer or at start; a controller that has none takes them by
+//! [`IntegerStop::from_constants`]. All else, and all of this file, is integers. Letters: `v` speed, `q` delay, `T` ramp, `θ`
+//! lag, `t` time since braking began, `h` and `H` as of [`RampedLag`](super::RampedLag).
 //!
 //! ```text
-//! steady           x = v t
-//! constant         x = v t − a t²/2
-//! exponential      x = v θ (1 − 2^(−t log₂e/θ))
+//! x = v (q + g(t))        place, counted from the command
+//! g = t − H(t)/T          while the set speed falls (t ≤ T), with  H = t²/2 − θ h,  h = t − θ (1 − e^(−t/θ))
+//! g = T/2 + θ − w e^(−(t−T)/θ)      after it, with  w = (θ²/T)(1 − e^(−T/θ))
 //! ```
 //!
-//! Constants are binary fractions of 64 bits, products have 128. Against the laws in floating point, no answer is off by more
-//! than one unit.
+//! Even braking is a ramp without a lag, an exponential a lag without a ramp. `g` is the time for which the train would run as
+//! far steadily: with q + T/2 + θ of it the stopping distance, and the time to command the stop, need nothing else.
 
-use super::stopping_distance::FromCommand;
-use super::stopping_law::{Braking, StoppingLaw};
-use crate::time::TimeSpan;
-use crate::units::{Length, Speed};
+mod constants;
+mod power_of_half;
 
-/// One metre in units of length.
-const UNITS_PER_M: f64 = 1e4;
-/// Binary digits behind the point of speed (units a tick), deceleration (units a tick squared) and the rate of an exponential
-/// (powers of two a tick), lengths (units) and times (ticks).
-const SPEED_BITS: u32 = 48;
-const RATE_BITS: u32 = 56;
+pub use constants::IntegerStopError;
+use power_of_half::{EXPONENT_BITS, POWER_BITS, power_of_half};
+
+/// Binary digits behind the point of times in ticks.
+const TIME_BITS: u32 = 30;
+/// Digits kept behind the point of a length in units when a target is taken from it.
 const LENGTH_BITS: u32 = 24;
-const TIME_BITS: u32 = 20;
-/// Constants stay below this, so that no product of them needs more than 128 bits.
-const MOST: f64 = 9.0e18;
-/// Distances stay below this many units (107 km).
-const FARTHEST: f64 = 1_073_741_824.0;
-/// Times of a stop stay below this many ticks (12 days of microseconds); four times as long after it every train rests.
-const LONGEST: f64 = 1_099_511_627_776.0;
-const AT_REST: i128 = 1 << (42 + TIME_BITS);
 
-/// 2^(−2^−k) for k = 1 to 32, in units of 2^−62.
-const ROOTS_OF_HALF: [u64; 32] = [
-    3_260_954_456_333_195_553,
-    3_877_950_241_171_266_237,
-    4_228_934_724_888_366_668,
-    4_416_165_660_797_809_419,
-    4_512_867_096_753_504_463,
-    4_562_008_997_483_360_349,
-    4_586_780_255_215_411_731,
-    4_599_216_278_082_138_665,
-    4_605_446_927_862_164_404,
-    4_608_565_417_332_308_035,
-    4_610_125_453_837_388_245,
-    4_610_905_670_110_601_999,
-    4_611_295_827_762_151_833,
-    4_611_490_918_967_884_501,
-    4_611_588_467_665_893_036,
-    4_611_637_242_788_701_951,
-    4_611_661_630_543_559_956,
-    4_611_673_824_469_352_645,
-    4_611_679_921_444_339_948,
-    4_611_682_969_934_856_344,
-    4_611_684_494_180_870_228,
-    4_611_685_256_304_066_092,
-    4_611_685_637_365_711_255,
-    4_611_685_827_896_545_643,
-    4_611_685_923_161_965_790,
-    4_611_685_970_794_676_601,
-    4_611_685_994_611_032_191,
-    4_611_686_006_519_210_032,
-    4_611_686_012_473_298_964,
-    4_611_686_015_450_343_433,
-    4_611_686_016_938_865_668,
-    4_611_686_017_683_126_786,
-];
-const ROOT_BITS: u32 = 62;
+/// A delay or a ramp is shorter than this (2³¹ ticks), a lag shorter than that (2²⁸ ticks): products fit 128 bits.
+const LONGEST: i64 = 1 << (31 + TIME_BITS);
+const LONGEST_LAG: i64 = 1 << (28 + TIME_BITS);
+/// A ramp that is there is at least so long as a share of the lag, as a power of two: its quotient magnifies roundings.
+const SHORTEST_RAMP_BITS: u32 = 14;
+/// No stop is longer than this many units (107 km).
+const FARTHEST: i128 = 1 << 30;
+/// So long after it began braking (2³⁴ ticks) every train rests.
+const AT_REST: i128 = 1 << (34 + TIME_BITS);
+/// Digits behind the point of a speed: from 2⁻²⁰ to 2¹³ units a tick; and of the rate of a lag.
+const SPEED_POINTS: [i64; 2] = [40, 72];
+const RATE_POINTS: [i64; 2] = [27, 100];
+/// A binary fraction has as many digits as a number in floating point: 53.
+const MANTISSA_BITS: u32 = 53;
 
-/// A train that runs steadily at one speed, and its stop, in tenths of a millimetre and ticks.
+/// A train that runs at a steady speed, and its stop, in tenths of a millimetre and ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntegerStop {
-    /// Units a tick, with [`SPEED_BITS`] behind the point.
-    speed: i64,
-    /// From the command to braking and to rest, in ticks with [`TIME_BITS`] behind the point.
+    /// Units a tick.
+    speed: BinaryFraction,
+    /// `q`, `T`, `θ` and `w` in ticks, with [`TIME_BITS`] behind the point.
     delay: i64,
+    ramp: i64,
+    lag: i64,
+    tail: i64,
+    /// log₂e/θ: powers of one half a tick.
+    rate: BinaryFraction,
+    /// From the command to rest in ticks, with [`TIME_BITS`] behind the point.
     time: i64,
-    /// From the command to rest, in units with [`LENGTH_BITS`] behind the point.
-    distance: i64,
-    braking: IntegerBraking,
 }
 
-/// How speed goes to zero once braking has begun.
+/// `digits` / 2^`point`, exactly what a number in floating point is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum IntegerBraking {
-    /// Deceleration in units a tick squared, with [`RATE_BITS`] behind the point.
-    Constant(i64),
-    /// Powers of two a tick, with [`RATE_BITS`] behind the point.
-    Exponential(i64),
+struct BinaryFraction {
+    digits: i64,
+    point: i64,
 }
 
-/// Why a law has no form in whole numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum IntegerStopError {
-    /// A tick takes some time.
-    Tick {
-        /// What was given.
-        found: TimeSpan,
-    },
-    /// The train does not run ahead, or runs too fast for a tick.
-    Speed {
-        /// What was given.
-        found: Speed,
-    },
-    /// The stop is too long or too sudden for whole numbers of this size.
-    Stop {
-        /// How far it would take.
-        distance: Length,
-        /// How long it would take.
-        time: TimeSpan,
-    },
-}
+impl BinaryFraction {
+    const fn is_within(self, points: [i64; 2]) -> bool {
+        let [fewest, most] = points;
+        let is_full = self.digits >> (MANTISSA_BITS - 1) == 1;
+        is_full && fewest <= self.point && self.point <= most
+    }
 
-impl core::fmt::Display for IntegerStopError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Tick { found } => {
-                write!(f, "a tick should take some time, such as 1 µs or 10 ms, not {} ns", found.as_ns())
-            }
-            Self::Speed { found } => write!(
-                f,
-                "speed should be above zero and below 3 m a tick, not {} mm/s: choose a shorter tick",
-                found.as_mm_per_s()
-            ),
-            Self::Stop { distance, time } => write!(
-                f,
-                "a stop of {} m in {} s has no form in tenths of a millimetre and ticks: it should take less than 107 km and \
-                 2^40 ticks, and longer than a tick",
-                distance.as_m(),
-                time.as_s()
-            ),
-        }
+    /// Times a number with so many digits behind its point, with `kept` digits behind the point, rounded to the nearest.
+    fn times(self, other: i128, bits: u32, kept: u32) -> i128 {
+        let shift = self.point as u32 + bits - kept;
+        (i128::from(self.digits) * other + (1 << (shift - 1))) >> shift
     }
 }
 
-impl core::error::Error for IntegerStopError {}
+/// These constants are none of a stop, or of one beyond what integers of this size can hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UnusableConstants;
+
+impl core::fmt::Display for UnusableConstants {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("these are no constants of a stop: take all nine, in order, as IntegerStop::constants returns them")
+    }
+}
+
+impl core::error::Error for UnusableConstants {}
 
 impl IntegerStop {
-    /// One unit of length.
-    pub const UNIT: Length = Length::from_mm(0.1);
+    /// All that is known of the stop: print it on a computer, and hand it to [`from_constants`](Self::from_constants) on the
+    /// controller. In order: digits and point of the speed, delay, ramp, lag, tail, digits and point of the rate, time.
+    #[must_use]
+    pub const fn constants(&self) -> [i64; 9] {
+        let Self { speed, delay, ramp, lag, tail, rate, time } = *self;
+        [speed.digits, speed.point, delay, ramp, lag, tail, rate.digits, rate.point, time]
+    }
 
-    /// The constants of a train that runs at a speed and stops by a law, for ticks of this length. The only part that calculates
-    /// with floating point.
+    /// The stop of constants calculated elsewhere; a `const` where they are known when the controller's program is built.
     ///
     /// # Errors
     ///
-    /// If the speed is not ahead, or speed or stop are beyond what the constants can hold.
-    pub fn new(
-        speed: Speed,
-        law: &StoppingLaw<FromCommand>,
-        tick: TimeSpan,
-    ) -> Result<Self, IntegerStopError> {
-        let tick_s = tick.as_s();
-        if tick <= TimeSpan::ZERO {
-            return Err(IntegerStopError::Tick { found: tick });
+    /// If one of them is beyond its range, so that no question asked later can overflow.
+    pub const fn from_constants(constants: [i64; 9]) -> Result<Self, UnusableConstants> {
+        let [speed, speed_point, delay, ramp, lag, tail, rate, rate_point, time] = constants;
+        let speed = BinaryFraction { digits: speed, point: speed_point };
+        let rate = BinaryFraction { digits: rate, point: rate_point };
+        let stop = Self { speed, delay, ramp, lag, tail, rate, time };
+        if stop.is_usable() { Ok(stop) } else { Err(UnusableConstants) }
+    }
+
+    const fn is_usable(&self) -> bool {
+        let Self { speed, delay, ramp, lag, tail, rate, time } = *self;
+        let spans =
+            delay >= 0 && delay < LONGEST && ramp >= 0 && ramp < LONGEST && lag >= 0 && lag < LONGEST_LAG;
+        let is_long_enough = ramp == 0 || ramp >= lag >> SHORTEST_RAMP_BITS;
+        let parts = tail >= 0 && tail <= lag && time >= delay && time <= i64::MAX >> 1;
+        if !(spans && is_long_enough && parts && speed.is_within(SPEED_POINTS) && rate.is_within(RATE_POINTS))
+        {
+            return false;
         }
-        let units = speed.as_m_per_s() * UNITS_PER_M * tick_s;
-        let whole_speed = fixed(units, SPEED_BITS)
-            .filter(|whole| *whole > 0)
-            .ok_or(IntegerStopError::Speed { found: speed })?;
-        let (distance, time) = (law.distance(speed).length(), law.time(speed));
-        let too_long = IntegerStopError::Stop { distance, time };
-        let rate = match law.braking() {
-            Braking::Constant(deceleration) => deceleration.as_m_per_s2() * UNITS_PER_M * tick_s * tick_s,
-            Braking::Exponential(time_constant) => core::f64::consts::LOG2_E * tick_s / time_constant.as_s(),
-        };
-        let rate = fixed(rate, RATE_BITS).filter(|rate| *rate > 0).ok_or(too_long)?;
-        let units = distance.as_m() * UNITS_PER_M;
-        let whole = fixed(units, LENGTH_BITS).filter(|_| units < FARTHEST).ok_or(too_long)?;
-        let ticks = |span: TimeSpan| fixed(span.as_s() / tick_s, TIME_BITS);
-        let (Some(delay), Some(rests), true) =
-            (ticks(law.delay()), ticks(time), time.as_s() < LONGEST * tick_s)
-        else {
-            return Err(too_long);
-        };
-        let braking = match law.braking() {
-            Braking::Constant(_) => IntegerBraking::Constant(rate),
-            Braking::Exponential(_) => IntegerBraking::Exponential(rate),
-        };
-        Ok(Self { speed: whole_speed, delay, time: rests, distance: whole, braking })
+        let stop = speed.digits as i128 * self.steady_time() as i128;
+        stop >> (speed.point as u32 + TIME_BITS) < FARTHEST
     }
 
     /// How far the train runs steadily in so many ticks.
     #[must_use]
     pub fn run(&self, ticks: i64) -> i32 {
-        rounded(product(self.speed, ticks), SPEED_BITS)
+        whole_units(self.speed.times(i128::from(ticks), 0, 0))
     }
 
     /// In how many ticks the train, running steadily, is so far ahead; negative if it has passed there.
     #[must_use]
     pub fn ticks_to(&self, distance: i32) -> i64 {
-        self.ticks_over(i128::from(distance) << LENGTH_BITS)
+        whole_ticks(self.time_over(distance))
     }
 
     /// How far the train still runs if it is commanded to stop now.
     #[must_use]
     pub fn stopping_distance(&self) -> i32 {
-        rounded(i128::from(self.distance), LENGTH_BITS)
+        whole_units(self.speed.times(i128::from(self.steady_time()), TIME_BITS, 0))
     }
 
     /// In how many ticks it rests if it is commanded to stop now.
@@ -213,90 +153,75 @@ impl IntegerStop {
     /// is late by as many.
     #[must_use]
     pub fn command_in(&self, distance: i32) -> i64 {
-        self.ticks_over((i128::from(distance) << LENGTH_BITS) - i128::from(self.distance))
+        whole_ticks(self.time_over(distance) - i128::from(self.steady_time()))
     }
 
     /// By how much the train runs beyond a place so far ahead if it is commanded to stop now; negative if it rests before it.
     #[must_use]
     pub fn overrun(&self, distance: i32) -> i32 {
-        rounded(i128::from(self.distance) - (i128::from(distance) << LENGTH_BITS), LENGTH_BITS)
+        let stop = self.speed.times(i128::from(self.steady_time()), TIME_BITS, LENGTH_BITS);
+        let beyond = stop - (i128::from(distance) << LENGTH_BITS);
+        whole_units((beyond + (1 << (LENGTH_BITS - 1))) >> LENGTH_BITS)
     }
 
     /// How far it has run so many ticks after the command to stop left.
     #[must_use]
     pub fn run_since_command(&self, ticks: i64) -> i32 {
-        let since = i128::from(ticks) << TIME_BITS;
-        let braking = (since - i128::from(self.delay)).min(AT_REST);
+        let braking = (i128::from(ticks) << TIME_BITS) - i128::from(self.delay);
         if braking <= 0 {
             return self.run(ticks);
         }
-        let before = product(self.speed, self.delay) >> TIME_BITS;
-        let whole = (i128::from(self.distance) << (SPEED_BITS - LENGTH_BITS)) - before;
-        let braked = match self.braking {
-            IntegerBraking::Constant(_) if since >= i128::from(self.time) => whole,
-            IntegerBraking::Constant(rate) => {
-                let slower = (i128::from(rate) * braking) >> TIME_BITS;
-                let lost = (slower * braking) >> (TIME_BITS + RATE_BITS - SPEED_BITS + 1);
-                ((i128::from(self.speed) * braking) >> TIME_BITS) - lost
-            }
-            IntegerBraking::Exponential(rate) => {
-                let left = power_of_half((i128::from(rate) * braking) >> TIME_BITS);
-                whole - part_of(whole, left)
-            }
+        let steady = i128::from(self.delay) + self.steady_time_of(braking.min(AT_REST));
+        whole_units(self.speed.times(steady, TIME_BITS, 0))
+    }
+
+    /// The time in which the train would run its stopping distance steadily: q + T/2 + θ.
+    const fn steady_time(&self) -> i64 {
+        self.delay + (self.ramp >> 1) + self.lag
+    }
+
+    /// `g`: the time in which it would run as far steadily as since it began braking, a time of up to [`AT_REST`] ago.
+    fn steady_time_of(&self, braking: i128) -> i128 {
+        let (ramp, lag) = (i128::from(self.ramp), i128::from(self.lag));
+        let whole = i128::from(self.steady_time() - self.delay);
+        let steady = if braking < ramp {
+            let behind = braking - part(lag, (1 << POWER_BITS) - self.left(braking));
+            braking - (braking * braking / 2 - lag * behind) / ramp
+        } else {
+            whole - part(i128::from(self.tail), self.left(braking - ramp))
         };
-        rounded(before + braked, SPEED_BITS)
+        // `clamp` could panic, of which no controller should have to hold the code.
+        steady.min(whole).max(0)
     }
 
-    /// Ticks for a length with [`LENGTH_BITS`] behind the point.
-    fn ticks_over(&self, length: i128) -> i64 {
-        let speed = i128::from(self.speed.max(1));
-        let numerator = length << (SPEED_BITS - LENGTH_BITS);
-        let half = speed / 2;
-        let away = if numerator < 0 { numerator - half } else { numerator + half };
-        whole(away / speed)
-    }
-}
-
-/// A constant with so many binary digits behind the point; `None` beyond 64 bits.
-fn fixed(value: f64, bits: u32) -> Option<i64> {
-    let scaled = libm::round(libm::ldexp(value, bits as i32));
-    (scaled.abs() < MOST).then_some(scaled as i64)
-}
-
-fn product(one: i64, other: i64) -> i128 {
-    i128::from(one) * i128::from(other)
-}
-
-/// A length of up to 80 bits times a part of one with [`ROOT_BITS`]: the upper and the lower half apart.
-fn part_of(length: i128, part: u64) -> i128 {
-    const HALF: u32 = 40;
-    let (upper, lower) = (length >> HALF, length & ((1 << HALF) - 1));
-    let part = i128::from(part);
-    ((upper * part) >> (ROOT_BITS - HALF)) + ((lower * part) >> ROOT_BITS)
-}
-
-/// 2^−x for x of [`RATE_BITS`] behind the point, in units of 2^−62: a root of one half for each binary digit that is set.
-fn power_of_half(x: i128) -> u64 {
-    let halvings = x >> RATE_BITS;
-    if halvings >= i128::from(ROOT_BITS) {
-        return 0;
-    }
-    let mut power = 1_u64 << ROOT_BITS;
-    for (digit, root) in (1..).zip(ROOTS_OF_HALF) {
-        if (x >> (RATE_BITS - digit)) & 1 == 1 {
-            power = ((u128::from(power) * u128::from(root)) >> ROOT_BITS) as u64;
+    /// e^(−t/θ), with [`POWER_BITS`] behind the point.
+    fn left(&self, time: i128) -> u64 {
+        if self.lag == 0 && time > 0 {
+            return 0;
         }
+        power_of_half(self.rate.times(time, TIME_BITS, EXPONENT_BITS))
     }
-    power >> halvings
+
+    /// Ticks for a distance run steadily, with [`TIME_BITS`] behind the point.
+    fn time_over(&self, distance: i32) -> i128 {
+        let digits = i128::from(self.speed.digits.max(1));
+        let shifted = i128::from(distance) << self.speed.point;
+        (shifted.div_euclid(digits) << TIME_BITS) + (shifted.rem_euclid(digits) << TIME_BITS) / digits
+    }
 }
 
-/// A length in whole units, to the nearest; at the ends of its range beyond them.
-fn rounded(length: i128, bits: u32) -> i32 {
-    let nearest = (length + (1 << (bits - 1))) >> bits;
-    i32::try_from(nearest).unwrap_or(if nearest < 0 { i32::MIN } else { i32::MAX })
+/// A time times a share with [`POWER_BITS`] behind the point.
+fn part(time: i128, share: u64) -> i128 {
+    (time * i128::from(share)) >> POWER_BITS
 }
 
-/// Ticks; at the ends of their range beyond them.
-fn whole(ticks: i128) -> i64 {
-    i64::try_from(ticks).unwrap_or(if ticks < 0 { i64::MIN } else { i64::MAX })
+/// At the ends of the range beyond them.
+fn whole_units(length: i128) -> i32 {
+    i32::try_from(length).unwrap_or(if length < 0 { i32::MIN } else { i32::MAX })
+}
+
+/// A time with [`TIME_BITS`] behind the point in whole ticks, to the nearest; at the ends of the range beyond them.
+fn whole_ticks(time: i128) -> i64 {
+    let nearest = (time + (1 << (TIME_BITS - 1))) >> TIME_BITS;
+    i64::try_from(nearest).unwrap_or(if nearest < 0 { i64::MIN } else { i64::MAX })
 }

@@ -7,7 +7,7 @@
 //! - [`RampedLag`] is one shape for all of them, where a fit has to be quick and none is known to be the right one.
 //! - [`TwoSensorRun`] is how an acceleration is measured.
 //! - [`StoppingLaw`] tells the [`StoppingDistance`], and its type since when that is counted.
-//! - [`IntegerStop`] is the same in whole numbers, for controllers without floating point.
+//! - [`IntegerStop`] is a stop in integers, for controllers without floating point.
 //! - [`ShortMove`] puts a start and a stop together: "go, wait, stop".
 
 mod ahead;
@@ -29,7 +29,7 @@ mod transit;
 mod trapezoid;
 mod two_sensor;
 
-pub use integer_stop::{IntegerStop, IntegerStopError};
+pub use integer_stop::{IntegerStop, IntegerStopError, UnusableConstants};
 pub use limits::{Limits, ProfileError};
 pub use minimum_jerk::MinimumJerk;
 pub use motion::{Motion, MotionState};

@@ -1,5 +1,9 @@
-//! What is absent on purpose: std, clocks, randomness and dependencies from core and wire, and from everything
-//! the mathematics that differs from machine to machine.
+//! What is absent on purpose: std, clocks, randomness and dependencies from core and wire, floating point from what runs on
+//! controllers that have none, and from everything the mathematics that differs from machine to machine.
+
+use std::str::FromStr as _;
+
+use proc_macro2::{TokenStream, TokenTree};
 
 use crate::project::{Fault, TextFile, assert_none, source_folders, sources_below, text_files};
 use crate::source::Source;
@@ -21,6 +25,16 @@ const PLATFORM_MATHEMATICS: [&str; 22] = [
     "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot", "sin", "cos",
     "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh",
 ];
+
+/// What runs on controllers without floating point.
+const INTEGER_FILES: [&str; 2] = [
+    "crates/footplate-core/src/kinematics/integer_stop.rs",
+    "crates/footplate-core/src/kinematics/integer_stop/power_of_half.rs",
+];
+
+/// Words that bring floating point in: its types, its functions, and quantities, which are made of it.
+const FLOATING_POINT: [&str; 9] =
+    ["f16", "f32", "f64", "f128", "libm", "units", "Length", "Speed", "TimeSpan"];
 
 /// What each pure crate may depend on.
 const DEPENDENCIES: [(&str, &[&str]); 2] = [
@@ -51,6 +65,39 @@ fn platform_mathematics(source: &Source) -> impl Iterator<Item = Fault> {
             what: format!("calls {name}, whose last bit differs from machine to machine; take it from libm"),
         }
     })
+}
+
+/// Where a file's text outside its tests names or writes a number in floating point: the line and the word.
+fn floating_point(text: &str) -> Vec<(usize, String)> {
+    let before_tests = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let tokens = TokenStream::from_str(before_tests).unwrap_or_else(|e| panic!("{before_tests}: {e}"));
+    let (mut found, mut groups) = (Vec::new(), vec![tokens]);
+    while let Some(tokens) = groups.pop() {
+        for token in tokens {
+            let word = token.to_string();
+            let is_floating = match &token {
+                TokenTree::Group(group) => {
+                    groups.push(group.stream());
+                    false
+                }
+                TokenTree::Ident(_) => FLOATING_POINT.contains(&word.as_str()),
+                TokenTree::Literal(_) => is_floating_point(&word),
+                TokenTree::Punct(_) => false,
+            };
+            if is_floating {
+                found.push((token.span().start().line, word));
+            }
+        }
+    }
+    found
+}
+
+/// Whether a literal is such a number: with a point, an exponent or a type that says so; `0x1e5` has none.
+fn is_floating_point(literal: &str) -> bool {
+    let is_decimal = literal.starts_with(|c: char| c.is_ascii_digit())
+        && !["0x", "0b", "0o"].iter().any(|prefix| literal.starts_with(prefix));
+    let number = literal.trim_end_matches("usize").trim_end_matches("isize");
+    is_decimal && number.contains(['.', 'e', 'E', 'f'])
 }
 
 /// The names under `[dependencies]`, with their lines.
@@ -104,6 +151,34 @@ fn elementary_functions_come_from_libm() {
     let sources = source_folders().into_iter().flat_map(|folder| sources_below(&folder));
     let faults: Vec<Fault> = sources.flat_map(|s| platform_mathematics(&s).collect::<Vec<_>>()).collect();
     assert_none(&faults);
+}
+
+#[test]
+fn what_runs_without_floating_point_names_none() {
+    let files = text_files(&INTEGER_FILES);
+    assert_eq!(files.len(), INTEGER_FILES.len(), "a file that is listed here is gone");
+    let faults = files.iter().flat_map(|file| {
+        floating_point(&file.text).into_iter().map(|(line, word)| {
+            let what = format!("`{word}` is floating point; calculate it in constants.rs, before");
+            Fault { path: file.path.clone(), line, what }
+        })
+    });
+    assert_none(&faults.collect::<Vec<_>>());
+}
+
+#[test]
+fn floating_point_is_noticed() {
+    let words = |text| floating_point(text).into_iter().map(|(_, word)| word).collect::<Vec<_>>();
+    assert_eq!(words("fn f(x: f64) -> i32 { x as i32 }"), ["f64"]);
+    assert_eq!(words("use crate::units::{Length, Ratio};"), ["units", "Length"]);
+    assert_eq!(words("const A: i64 = 1.5 as i64;"), ["1.5"]);
+    assert_eq!(words("const A: i64 = 1e3 as i64;"), ["1e3"]);
+    assert_eq!(
+        words(
+            "/// 1.5 f64\nconst A: u64 = 0x1e5 + 1_u64 + 2_usize;\n#[cfg(test)]\nmod tests { type X = f64; }"
+        ),
+        [""; 0]
+    );
 }
 
 #[test]
