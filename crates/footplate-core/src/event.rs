@@ -59,7 +59,8 @@ pub struct Report {
     /// The contact.
     pub sensor: SensorId,
     /// The interval of the poll that reported it, from the reading before to the reading that saw it closed,
-    /// where the host recorded it; the contact closed within this span before the reading.
+    /// where the host recorded it; the contact closed within this span before the reading. On a link whose sensors report by
+    /// themselves it is the span of the delays that the report may have had, as the link's session knows them.
     pub poll_interval: Option<TimeSpan>,
 }
 

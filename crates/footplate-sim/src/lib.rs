@@ -54,8 +54,9 @@ pub use electric::ElectricEngine;
 pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use living::{
-    CoilAlarm, CtsSwitch, End, FromStation, HandError, LivingLayout, LivingSwitches, Mishap, MishapKind,
-    PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualStation,
+    BoardSwitches, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError, LivingLayout, LivingSwitches,
+    Mishap, MishapKind, PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualBoard,
+    VirtualStation,
 };
 pub use other_law::OtherLaw;
 pub use physics_range::PhysicsRange;

@@ -6,7 +6,9 @@
 
 extern crate alloc;
 
+pub mod dcc_ex;
 pub mod marklin_serial;
+mod queue;
 mod session;
 
-pub use session::{Closing, CommandError, LinkNotice, Session, Transmit};
+pub use session::{Closing, CommandError, Confirmation, LinkNotice, Session, Transmit};

@@ -1,11 +1,12 @@
 //! A command station spoken to without a socket: bytes and commands in, bytes and entries of the recording out.
 
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
 
-use footplate_core::{Command, Event, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, Event, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
-use crate::marklin_serial::{EncodeError, ModuleReads};
+use crate::marklin_serial::ModuleReads;
 
 /// What the loop around a command station's line hands over and asks for.
 ///
@@ -16,8 +17,9 @@ pub trait Session {
     /// Bytes have come from the station.
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]);
 
-    /// The station's hand-shake line is `up` (bytes may come) now; also said once at the beginning.
-    fn handle_cts(&mut self, now: Timestamp, up: bool);
+    /// The station's hand-shake line is `up` (bytes may come) now; also said once at the beginning. Without effect on links
+    /// that have none.
+    fn handle_cts(&mut self, _now: Timestamp, _up: bool) {}
 
     /// The line was lost and has been opened again: what was on it is gone, and the station may wait for the rest of it.
     fn handle_reopened(&mut self, now: Timestamp);
@@ -31,11 +33,12 @@ pub trait Session {
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
     /// A command is expected to leave at this time: begin no poll that could still occupy the line then. A later
-    /// word replaces an earlier one; `None` takes it back.
-    fn hold_line(&mut self, until: Option<Timestamp>);
+    /// word replaces an earlier one; `None` takes it back. Without effect on links that do not poll.
+    fn hold_line(&mut self, _until: Option<Timestamp>) {}
 
-    /// Ask for the module of this contact often, for others now and then. `None`: for all alike.
-    fn watch(&mut self, sensor: Option<SensorId>);
+    /// Ask for the module of this contact often, for others now and then. `None`: for all alike. Without effect on links that
+    /// do not poll.
+    fn watch(&mut self, _sensor: Option<SensorId>) {}
 
     /// The time has come that was asked for, or it is a good moment to look at the clock anyway.
     fn handle_timeout(&mut self, now: Timestamp);
@@ -60,6 +63,8 @@ pub trait Session {
 pub enum Transmit {
     /// Write this byte now.
     Byte(u8),
+    /// Write these bytes now, in one piece: some stations do not put a message together that arrives in several.
+    Message(Vec<u8>),
     /// An entry of the recording: a contact was reported, a command has left.
     Event(Event),
     /// For people to know.
@@ -90,7 +95,42 @@ pub enum LinkNotice {
         since: TimeSpan,
         /// Bytes that came in that time; none of them made a whole reply.
         bytes: usize,
+        /// What a person should check on this kind of link.
+        check: &'static str,
     },
+    /// So much of what came could not be read that the line is out of order. Said once.
+    Unreadable {
+        /// Bytes that could not be read.
+        bytes: usize,
+        /// What a person should check on this kind of link.
+        check: &'static str,
+    },
+    /// The station has said what it is.
+    Identified {
+        /// Its own words.
+        identity: String,
+    },
+    /// The station was reset: it has forgotten all commands, and trains stopped where they were when the power went.
+    Restarted,
+    /// The station did not confirm a command, however often it was repeated; it is given up.
+    Unconfirmed {
+        /// The command.
+        command: Command,
+    },
+    /// The station has no such turnout.
+    TurnoutRefused {
+        /// The turnout.
+        turnout: TurnoutId,
+    },
+    /// Another throttle drives a train of this program.
+    OtherThrottle {
+        /// The train.
+        train: TrainId,
+        /// Whether it was reversed.
+        reversed: bool,
+    },
+    /// The power went off the track without a command of this program.
+    PowerLost,
     /// The station has kept its hand-shake line down, and nothing may be written.
     NotReady {
         /// For how long.
@@ -126,6 +166,18 @@ pub enum LinkNotice {
     Closed(Closing),
 }
 
+/// What on a link says that a station heard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Confirmation {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// It took the bytes by its hand-shake; more than that, the link never confirms.
+    HandShake,
+    /// It answers each command; what was not answered is counted as not said.
+    Replies,
+}
+
 /// What the station was told at the end, and whether anything says that it heard.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Closing {
@@ -133,19 +185,19 @@ pub struct Closing {
     pub told_to_stand: Vec<TrainId>,
     /// Trains that run or may run and were not told to stand.
     pub not_told: Vec<TrainId>,
-    /// Whether the solenoids were released.
-    pub solenoids_released: bool,
+    /// Whether the solenoids were released; `None` where the station does that by itself.
+    pub solenoids_released: Option<bool>,
     /// Whether the power was taken from the track.
     pub power_off: bool,
-    /// Whether the station took the bytes by its hand-shake; more than that, this line never confirms.
-    pub hand_shaken: bool,
+    /// What says that the station heard.
+    pub confirmation: Confirmation,
 }
 
 impl Closing {
     /// Whether everything was said that had to be.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.not_told.is_empty() && self.solenoids_released && self.power_off
+        self.not_told.is_empty() && self.solenoids_released != Some(false) && self.power_off
     }
 }
 
@@ -153,24 +205,48 @@ impl Closing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// The station has no bytes for it.
-    Encode(EncodeError),
+    /// No locomotive decoder has this address here.
+    Train {
+        /// The train.
+        train: TrainId,
+        /// The first and the last address.
+        addresses: (u16, u16),
+    },
+    /// Beyond the steps of this link.
+    Step {
+        /// The step.
+        step: SpeedStep,
+        /// The highest.
+        highest: u8,
+    },
+    /// No turnout has this address here.
+    Turnout {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The first and the last address.
+        addresses: (u16, u16),
+    },
+    /// The station knows no such command.
+    Unknown,
     /// This many commands wait already; the line is stuck or is told more than it can carry.
     TooManyWaiting(usize),
     /// The session is closed or being closed.
     Closed,
 }
 
-impl From<EncodeError> for CommandError {
-    fn from(error: EncodeError) -> Self {
-        Self::Encode(error)
-    }
-}
-
 impl Display for CommandError {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         match self {
-            Self::Encode(error) => error.fmt(f),
+            Self::Train { train, addresses: (first, last) } => {
+                write!(f, "train {train} has no address here; addresses are {first} to {last}")
+            }
+            Self::Step { step, highest } => {
+                write!(f, "step {step} is beyond the decoder; steps are 0 to {highest}")
+            }
+            Self::Turnout { turnout, addresses: (first, last) } => {
+                write!(f, "turnout {turnout} has no address here; addresses are {first} to {last}")
+            }
+            Self::Unknown => f.write_str("the station knows no such command"),
             Self::TooManyWaiting(count) => {
                 write!(f, "{count} commands wait for the line already; wait until some of them have left")
             }
@@ -193,16 +269,35 @@ impl Display for LinkNotice {
                 f,
                 "{count} bytes came that nobody asked for; dropped, and the line is brought back into step"
             ),
-            Self::Silent { since, bytes: 0 } => write!(
-                f,
-                "the station has answered nothing for {:.1} s; check its power, the cable and the port",
-                since.as_s()
+            Self::Silent { since, bytes: 0, check } => {
+                write!(f, "the station has answered nothing for {:.1} s; {check}", since.as_s())
+            }
+            Self::Silent { since, bytes, check } => {
+                write!(f, "no whole reply for {:.1} s, only {bytes} stray bytes; {check}", since.as_s())
+            }
+            Self::Unreadable { bytes, check } => {
+                write!(f, "{bytes} bytes came that could not be read; {check}")
+            }
+            Self::Identified { identity } => write!(f, "the station is {identity}"),
+            Self::Restarted => f.write_str(
+                "the station was reset; trains stopped when the power went and stay so until they are commanded anew",
             ),
-            Self::Silent { since, bytes } => write!(
+            Self::Unconfirmed { command } => {
+                write!(f, "the station did not confirm: {}; check that it has not stopped", Said(*command))
+            }
+            Self::TurnoutRefused { turnout } => write!(
                 f,
-                "no whole reply for {:.1} s, only {bytes} stray bytes; check the line's speed (2400 baud, 8 data \
-                 bits, no parity, 2 stop bits) and the number of sensor modules",
-                since.as_s()
+                "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
+                 `turnouts=defined`"
+            ),
+            Self::OtherThrottle { train, reversed } => write!(
+                f,
+                "another throttle {} train {train}; drive it from one place only",
+                if *reversed { "reversed" } else { "drives" }
+            ),
+            Self::PowerLost => f.write_str(
+                "the track has lost its power: a short circuit, or another program switched it off; clear it, then \
+                 switch the power on",
             ),
             Self::NotReady { since } => write!(
                 f,
@@ -270,16 +365,19 @@ impl Display for Closing {
         if !self.not_told.is_empty() {
             write!(f, "NOT told to stand and possibly running: {}; ", Listed(&self.not_told))?;
         }
-        write!(
-            f,
-            "solenoids {}released, track power {}switched off; ",
-            told(self.solenoids_released),
-            told(self.power_off)
-        )?;
-        f.write_str(if self.hand_shaken {
-            "the station took the bytes, and this line confirms no more than that"
-        } else {
-            "nothing on this line confirms that the station heard it: see that the trains stand"
+        if let Some(released) = self.solenoids_released {
+            write!(f, "solenoids {}released, ", told(released))?;
+        }
+        write!(f, "track power {}switched off; ", told(self.power_off))?;
+        f.write_str(match self.confirmation {
+            Confirmation::HandShake => "the station took the bytes, and this line confirms no more than that",
+            Confirmation::Nothing => {
+                "nothing on this line confirms that the station heard it: see that the trains stand"
+            }
+            Confirmation::Replies if self.is_complete() => "the station has confirmed it",
+            Confirmation::Replies => {
+                "the station did not confirm the rest: see that the trains stand, and take the power from the track"
+            }
         })
     }
 }

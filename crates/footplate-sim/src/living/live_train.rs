@@ -144,6 +144,12 @@ impl LiveTrain {
         self.sleeps = false;
     }
 
+    /// Whether its front end leads once it has heard the orders that are on their way.
+    pub(crate) fn runs_forward(&self) -> bool {
+        let turns = self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn)).count();
+        (self.leads == End::Nose) == turns.is_multiple_of(2)
+    }
+
     /// Its decoder has lost power and forgets everything.
     pub(crate) fn lose_power(&mut self) {
         self.orders.clear();

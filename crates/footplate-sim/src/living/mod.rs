@@ -2,12 +2,15 @@
 //!
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
+//! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
 //! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
 //! rails  switches  truth   the rails underneath; how bad the world is; what really happened, for scorers only
 //! ```
 
+mod board;
+mod board_switches;
 mod body;
 mod cts;
 mod drive;
@@ -23,6 +26,8 @@ mod switches;
 mod truth;
 mod world;
 
+pub use board::VirtualBoard;
+pub use board_switches::{BoardSwitches, Delivery};
 pub use cts::CtsSwitch;
 pub use hands::HandError;
 pub use live_train::End;

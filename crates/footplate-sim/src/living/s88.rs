@@ -21,6 +21,14 @@ struct Change {
     closes: bool,
 }
 
+/// A sensor has become occupied, or free again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Edge {
+    pub(crate) at: Timestamp,
+    pub(crate) sensor: SensorId,
+    pub(crate) is_occupied: bool,
+}
+
 /// All contacts and what is remembered of them.
 #[derive(Debug, Clone)]
 pub(crate) struct S88 {
@@ -31,6 +39,8 @@ pub(crate) struct S88 {
     /// By the contact's number: by how much it is held closed, and whether it was since it was last read.
     contacts: Vec<(u8, bool)>,
     changes: BinaryHeap<Reverse<Change>>,
+    /// What has changed since a board looked last, if one does.
+    edges: Option<Vec<Edge>>,
     caused: u64,
     next_spurious: Timestamp,
     /// For scorers: every contact that a train came to, and every one that closed by itself.
@@ -56,6 +66,7 @@ impl S88 {
             sensors,
             contacts,
             changes: BinaryHeap::new(),
+            edges: None,
             caused: 0,
             next_spurious: first,
             passes: Vec::new(),
@@ -103,6 +114,22 @@ impl S88 {
         ModuleState::with_closed(module, closed)
     }
 
+    /// What has changed by a time since this was asked last; from the first time on, and in order.
+    pub(crate) fn take_edges(&mut self, by: Timestamp) -> Vec<Edge> {
+        self.settle(by);
+        self.edges.replace(Vec::new()).unwrap_or_default()
+    }
+
+    /// Whether a sensor is occupied, as far as was looked; `None` if there is no such sensor.
+    pub(crate) fn is_occupied(&self, sensor: SensorId) -> Option<bool> {
+        self.sensors.contains(&sensor).then(|| self.contacts[usize::from(sensor.0)].0 > 0)
+    }
+
+    /// The sensors of the layout.
+    pub(crate) fn sensors(&self) -> &[SensorId] {
+        &self.sensors
+    }
+
     fn change(&mut self, sensor: SensorId, at: Timestamp, closes: bool) {
         self.caused += 1;
         self.changes.push(Reverse(Change { at, nth: self.caused, sensor, closes }));
@@ -126,11 +153,16 @@ impl S88 {
             let Some((held, remembered)) = self.contacts.get_mut(usize::from(change.sensor.0)) else {
                 continue;
             };
+            let was_occupied = *held > 0;
             if change.closes {
                 *held = held.saturating_add(1);
                 *remembered = true;
             } else {
                 *held = held.saturating_sub(1);
+            }
+            let is_occupied = *held > 0;
+            if let Some(edges) = self.edges.as_mut().filter(|_| is_occupied != was_occupied) {
+                edges.push(Edge { at: change.at, sensor: change.sensor, is_occupied });
             }
         }
     }

@@ -158,6 +158,16 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
+    /// Whether a train will run with its front end leading, once it has heard everything that was sent.
+    pub(crate) fn runs_forward(&self, train: TrainId) -> Option<bool> {
+        self.trains.iter().find(|found| found.id == train).map(LiveTrain::runs_forward)
+    }
+
+    /// The trains.
+    pub(crate) fn train_ids(&self) -> impl Iterator<Item = TrainId> {
+        self.trains.iter().map(|train| train.id)
+    }
+
     fn send(&mut self, place: usize, order: Order, sent: Timestamp) {
         let train = &mut self.trains[place];
         if self.is_powered && train.body.is_some() && !train.is_wrecked {

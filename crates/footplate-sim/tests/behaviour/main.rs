@@ -15,4 +15,5 @@ mod same_seed;
 mod scenarios;
 mod speeds;
 mod stops;
+mod virtual_board;
 mod yard;

@@ -8,6 +8,8 @@ use core::ops::RangeInclusive;
 
 use footplate_core::{SpeedStep, TrainId, TurnoutId};
 
+use crate::session::CommandError;
+
 /// Steps 0 to 14; with [`REVERSE`] the first byte of what is said to one locomotive.
 const HIGHEST_STEP: u8 = 14;
 /// Turns a locomotive around.
@@ -299,3 +301,17 @@ impl Display for EncodeError {
 }
 
 impl core::error::Error for EncodeError {}
+
+impl From<EncodeError> for CommandError {
+    fn from(error: EncodeError) -> Self {
+        match error {
+            EncodeError::Train(train) => Self::Train { train, addresses: (*TRAINS.start(), *TRAINS.end()) },
+            EncodeError::Step(step) => Self::Step { step, highest: HIGHEST_STEP },
+            EncodeError::Turnout(turnout) => {
+                Self::Turnout { turnout, addresses: (*TURNOUTS.start(), *TURNOUTS.end()) }
+            }
+            // No command is one of these.
+            EncodeError::Module(_) | EncodeError::Unknown => Self::Unknown,
+        }
+    }
+}

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use footplate_core::{Command, SpeedStep, TrainId};
 
-use crate::session::Closing;
+use crate::session::{Closing, Confirmation};
 
 /// What there is to do at the end, and what of it was done.
 #[derive(Debug, Clone, Default)]
@@ -70,9 +70,9 @@ impl Farewell {
         Closing {
             told_to_stand: trains(true),
             not_told: trains(false),
-            solenoids_released: self.released,
+            solenoids_released: Some(self.released),
             power_off: self.is_over(),
-            hand_shaken,
+            confirmation: if hand_shaken { Confirmation::HandShake } else { Confirmation::Nothing },
         }
     }
 }

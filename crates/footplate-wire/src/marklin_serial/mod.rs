@@ -13,7 +13,6 @@ mod line;
 mod module_reads;
 mod pacing;
 mod polls;
-mod queue;
 mod readings;
 mod recovery;
 mod reply_time;

@@ -13,13 +13,13 @@ use super::farewell::Farewell;
 use super::module_reads::ModuleReads;
 use super::pacing::Pacing;
 use super::polls::Polls;
-use super::queue::Queue;
 use super::readings::Readings;
 use super::recovery::Recovery;
 use super::reply_time::ReplyTime;
 use super::settings::Settings;
 use super::silence::Silence;
 use super::solenoid::Solenoid;
+use crate::queue::Queue;
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
 /// How long CTS may be down before a person should know: no message and no reply takes so long.
@@ -96,6 +96,12 @@ impl Interface {
         };
         interface.recovery.begin_anew(interface.power_word());
         Ok(interface)
+    }
+
+    /// How many sensor modules are read.
+    #[must_use]
+    pub const fn modules(&self) -> u8 {
+        self.settings.modules
     }
 
     /// Which reads of sensor modules the interface answers; `None` until that has been tried.
@@ -175,7 +181,7 @@ impl Interface {
         if hurries {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
-        if let Some(command) = self.waiting.next_urgent() {
+        if let Some(command) = self.waiting.next_urgent(|_| true) {
             return Some((self.message(command), Purpose::Told(command)));
         }
         if core::mem::take(&mut self.is_overtaken) {
@@ -189,7 +195,7 @@ impl Interface {
         if self.solenoid.due().is_some_and(|due| now >= due) {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
-        if let Some(command) = self.waiting.next_usual(self.solenoid.is_powered()) {
+        if let Some(command) = self.waiting.next_usual(|waiting| self.solenoid.lets(waiting)) {
             return Some((self.message(command), Purpose::Told(command)));
         }
         if core::mem::take(&mut self.disturbed) {

@@ -63,6 +63,11 @@ impl Silence {
             return None;
         }
         self.said = Some(Said::Silent);
-        Some(LinkNotice::Silent { since, bytes: self.bytes })
+        let check = if self.bytes == 0 {
+            "check its power, the cable and the port"
+        } else {
+            "check the line's speed (2400 baud, 8 data bits, no parity, 2 stop bits) and the number of sensor modules"
+        };
+        Some(LinkNotice::Silent { since, bytes: self.bytes, check })
     }
 }

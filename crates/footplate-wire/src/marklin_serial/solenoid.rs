@@ -1,6 +1,6 @@
 //! The one coil that may be powered at a time, and when it has to be released.
 
-use footplate_core::{TimeSpan, Timestamp, TurnoutId};
+use footplate_core::{Command, TimeSpan, Timestamp, TurnoutId};
 
 use super::line::{BYTE_TIME, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST};
 
@@ -33,6 +33,11 @@ impl Solenoid {
 
     pub(super) fn is_powered(&self) -> bool {
         self.powered.is_some()
+    }
+
+    /// Whether a command may go now: turnouts wait in their order while one is powered.
+    pub(super) fn lets(&self, command: &Command) -> bool {
+        !(self.is_powered() && matches!(command, Command::Turnout { .. }))
     }
 
     fn since(&self) -> Option<Timestamp> {

@@ -6,6 +6,9 @@
     reason = "a test may stop at the first surprise"
 )]
 
+mod dcc_ex_round_trip;
+mod dcc_ex_session;
+mod dcc_ex_vectors;
 mod marklin_serial_bench;
 mod marklin_serial_line;
 mod marklin_serial_mishaps;

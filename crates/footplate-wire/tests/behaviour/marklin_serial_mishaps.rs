@@ -3,7 +3,7 @@
 
 use footplate_core::{Command, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Message, Pace, Settings};
-use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+use footplate_wire::{CommandError, Confirmation, LinkNotice, Session, Transmit};
 use proptest::prelude::{Just, Strategy, any, prop_assert, prop_oneof, proptest};
 
 use crate::marklin_serial_bench::{Bench, ms, reverse, speed, turnout};
@@ -163,7 +163,7 @@ fn closing_stops_every_train_that_was_ever_driven() {
     assert!(!bench.station.power);
     assert!(are_safe(&coil_times(&bench)), "{:?}", coil_times(&bench));
     let Some(LinkNotice::Closed(closing)) = bench.notices.last() else { panic!("not closed") };
-    assert!(closing.is_complete() && closing.hand_shaken);
+    assert!(closing.is_complete() && closing.confirmation == Confirmation::HandShake);
     assert_eq!(closing.told_to_stand.len(), 4);
     assert_eq!(bench.session.handle_command(bench.now, speed(24, 3)), Err(CommandError::Closed));
     let written = bench.written.len();

@@ -1,5 +1,6 @@
 //! `footplate doctor`: whether the line to a station is in order, and how fast it is.
 
+mod board_figures;
 mod figures;
 
 use std::collections::BTreeMap;
@@ -13,10 +14,11 @@ use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
 use footplate_wire::{CommandError, LinkNotice};
 
+use self::board_figures::BoardFigures;
 use self::figures::Figures;
 use super::Outcome;
 use super::plot::PictureFile;
-use crate::link::{Address, Link, Speed, TappedLink, open, session_settings};
+use crate::link::{Address, Link, Passed, Speed, StationSession, TappedLink, open, open_session};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 
 /// A command now and then, to see what one costs; as rare as commands are when trains are driven.
@@ -29,9 +31,13 @@ const LOST_SHARE: f64 = 0.01;
 /// No train is moved. Power is put on the track; trains that stand stay, and at the end the power is taken off.
 /// The exit status is 1 when more than one reply in a hundred was lost.
 #[derive(Args)]
-#[command(after_help = "Example: footplate doctor --link marklin-serial:/dev/ttyUSB0")]
+#[command(after_help = "\
+Examples:
+  footplate doctor --link marklin-serial:/dev/ttyUSB0
+  footplate doctor --link dcc-ex:tcp://192.168.4.1:2560")]
 pub(crate) struct Arguments {
-    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0 or marklin-serial:tcp://host:port.
+    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, or tcp://host:port in place of a
+    /// device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -53,14 +59,10 @@ impl Arguments {
         if !(self.seconds >= 1.0 && self.seconds <= 1e5) {
             bail!("{} s are not worth listening; write --seconds 10", self.seconds);
         }
-        let layout = match &self.link {
-            Address::Simulated(simulated) => &simulated.layout,
-            Address::Serial(_) => &self.layout,
-        };
+        let layout = self.link.simulated().map_or(&self.layout, |simulated| &simulated.layout);
         let layout = layout_named(layout)?.layout;
         let link = open(&self.link, &layout, Speed::Unpaced)?;
-        let settings = session_settings(&self.link, &link, &layout);
-        let session = Interface::new(link.now(), settings)?;
+        let session = open_session(&self.link, &link, &layout)?;
         let mut patient = Patient { next: link.now() + COMMAND_EVERY, due: false };
         let mut ear =
             Ear { until: link.now() + TimeSpan::from_s(self.seconds), noticed: BTreeMap::new(), lost: 0 };
@@ -71,9 +73,24 @@ impl Arguments {
             Ended::Finished | Ended::Interrupted => {}
             Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
         }
-        let interface = runtime.session();
+        let heard =
+            Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
+        let lost_share = match runtime.session() {
+            StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
+            StationSession::DccEx(_) => self.report_board(&heard, output)?,
+        };
+        Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    /// Reports on a 6051; returns the share of replies that were lost.
+    fn report_interface(
+        &self,
+        interface: &Interface,
+        heard: &Heard<'_>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<f64> {
         let (reads, lateness) = (interface.module_reads(), interface.reply_lateness());
-        let figures = Figures::of(runtime.link().passed(), ear.lost);
+        let figures = Figures::of(heard.passed, heard.ear.lost);
         if let Some(plot) = &self.plot {
             plot.write(&figures.picture())?;
         }
@@ -83,8 +100,12 @@ impl Arguments {
             json["reply_lateness_ms"] = lateness.map(TimeSpan::as_ms).into();
             writeln!(output, "{json}")?;
         } else {
-            let hand_shake = if runtime.link().cts().is_some() { "CTS" } else { "by the clock" };
-            writeln!(output, "line          {} sensor modules, hand-shake {hand_shake}", settings.modules)?;
+            let hand_shake = if heard.has_cts { "CTS" } else { "by the clock" };
+            writeln!(
+                output,
+                "line          {} sensor modules, hand-shake {hand_shake}",
+                interface.modules()
+            )?;
             match reads {
                 Some(reads) => writeln!(output, "interface     {reads}")?,
                 None => {
@@ -96,13 +117,38 @@ impl Arguments {
                 writeln!(output, "replies       come up to {ms:.0} ms later than their bytes take")?;
             }
             figures.write(output)?;
-            for (notice, count) in &ear.noticed {
-                writeln!(output, "{count:>4} x        {notice}")?;
-            }
+            heard.ear.write(output)?;
         }
-        let is_bad = figures.lost_share() > LOST_SHARE;
-        Ok(if is_bad { Outcome::FallsShort } else { Outcome::Done })
+        Ok(figures.lost_share())
     }
+
+    /// Reports on a DCC-EX board; returns the share of requests that were not answered.
+    fn report_board(&self, heard: &Heard<'_>, output: &mut dyn Write) -> anyhow::Result<f64> {
+        let figures = BoardFigures::of(heard.passed);
+        if figures.identity().is_none() {
+            bail!(
+                "no DCC-EX board has said what it is; check the port, and listen longer with --seconds 20 if the board \
+                 is slow to start"
+            );
+        }
+        if let Some(plot) = &self.plot {
+            plot.write(&figures.picture())?;
+        }
+        if self.json {
+            writeln!(output, "{}", figures.json())?;
+        } else {
+            figures.write(output)?;
+            heard.ear.write(output)?;
+        }
+        Ok(figures.lost_share())
+    }
+}
+
+/// What came of listening.
+struct Heard<'h> {
+    passed: &'h [Passed],
+    ear: &'h Ear,
+    has_cts: bool,
 }
 
 /// A machine that moves nothing.
@@ -140,13 +186,22 @@ struct Ear {
     lost: usize,
 }
 
+impl Ear {
+    fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        for (notice, count) in &self.noticed {
+            writeln!(output, "{count:>4} x        {notice}")?;
+        }
+        Ok(())
+    }
+}
+
 impl<M: Machine> Attendant<M> for Ear {
     fn hear(&mut self, _: Timestamp, _: M::Notice) {}
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
             // Which reads are answered is a line of its own, and finding it out loses some.
-            LinkNotice::Answers => return,
+            LinkNotice::Answers | LinkNotice::Identified { .. } => return,
             LinkNotice::Reads(_) => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
                 return;

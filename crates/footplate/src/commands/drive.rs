@@ -26,7 +26,6 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
-use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::DriveBeginning;
 use self::instruction::HELP;
@@ -48,7 +47,7 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
+use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::witness::Witnessed;
@@ -92,7 +91,8 @@ pub(crate) struct Arguments {
 /// What is driven: a station, a layout, and what is known of trains.
 #[derive(Args)]
 pub(crate) struct Railway {
-    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or marklin-serial:tcp://host:port.
+    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, or tcp://host:port in
+    /// place of a device.
     #[arg(long, value_name = "URL")]
     link: Address,
     /// The layout: the name of a built-in one or a layout file; a simulated link brings its own.
@@ -131,7 +131,7 @@ impl Arguments {
         let layout = &written.layout;
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
-        if let Address::Simulated(simulated) = &self.railway.link {
+        if let Some(simulated) = self.railway.link.simulated() {
             named.extend(&simulated.trains);
         }
         let known = KnownTrains::gather(
@@ -151,7 +151,7 @@ impl Arguments {
                 let link = open_simulated(simulated, &real, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
-            Address::Serial(_) => {
+            Address::Serial(_) | Address::Board(_) => {
                 let link = open(&self.railway.link, layout, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
@@ -160,10 +160,10 @@ impl Arguments {
 
     /// The layout: the one that was named, or the simulated one.
     fn layout(&self) -> anyhow::Result<WrittenLayout> {
-        let named = match (&self.railway.layout, &self.railway.link) {
+        let named = match (&self.railway.layout, self.railway.link.simulated()) {
             (Some(named), _) => named,
-            (None, Address::Simulated(simulated)) => &simulated.layout,
-            (None, Address::Serial(_)) => {
+            (None, Some(simulated)) => &simulated.layout,
+            (None, None) => {
                 bail!("which layout is it? Name it with `--layout track-a` or `--layout my-layout.toml`")
             }
         };
@@ -239,10 +239,8 @@ impl Arguments {
         journal
             .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
         // Only a simulated clock can wait for a disk.
-        let when_full = match &self.railway.link {
-            Address::Simulated(_) => WhenFull::Wait,
-            Address::Serial(_) => WhenFull::Lose,
-        };
+        let is_simulated = self.railway.link.simulated().is_some();
+        let when_full = if is_simulated { WhenFull::Wait } else { WhenFull::Lose };
         Ok(Some(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?))
     }
 
@@ -255,8 +253,7 @@ impl Arguments {
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
-        let settings = session_settings(&self.railway.link, &link, layout);
-        let session = Interface::new(link.now(), settings)?;
+        let session = open_session(&self.railway.link, &link, layout)?;
         let sits_at_terminal = self.is_drawn();
         let drawn = || Board::new(now().as_ns());
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));

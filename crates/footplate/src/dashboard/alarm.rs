@@ -81,7 +81,7 @@ impl Alarm {
     /// What a line has to say, if it concerns people. That a station answers matters to who has heard that it did not.
     pub(crate) fn of_line(notice: &LinkNotice) -> Option<Self> {
         let (grade, what, train, blanks) = match notice {
-            LinkNotice::Closed(_) => return None,
+            LinkNotice::Closed(_) | LinkNotice::Identified { .. } => return None,
             LinkNotice::Answers => (Grade::Over, "line-answers", None, Vec::new()),
             LinkNotice::Silent { since, .. } => {
                 (Grade::Danger, "line-silent", None, vec![format!("{:.1}", since.as_s())])
@@ -104,6 +104,12 @@ impl Alarm {
             LinkNotice::SolenoidLate { turnout, held } => {
                 let blanks = vec![turnout.to_string(), format!("{:.0}", held.as_ms())];
                 (Grade::Danger, "line-solenoid-late", None, blanks)
+            }
+            LinkNotice::OtherThrottle { train, .. } => {
+                (Grade::Danger, "line-says", Some(*train), vec![notice.to_string()])
+            }
+            LinkNotice::Restarted | LinkNotice::PowerLost | LinkNotice::Unconfirmed { .. } => {
+                (Grade::Danger, "line-says", None, vec![notice.to_string()])
             }
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
         };

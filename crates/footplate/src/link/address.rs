@@ -2,17 +2,21 @@
 //!
 //! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
-//! `[?pace=careful&cts=no&modules=5&speed=20]`.
+//! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board.
 
-use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::str::FromStr;
 
-use footplate_core::TrainId;
-use footplate_sim::{LawFamily, PhysicsRange};
+use footplate_core::{Ratio, TrainId};
+use footplate_sim::{BoardSwitches, Delivery, LawFamily, PhysicsRange};
+
+use super::board_address::BoardAddress;
+use super::port::Port;
 
 const SIMULATED: &str = "sim:";
 const SERIAL: &str = "marklin-serial:";
-const TCP: &str = "tcp://";
+const BOARD: &str = "dcc-ex:";
+/// The port that a served simulated 6051 is written with in examples.
+const EXAMPLE_PORT: u16 = 2400;
 
 /// The trains of the course's track that its reports are about.
 const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
@@ -25,6 +29,42 @@ pub(crate) enum Address {
     Simulated(SimulatedAddress),
     /// A 6050 or 6051 behind a line of bytes.
     Serial(SerialAddress),
+    /// A DCC-EX board behind a serial port or a network.
+    Board(BoardAddress),
+}
+
+impl Address {
+    /// The world that is simulated, if one is.
+    pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
+        match self {
+            Self::Simulated(simulated) => Some(simulated),
+            Self::Serial(_) | Self::Board(_) => None,
+        }
+    }
+}
+
+/// Which station a simulated layout is behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum StationKind {
+    /// A 6051.
+    #[default]
+    Marklin,
+    /// A DCC-EX board.
+    DccEx,
+}
+
+impl StationKind {
+    /// The station of a name.
+    ///
+    /// # Errors
+    /// There is none; those that there are.
+    pub(crate) fn named(value: &str) -> Result<Self, String> {
+        match value {
+            "marklin" => Ok(Self::Marklin),
+            "dcc-ex" => Ok(Self::DccEx),
+            _ => Err(format!("there is no simulated station `{value}`; there are marklin and dcc-ex")),
+        }
+    }
 }
 
 /// A simulated world.
@@ -44,6 +84,10 @@ pub(crate) struct SimulatedAddress {
     pub(crate) physics: PhysicsRange,
     /// How fast its clock runs, if it was said.
     pub(crate) speed: Option<Speed>,
+    /// The station that it is behind.
+    pub(crate) station: StationKind,
+    /// How a DCC-EX board behaves, if it is one.
+    pub(crate) board: BoardSwitches,
 }
 
 /// How fast a simulated clock runs.
@@ -79,20 +123,6 @@ pub(crate) enum PaceChoice {
     Fast,
 }
 
-/// Where a serial line ends at this computer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Port {
-    /// At a server of the network.
-    Tcp {
-        /// Its name or address.
-        host: String,
-        /// Its port.
-        port: u16,
-    },
-    /// At a serial port or pseudo-terminal.
-    Device(String),
-}
-
 impl FromStr for Address {
     type Err = String;
 
@@ -107,10 +137,14 @@ impl FromStr for Address {
             let mut address = SerialAddress::of(port)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::Serial(address))
+        } else if let Some(port) = place.strip_prefix(BOARD) {
+            let mut address = BoardAddress::of(port)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Board(address))
         } else {
             Err(format!(
-                "`{text}` is no link; write sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0 or \
-                 marklin-serial:tcp://host:port"
+                "`{text}` is no link; write sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
+                 dcc-ex:/dev/ttyACM0, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -120,11 +154,11 @@ fn pair(text: &str) -> Result<(&str, &str), String> {
     text.split_once('=').ok_or_else(|| format!("`{text}` has no value; write {text}=…"))
 }
 
-fn number<N: FromStr>(key: &str, value: &str, example: &str) -> Result<N, String> {
+pub(super) fn number<N: FromStr>(key: &str, value: &str, example: &str) -> Result<N, String> {
     value.parse().map_err(|_| format!("`{value}` is no {key}; write {key}={example}"))
 }
 
-fn times(value: &str) -> Result<f64, String> {
+pub(super) fn times(value: &str) -> Result<f64, String> {
     let times: f64 = number("speed", value, "20")?;
     let runs = times > 0.0 && times <= FASTEST;
     runs.then_some(times).ok_or_else(|| {
@@ -150,6 +184,8 @@ impl SimulatedAddress {
             faults: true,
             physics: PhysicsRange::Usual,
             speed: None,
+            station: StationKind::default(),
+            board: BoardSwitches::default(),
         })
     }
 
@@ -161,6 +197,8 @@ impl SimulatedAddress {
             "trains" => self.trains = trains(value)?,
             "law" => self.law = Some(law_named(value)?),
             "world" => self.physics = physics_named(value)?,
+            "station" => self.station = StationKind::named(value)?,
+            "quirks" => self.board = quirks(value)?,
             "faults" => {
                 self.faults = match value {
                     "some" => true,
@@ -174,7 +212,7 @@ impl SimulatedAddress {
             }
             _ => {
                 return Err(format!(
-                    "a simulated link has no `{key}`; it has seed, speed, trains, law, faults and world"
+                    "a simulated link has no `{key}`; it has seed, speed, trains, law, faults, world, station and quirks"
                 ));
             }
         }
@@ -200,6 +238,32 @@ pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
     Ok(trains)
 }
 
+/// How often a board that chatters prints other text before a message.
+const CHATTER: Ratio = Ratio::from_percent(50.0);
+/// How often a lossy line drops a byte: one message in fifty is hit.
+const LOSSY: Ratio = Ratio::from_percent(0.2);
+
+/// Reads quirks of a DCC-EX board as `chatter,split`.
+pub(crate) fn quirks(value: &str) -> Result<BoardSwitches, String> {
+    let mut board = BoardSwitches::default();
+    for one in value.split(',') {
+        match one {
+            "chatter" => board.chatter = CHATTER,
+            "merged" => board.delivery = Delivery::Merged,
+            "split" => board.delivery = Delivery::Split,
+            "lossy" => board.lost = LOSSY,
+            "silent" => board.has_banner = false,
+            _ => {
+                return Err(format!(
+                    "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
+                     (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset)"
+                ));
+            }
+        }
+    }
+    Ok(board)
+}
+
 /// The law of a name.
 ///
 /// # Errors
@@ -221,25 +285,7 @@ pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
 
 impl SerialAddress {
     fn of(port: &str) -> Result<Self, String> {
-        let port = match port.strip_prefix(TCP) {
-            Some(server) => {
-                let wanted = || {
-                    format!("`{server}` is no server; write tcp://host:port, such as tcp://127.0.0.1:2400")
-                };
-                let (host, port) = server.rsplit_once(':').ok_or_else(wanted)?;
-                let host = host.trim_start_matches('[').trim_end_matches(']');
-                if host.is_empty() {
-                    return Err(wanted());
-                }
-                Port::Tcp { host: host.to_owned(), port: port.parse().map_err(|_| wanted())? }
-            }
-            None if port.is_empty() => {
-                return Err("`marklin-serial:` wants a port; write marklin-serial:/dev/ttyUSB0 or \
-                            marklin-serial:tcp://host:port"
-                    .into());
-            }
-            None => Port::Device(port.to_owned()),
-        };
+        let port = Port::named(SERIAL, port, "/dev/ttyUSB0", EXAMPLE_PORT)?;
         Ok(Self { port, pace: None, cts: None, modules: None, speed: 1.0 })
     }
 
@@ -267,15 +313,6 @@ impl SerialAddress {
     }
 }
 
-impl Display for Port {
-    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        match self {
-            Self::Tcp { host, port } => write!(f, "{TCP}{host}:{port}"),
-            Self::Device(path) => f.write_str(path),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -295,6 +332,8 @@ mod tests {
             faults: false,
             physics: PhysicsRange::Usual,
             speed: Some(Speed::Times(20.0)),
+            station: StationKind::Marklin,
+            board: BoardSwitches::default(),
         };
         assert_eq!(written.parse(), Ok(Address::Simulated(expected)));
         let Ok(Address::Simulated(plain)) = "sim:loop.toml".parse() else { panic!("a plain one") };
@@ -335,8 +374,9 @@ mod tests {
             ("sim:track-a?trains=24,24", "an address of its own"),
             ("sim:track-a?law=newton", "there are"),
             ("sim:track-a?faults=all", "faults=some"),
-            ("sim:track-a?sped=20", "seed, speed, trains, law, faults and world"),
+            ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
+            ("sim:track-a?station=z21", "marklin and dcc-ex"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),
             ("marklin-serial:tcp://host:99999", "tcp://host:port"),

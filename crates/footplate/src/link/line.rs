@@ -11,8 +11,8 @@ pub(crate) trait Link {
     /// The time, since the line was opened. On a simulated station it is the station's time.
     fn now(&self) -> Timestamp;
 
-    /// Puts a byte on the line now.
-    fn write(&mut self, byte: u8) -> Result<(), Lost>;
+    /// Puts bytes on the line now, in one piece.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost>;
 
     /// Waits until something is heard, but not beyond a time.
     fn wait(&mut self, until: Timestamp) -> Heard;
@@ -56,8 +56,8 @@ impl<L: Link + ?Sized> Link for Box<L> {
     fn now(&self) -> Timestamp {
         (**self).now()
     }
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        (**self).write(byte)
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        (**self).write(bytes)
     }
     fn wait(&mut self, until: Timestamp) -> Heard {
         (**self).wait(until)

@@ -1,10 +1,12 @@
 //! Bytes to and from a command station: over a cable, over a network, or into a simulated one.
 //!
 //! ```text
-//! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`
+//! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
+//! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
 //! open        an address becomes a link
+//! simulated_station  a simulated layout behind either kind of station
 //! simulated   a virtual station in this process, as fast as it goes or paced
 //! served      a virtual station for other programs, at a network port or a pseudo-terminal
 //! tapped      any of them, with every byte noted
@@ -14,23 +16,29 @@
 //! ```
 
 mod address;
+mod board_address;
 mod line;
 mod news;
 mod observed;
 mod open;
+mod port;
 mod rhythm;
 mod served;
 mod simulated;
+mod simulated_station;
+mod station_session;
 mod stream;
 mod tapped;
 
-pub(crate) use address::{Address, SimulatedAddress, Speed, law_named, trains};
+pub(crate) use address::{Address, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use line::{Heard, Link, Lost};
 pub(crate) use news::news_of;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
-pub(crate) use open::{module_count, open, open_simulated, session_settings, station};
+pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;
 pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
+pub(crate) use simulated_station::SimulatedStation;
+pub(crate) use station_session::StationSession;
 pub(crate) use stream::StreamLink;
 pub(crate) use tapped::{Passed, TappedLink};

@@ -7,9 +7,14 @@ use footplate_wire::LinkNotice;
 /// nothing of the kind.
 pub(crate) const fn news_of(notice: &LinkNotice) -> Option<LinkNews> {
     match notice {
-        LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => Some(LinkNews::Silent),
+        // After a reset, too, it is not known what of the last commands was heard; it answers when it has been asked everything.
+        LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } | LinkNotice::Restarted => {
+            Some(LinkNews::Silent)
+        }
         LinkNotice::Answers => Some(LinkNews::Answers),
-        LinkNotice::ReverseInDoubt { train } => Some(LinkNews::ReverseInDoubt { train: *train }),
+        LinkNotice::ReverseInDoubt { train } | LinkNotice::OtherThrottle { train, reversed: true } => {
+            Some(LinkNews::ReverseInDoubt { train: *train })
+        }
         _ => None,
     }
 }

@@ -85,15 +85,19 @@ impl<L: Link> Link for ObservedLink<L> {
         self.link.now()
     }
 
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        if let Some(observed) = &mut self.observed {
-            let request = observed.rhythm.written(self.link.now(), byte);
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        // What is written byte by byte is a 6051's; a DCC-EX board is written messages, and is not polled.
+        if let (Some(observed), [_, _, ..]) = (&mut self.observed, bytes) {
+            observed.rhythm.wrote_message(bytes);
+        }
+        if let (Some(observed), [byte]) = (&mut self.observed, bytes) {
+            let request = observed.rhythm.written(self.link.now(), *byte);
             // What has a command between it is no period of the polls alone.
             if let Some((span, 0)) = request.and_then(|request| request.after) {
                 observed.own.periods.add(span.as_ms());
             }
         }
-        self.link.write(byte)
+        self.link.write(bytes)
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
@@ -101,10 +105,11 @@ impl<L: Link> Link for ObservedLink<L> {
         observed.turn_ends();
         let heard = self.link.wait(until);
         observed.turn = Some(Stopwatch::start());
-        if matches!(heard, Heard::Byte(_))
-            && let Some(span) = observed.rhythm.heard(self.link.now())
-        {
-            observed.own.first_bytes.add(span.as_ms());
+        if let Heard::Byte(byte) = heard {
+            observed.rhythm.heard_of_board(byte);
+            if let Some(span) = observed.rhythm.heard(self.link.now()) {
+                observed.own.first_bytes.add(span.as_ms());
+            }
         }
         heard
     }

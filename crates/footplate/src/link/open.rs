@@ -2,11 +2,12 @@
 
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
-use footplate_sim::living::{LivingSwitches, VirtualStation};
-use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Pace, Settings};
+use footplate_sim::living::{LivingSwitches, VirtualBoard, VirtualStation};
+use footplate_wire::dcc_ex;
+use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
 
-use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
-use super::{Link, SimulatedLink, StreamLink};
+use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
+use super::{Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
 /// 16 ms unless told otherwise.
@@ -24,6 +25,7 @@ pub(crate) fn open<'l>(
     Ok(match address {
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
         Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
+        Address::Board(board) => Box::new(StreamLink::open(board)?),
     })
 }
 
@@ -47,14 +49,18 @@ pub(crate) fn open_simulated<'l>(
 pub(crate) fn station<'l>(
     address: &SimulatedAddress,
     layout: &'l Layout,
-) -> anyhow::Result<VirtualStation<'l>> {
+) -> anyhow::Result<SimulatedStation<'l>> {
     let mut switches = if address.faults { LivingSwitches::well_kept() } else { LivingSwitches::faultless() };
     switches.law = address.law;
     switches.physics = address.physics;
     if !address.faults {
         switches.turnout_failure = Ratio::ZERO;
     }
-    Ok(VirtualStation::draw(layout, address.seed, &address.trains, &switches)?)
+    let SimulatedAddress { seed, trains, .. } = address;
+    Ok(match address.station {
+        StationKind::Marklin => VirtualStation::draw(layout, *seed, trains, &switches)?.into(),
+        StationKind::DccEx => VirtualBoard::draw(layout, *seed, trains, &switches, address.board)?.into(),
+    })
 }
 
 /// How many modules the contacts of a layout are on.
@@ -63,13 +69,26 @@ pub(crate) fn module_count(layout: &Layout) -> u8 {
     u8::try_from(highest / CONTACTS_PER_MODULE + 1).unwrap_or(u8::MAX)
 }
 
-/// What the session over an open line has to know.
-pub(crate) fn session_settings(address: &Address, link: &dyn Link, layout: &Layout) -> Settings {
-    let modules = module_count(layout);
-    match address {
-        Address::Simulated(_) => Settings::with_cts(modules),
-        Address::Serial(serial) => serial_settings(serial, link.cts().is_some(), modules),
-    }
+/// The session over an open line.
+///
+/// # Errors
+/// When no bus has as many sensor modules as the layout needs.
+pub(crate) fn open_session(
+    address: &Address,
+    link: &dyn Link,
+    layout: &Layout,
+) -> anyhow::Result<StationSession> {
+    let (now, modules) = (link.now(), module_count(layout));
+    Ok(match address {
+        Address::Simulated(simulated) => match simulated.station {
+            StationKind::Marklin => Interface::new(now, Settings::with_cts(modules))?.into(),
+            StationKind::DccEx => dcc_ex::Client::new(now, dcc_ex::Settings::default()).into(),
+        },
+        Address::Serial(serial) => {
+            Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
+        }
+        Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
+    })
 }
 
 fn serial_settings(address: &SerialAddress, has_cts: bool, modules: u8) -> Settings {

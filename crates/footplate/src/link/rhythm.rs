@@ -1,6 +1,7 @@
 //! What the bytes of a line tell of its rhythm: how often sensors are asked for, and how soon the answer begins.
 
 use footplate_core::{TimeSpan, Timestamp};
+use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
 use serde::Serialize;
 
@@ -14,6 +15,8 @@ pub(crate) struct Rhythm {
     power: Option<PowerTold>,
     /// Sensors were asked for after that.
     asked_since: bool,
+    /// What a DCC-EX board says, once something was written to one.
+    replies: Option<Framing>,
 }
 
 /// What the station was told last of the power, and whether anything was heard of it since.
@@ -53,6 +56,25 @@ impl Rhythm {
         Some(Request { after: before.map(|(asked, others)| (at - asked, others)) })
     }
 
+    /// A message to a DCC-EX board was written.
+    pub(crate) fn wrote_message(&mut self, text: &[u8]) {
+        self.replies.get_or_insert_default();
+        let mut framing = Framing::default();
+        let request = text.iter().find_map(|byte| framing.push(*byte).and_then(dcc_ex::Request::read));
+        if let Some(dcc_ex::Request::Power { on, .. }) = request {
+            self.power = Some(PowerTold { is_on: on, has_answered: false });
+        }
+    }
+
+    /// A byte was heard; if a DCC-EX board confirms the power with it, that counts.
+    pub(crate) fn heard_of_board(&mut self, byte: u8) {
+        let Some(text) = self.replies.as_mut().and_then(|framing| framing.push(byte)) else { return };
+        let confirmed = Reply::read(text).ok().flatten().and_then(|reply| reply.main_power());
+        if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
+            power.has_answered = true;
+        }
+    }
+
     /// What the station was told of the power.
     pub(crate) const fn power(&self) -> Option<PowerTold> {
         self.power
@@ -73,6 +95,17 @@ impl Rhythm {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_board_confirms_the_power_itself() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_message(b"<1 MAIN>");
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
+        b"<# 50><p0 B>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
+        b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
+        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: true }));
+    }
 
     #[test]
     fn the_power_counts_as_heard_of_only_when_a_later_request_is_answered() {

@@ -1,6 +1,6 @@
-//! A simulated station behind a network port or a pseudo-terminal, for any program that speaks to a 6051.
+//! A simulated station behind a network port or a pseudo-terminal, for any program that speaks to one.
 //!
-//! Between the other program and the station stands what an adapter with a hand-shake would be: it keeps bytes until the
+//! Between the other program and a 6051 stands what an adapter with a hand-shake would be: it keeps bytes until the
 //! station's CTS has gone down and up again. The station runs at a multiple of real time, whether anybody listens or
 //! not, as trains do.
 
@@ -11,9 +11,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
-use footplate_sim::living::{FromStation, VirtualStation};
 use footplate_wire::marklin_serial::BYTE_TIME;
 
+use super::simulated_station::{FromSimulated, SimulatedStation};
 use crate::clock::Stopwatch;
 
 /// How finely the station's time follows real time, in its own: a fifth of a byte.
@@ -35,7 +35,7 @@ pub(crate) enum Incoming {
 
 /// A station and who is connected to it.
 pub(crate) struct Server<'l> {
-    station: VirtualStation<'l>,
+    station: SimulatedStation<'l>,
     times: f64,
     began: Timestamp,
     stopwatch: Stopwatch,
@@ -49,7 +49,12 @@ pub(crate) struct Server<'l> {
 
 impl<'l> Server<'l> {
     /// A station that runs `times` as fast as real time from now on.
-    pub(crate) fn new(station: VirtualStation<'l>, times: f64, incoming: Receiver<Incoming>) -> Self {
+    pub(crate) fn new(
+        station: impl Into<SimulatedStation<'l>>,
+        times: f64,
+        incoming: Receiver<Incoming>,
+    ) -> Self {
+        let station = station.into();
         let began = station.now();
         Self {
             station,
@@ -75,18 +80,19 @@ impl<'l> Server<'l> {
                 }
             }
             self.catch_up(&mut said);
-            if let Some((_, client)) = &mut self.client
-                && !said.is_empty()
-                && client.write_all(&said).and_then(|()| client.flush()).is_err()
-            {
-                self.client = None;
+            // A portion is written by itself, so that it arrives as the station sent it.
+            for portion in said.drain(..) {
+                if let Some((_, client)) = &mut self.client
+                    && client.write_all(&portion).and_then(|()| client.flush()).is_err()
+                {
+                    self.client = None;
+                }
             }
-            said.clear();
         }
     }
 
     /// The station and its world.
-    pub(crate) fn station(&self) -> &VirtualStation<'l> {
+    pub(crate) fn station(&self) -> &SimulatedStation<'l> {
         &self.station
     }
 
@@ -108,7 +114,7 @@ impl<'l> Server<'l> {
     }
 
     /// Lets the station go on to now.
-    fn catch_up(&mut self, said: &mut Vec<u8>) {
+    fn catch_up(&mut self, said: &mut Vec<Vec<u8>>) {
         let now = self.began + TimeSpan::from_s(self.stopwatch.elapsed().as_secs_f64() * self.times);
         loop {
             self.pass_on();
@@ -117,8 +123,8 @@ impl<'l> Server<'l> {
                 _ => now,
             };
             match self.station.advance(until) {
-                Some(FromStation::Byte(byte)) => said.push(byte),
-                Some(FromStation::Cts(up)) => {
+                Some(FromSimulated::Bytes(bytes)) => said.push(bytes.into()),
+                Some(FromSimulated::Cts(up)) => {
                     if let Some((_, lowered)) = &mut self.passed {
                         *lowered |= !up;
                     }
@@ -132,12 +138,15 @@ impl<'l> Server<'l> {
     /// Gives the station the next byte if it is ready.
     fn pass_on(&mut self) {
         let now = self.station.now();
-        let ready = self.station.cts()
-            && self.passed.is_none_or(|(at, lowered)| lowered || now >= at + BYTE_TIME + GUARD);
+        let Some(cts) = self.station.cts() else {
+            self.station.write(self.waiting.make_contiguous());
+            return self.waiting.clear();
+        };
+        let ready = cts && self.passed.is_none_or(|(at, lowered)| lowered || now >= at + BYTE_TIME + GUARD);
         if ready {
             self.passed = None;
             if let Some(byte) = self.waiting.pop_front() {
-                self.station.write(byte);
+                self.station.write(&[byte]);
                 self.passed = Some((now, false));
             }
         }

@@ -1,12 +1,13 @@
 //! A virtual station in this process: on a clock of its own, or paced at a multiple of real time.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
-use footplate_sim::living::{FromStation, VirtualStation};
 
 use super::address::Speed;
 use super::line::PERSON_MS;
+use super::simulated_station::{FromSimulated, SimulatedStation};
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
@@ -15,25 +16,28 @@ const VIRTUAL_PATIENCE: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// A link into a simulated world.
 pub(crate) struct SimulatedLink<'l> {
-    station: VirtualStation<'l>,
+    station: SimulatedStation<'l>,
+    /// What has reached the host with the last portion and was not handed over yet.
+    heard: VecDeque<u8>,
     speed: Speed,
     began: Timestamp,
     stopwatch: Stopwatch,
 }
 
 impl<'l> SimulatedLink<'l> {
-    pub(crate) fn new(station: VirtualStation<'l>, speed: Speed) -> Self {
+    pub(crate) fn new(station: impl Into<SimulatedStation<'l>>, speed: Speed) -> Self {
+        let station = station.into();
         let began = station.now();
-        Self { station, speed, began, stopwatch: Stopwatch::start() }
+        Self { station, heard: VecDeque::new(), speed, began, stopwatch: Stopwatch::start() }
     }
 
     /// The station and the world behind it: for hands and for scorers.
-    pub(crate) fn station(&self) -> &VirtualStation<'l> {
+    pub(crate) fn station(&self) -> &SimulatedStation<'l> {
         &self.station
     }
 
     /// The same, to change the world with.
-    pub(crate) fn station_mut(&mut self) -> &mut VirtualStation<'l> {
+    pub(crate) fn station_mut(&mut self) -> &mut SimulatedStation<'l> {
         &mut self.station
     }
 
@@ -53,23 +57,29 @@ impl Link for SimulatedLink<'_> {
         self.station.now()
     }
 
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        self.station.write(byte);
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        self.station.write(bytes);
         Ok(())
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
+        if let Some(byte) = self.heard.pop_front() {
+            return Heard::Byte(byte);
+        }
         let heard = self.station.advance(until);
         self.keep_pace();
         match heard {
-            Some(FromStation::Byte(byte)) => Heard::Byte(byte),
-            Some(FromStation::Cts(up)) => Heard::Cts(up),
+            Some(FromSimulated::Bytes(bytes)) => {
+                self.heard = bytes;
+                self.heard.pop_front().map_or(Heard::Nothing, Heard::Byte)
+            }
+            Some(FromSimulated::Cts(up)) => Heard::Cts(up),
             None => Heard::Nothing,
         }
     }
 
     fn cts(&self) -> Option<bool> {
-        Some(self.station.cts())
+        self.station.cts()
     }
 
     fn patience(&self) -> TimeSpan {

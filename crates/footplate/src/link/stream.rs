@@ -11,22 +11,53 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp};
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
-use super::address::{Port, SerialAddress};
+use super::address::SerialAddress;
+use super::board_address::BoardAddress;
 use super::line::PERSON_MS;
+use super::port::Port;
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
 /// The speed of the interface's line (Märklin).
-const BAUD: u32 = 2400;
+const MARKLIN_BAUD: u32 = 2400;
+/// The speed of a DCC-EX board's serial port.
+const DCC_EX_BAUD: u32 = 115_200;
 /// How often the hand-shake line is looked at: it is down for a millisecond or so after each byte.
 const CTS_EVERY: Duration = Duration::from_micros(500);
 /// How long a connection over a network may take to be made.
 const CONNECT_WITHIN: Duration = Duration::from_secs(2);
 /// A line that can not even be written to for so long is taken for lost.
 const WRITE_WITHIN: Duration = Duration::from_secs(1);
+
+/// Where a line is and how its bytes are sent.
+#[derive(Debug, Clone)]
+pub(crate) struct Cable {
+    port: Port,
+    baud: u32,
+    stop_bits: StopBits,
+    /// Whether its hand-shake line is used; `None`: if it can be read.
+    cts: Option<bool>,
+    /// How many times faster than real time the station's clock runs.
+    speed: f64,
+}
+
+impl From<&SerialAddress> for Cable {
+    fn from(address: &SerialAddress) -> Self {
+        let SerialAddress { port, cts, speed, .. } = address.clone();
+        Self { port, baud: MARKLIN_BAUD, stop_bits: StopBits::Two, cts, speed }
+    }
+}
+
+impl From<&BoardAddress> for Cable {
+    fn from(address: &BoardAddress) -> Self {
+        let BoardAddress { port, speed, .. } = address.clone();
+        Self { port, baud: DCC_EX_BAUD, stop_bits: StopBits::One, cts: Some(false), speed }
+    }
+}
+
 /// A line outside this process.
 pub(crate) struct StreamLink {
-    address: SerialAddress,
+    cable: Cable,
     line: Line,
     stopwatch: Stopwatch,
 }
@@ -45,15 +76,16 @@ enum Arrival {
 }
 
 impl StreamLink {
-    pub(crate) fn open(address: &SerialAddress) -> Result<Self, Lost> {
-        Ok(Self { line: open(address)?, address: address.clone(), stopwatch: Stopwatch::start() })
+    pub(crate) fn open(cable: impl Into<Cable>) -> Result<Self, Lost> {
+        let cable = cable.into();
+        Ok(Self { line: open(&cable)?, cable, stopwatch: Stopwatch::start() })
     }
 }
 
-fn open(address: &SerialAddress) -> Result<Line, Lost> {
-    match &address.port {
+fn open(cable: &Cable) -> Result<Line, Lost> {
+    match &cable.port {
         Port::Tcp { host, port } => connect(host, *port),
-        Port::Device(path) => open_device(path, address.cts),
+        Port::Device(path) => open_device(path, cable),
     }
 }
 
@@ -90,23 +122,23 @@ fn connect(host: &str, port: u16) -> Result<Line, Lost> {
     Ok(Line { writer: Box::new(stream), arrivals, cts: None })
 }
 
-fn open_device(path: &str, wants_cts: Option<bool>) -> Result<Line, Lost> {
+fn open_device(path: &str, cable: &Cable) -> Result<Line, Lost> {
     let failed = |error: &serialport::Error| {
         Lost(format!(
             "cannot open `{path}`: {error}; check the cable, the name of the port and that you may use it"
         ))
     };
-    let port = serialport::new(path, BAUD)
+    let port = serialport::new(path, cable.baud)
         .data_bits(DataBits::Eight)
         .parity(Parity::None)
-        .stop_bits(StopBits::Two)
+        .stop_bits(cable.stop_bits)
         // The hand-shake is kept byte by byte above; the driver's own lets buffered bytes slip through.
         .flow_control(FlowControl::None)
         .timeout(CTS_EVERY)
         .open();
     let mut port = port.map_err(|error| failed(&error))?;
-    let cts = if wants_cts == Some(false) { None } else { port.read_clear_to_send().ok() };
-    if wants_cts == Some(true) && cts.is_none() {
+    let cts = if cable.cts == Some(false) { None } else { port.read_clear_to_send().ok() };
+    if cable.cts == Some(true) && cts.is_none() {
         return Err(Lost(format!(
             "`{path}` has no CTS line that can be read, as a pseudo-terminal has none; leave out `cts=yes`"
         )));
@@ -150,16 +182,16 @@ fn listen(mut port: Box<dyn SerialPort>, mut cts: Option<bool>, sender: &Sender<
 
 impl Link for StreamLink {
     fn now(&self) -> Timestamp {
-        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.address.speed)
+        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed)
     }
 
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        let written = self.line.writer.write_all(&[byte]).and_then(|()| self.line.writer.flush());
-        written.map_err(|error| Lost(format!("`{}` can not be written to: {error}", self.address.port)))
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        let written = self.line.writer.write_all(bytes).and_then(|()| self.line.writer.flush());
+        written.map_err(|error| Lost(format!("`{}` can not be written to: {error}", self.cable.port)))
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
-        let span_s = (until - self.now()).as_s() / self.address.speed;
+        let span_s = (until - self.now()).as_s() / self.cable.speed;
         let heard = match self.line.arrivals.try_recv() {
             Ok(arrival) => Ok(arrival),
             Err(_) if span_s <= 0.0 => return Heard::Nothing,
@@ -171,10 +203,10 @@ impl Link for StreamLink {
                 self.line.cts = Some(up);
                 Heard::Cts(up)
             }
-            Ok(Arrival::Lost(why)) => Heard::Lost(Lost(format!("`{}` is gone: {why}", self.address.port))),
+            Ok(Arrival::Lost(why)) => Heard::Lost(Lost(format!("`{}` is gone: {why}", self.cable.port))),
             Err(RecvTimeoutError::Timeout) => Heard::Nothing,
             Err(RecvTimeoutError::Disconnected) => {
-                Heard::Lost(Lost(format!("`{}` is gone", self.address.port)))
+                Heard::Lost(Lost(format!("`{}` is gone", self.cable.port)))
             }
         }
     }
@@ -184,11 +216,11 @@ impl Link for StreamLink {
     }
 
     fn patience(&self) -> TimeSpan {
-        TimeSpan::from_s(PERSON_MS * 1e-3 * self.address.speed)
+        TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed)
     }
 
     fn reopen(&mut self) -> Result<(), Lost> {
-        self.line = open(&self.address)?;
+        self.line = open(&self.cable)?;
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ pub(crate) enum Passed {
     /// To the station; when it was put on the line.
     Written(Timestamp, u8),
     /// From the station; when it was heard.
-    Heard(Timestamp),
+    Heard(Timestamp, u8),
 }
 
 /// A link whose bytes are noted.
@@ -35,15 +35,16 @@ impl<L: Link> Link for TappedLink<L> {
         self.link.now()
     }
 
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        self.passed.push(Passed::Written(self.link.now(), byte));
-        self.link.write(byte)
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        let now = self.link.now();
+        self.passed.extend(bytes.iter().map(|byte| Passed::Written(now, *byte)));
+        self.link.write(bytes)
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
         let heard = self.link.wait(until);
-        if matches!(heard, Heard::Byte(_)) {
-            self.passed.push(Passed::Heard(self.link.now()));
+        if let Heard::Byte(byte) = heard {
+            self.passed.push(Passed::Heard(self.link.now(), byte));
         }
         heard
     }

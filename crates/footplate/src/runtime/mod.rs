@@ -13,6 +13,8 @@ mod run;
 mod stop_flag;
 
 #[cfg(test)]
+mod over_a_board;
+#[cfg(test)]
 mod over_a_network;
 #[cfg(test)]
 mod over_a_simulation;

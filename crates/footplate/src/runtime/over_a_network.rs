@@ -9,13 +9,12 @@ use std::thread::JoinHandle;
 use footplate_core::{EventKind, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::LinkNotice;
-use footplate_wire::marklin_serial::Interface;
 
 use super::over_a_simulation::{Runs, Until};
 use super::{Ended, Runtime};
 use crate::clock::Stopwatch;
 use crate::link::{
-    Address, Link, Server, SimulatedAddress, StreamLink, listen_on, open_pseudo_terminal, session_settings,
+    Address, Link, Server, SimulatedAddress, StreamLink, listen_on, open_pseudo_terminal, open_session,
     station,
 };
 
@@ -75,8 +74,8 @@ fn connected(place: &str) -> Runtime<'static, StreamLink> {
     let Address::Serial(serial) = &address else { panic!("a serial one") };
     let link = StreamLink::open(serial).expect("a connection");
     let layout = layout_named("track-a").expect("a layout").layout;
-    let session = Interface::new(link.now(), session_settings(&address, &link, &layout));
-    Runtime::new(link, session.expect("modules"), None, None)
+    let session = open_session(&address, &link, &layout).expect("modules");
+    Runtime::new(link, session, None, None)
 }
 
 fn reports(machine: &Runs) -> usize {

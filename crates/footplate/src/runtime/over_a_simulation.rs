@@ -11,7 +11,7 @@ use footplate_wire::{CommandError, LinkNotice};
 
 use super::{Attendant, Ended, Recorder, Runtime, Wish};
 use crate::clock::Stopwatch;
-use crate::link::{Address, Link, SimulatedLink, Speed, open_simulated, session_settings};
+use crate::link::{Address, Link, SimulatedLink, Speed, open_session, open_simulated};
 
 const T24: TrainId = TrainId(24);
 const T58: TrainId = TrainId(58);
@@ -99,8 +99,7 @@ fn with_runtime<R>(
     let Address::Simulated(simulated) = &address else { panic!("a simulated one") };
     let layout = layout_named(&simulated.layout).expect("a layout").layout;
     let link = open_simulated(simulated, &layout, Speed::Unpaced).expect("a world");
-    let settings = session_settings(&address, &link, &layout);
-    let session = Interface::new(link.now(), settings).expect("modules");
+    let session = open_session(&address, &link, &layout).expect("modules");
     with(Runtime::new(link, session, recorder, None))
 }
 

@@ -4,14 +4,13 @@ use std::time::Duration;
 
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, TimeSpan, Timestamp};
-use footplate_wire::marklin_serial::Interface;
 use footplate_wire::{Closing, LinkNotice, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
 use super::ending::{Ended, REOPEN_WITHIN_S, SECOND_CHANCE, WITHIN};
 use super::stop_flag::StopFlag;
 use crate::clock::Stopwatch;
-use crate::link::{Heard, Link, Lost};
+use crate::link::{Heard, Link, Lost, StationSession};
 
 /// A machine that was woken and still asks for a time that has passed is woken again after this, so that time goes on
 /// whatever it asks for: as long as a byte takes on the line.
@@ -25,7 +24,7 @@ const REOPEN_EVERY: Duration = Duration::from_millis(250);
 /// However it is left, at its end, with an error or in a panic: trains are told to stand first.
 pub(crate) struct Runtime<'r, L: Link> {
     link: L,
-    session: Interface,
+    session: StationSession,
     recorder: Option<&'r mut dyn Recorder>,
     stop: Option<StopFlag>,
     /// Entries that are not written down yet; kept so that no byte costs an allocation.
@@ -44,10 +43,11 @@ impl<'r, L: Link> Runtime<'r, L> {
     /// `stop`: what raises the flag that ends a run, if something may.
     pub(crate) fn new(
         link: L,
-        mut session: Interface,
+        session: impl Into<StationSession>,
         recorder: Option<&'r mut dyn Recorder>,
         stop: Option<StopFlag>,
     ) -> Self {
+        let mut session = session.into();
         if let Some(up) = link.cts() {
             session.handle_cts(link.now(), up);
         }
@@ -66,7 +66,7 @@ impl<'r, L: Link> Runtime<'r, L> {
     }
 
     /// The program's side of the line.
-    pub(crate) const fn session(&self) -> &Interface {
+    pub(crate) const fn session(&self) -> &StationSession {
         &self.session
     }
 
@@ -186,7 +186,8 @@ impl<'r, L: Link> Runtime<'r, L> {
     fn write(&mut self) -> Result<(), Lost> {
         while let Some(output) = self.session.poll_output() {
             match output {
-                Transmit::Byte(byte) => self.link.write(byte)?,
+                Transmit::Byte(byte) => self.link.write(&[byte])?,
+                Transmit::Message(bytes) => self.link.write(&bytes)?,
                 Transmit::Event(event) => self.fresh.push(event),
                 Transmit::Notice(notice) => self.notices.push(notice),
             }

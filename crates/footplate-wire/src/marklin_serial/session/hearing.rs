@@ -82,7 +82,7 @@ impl Interface {
         // A line that babbles on must not burn a coil.
         let is_over = now >= quiet.until || self.solenoid.hurries(now);
         let release_is_due = self.solenoid.due().is_some_and(|due| now >= due);
-        let command_may_go = self.waiting.has_next(self.solenoid.is_powered());
+        let command_may_go = self.waiting.has_next(|waiting| self.solenoid.lets(waiting));
         let interrupted = !quiet.in_doubt && (self.farewell.begun || command_may_go || release_is_due);
         let overtakes = quiet.in_doubt && self.waiting.has_urgent() && now >= quiet.stops_may_go();
         if is_over {

@@ -19,7 +19,6 @@ use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};
-use footplate_wire::marklin_serial::Interface;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -32,7 +31,7 @@ use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ServedAt, Showing};
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_simulated, session_settings};
+use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
 use crate::witness::Witnessed;
@@ -90,11 +89,11 @@ impl Session<'_> {
     pub(super) fn run(&self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let written = WrittenLayout::named(self.layout)?;
         // A simulated railway is what its address says, whatever people believe it to be.
-        let real = match self.link {
-            Address::Simulated(simulated) => layout_named(&simulated.layout)?.layout,
-            Address::Serial(_) => written.layout.clone(),
+        let real = match self.link.simulated() {
+            Some(simulated) => layout_named(&simulated.layout)?.layout,
+            None => written.layout.clone(),
         };
-        if let Address::Simulated(simulated) = self.link
+        if let Some(simulated) = self.link.simulated()
             && !simulated.trains.contains(&self.train)
         {
             let there: Vec<String> = simulated.trains.iter().map(ToString::to_string).collect();
@@ -118,7 +117,9 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) => self.drive(&written, open(self.link, &real, pace)?, output),
+            Address::Serial(_) | Address::Board(_) => {
+                self.drive(&written, open(self.link, &real, pace)?, output)
+            }
         }
     }
 
@@ -135,8 +136,7 @@ impl Session<'_> {
             Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
             None => None,
         };
-        let settings = session_settings(self.link, &link, layout);
-        let session = Interface::new(link.now(), settings)?;
+        let session = open_session(self.link, &link, layout)?;
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);

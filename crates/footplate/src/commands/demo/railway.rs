@@ -46,9 +46,9 @@ impl Link for CountedLink<'_> {
     fn now(&self) -> Timestamp {
         self.line.now()
     }
-    fn write(&mut self, byte: u8) -> Result<(), Lost> {
-        self.bytes += 1;
-        self.line.write(byte)
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        self.bytes += bytes.len() as u64;
+        self.line.write(bytes)
     }
     fn wait(&mut self, until: Timestamp) -> Heard {
         let heard = self.line.wait(until);

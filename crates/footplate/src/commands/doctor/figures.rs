@@ -38,7 +38,7 @@ impl Figures {
                         figures.period(span, others);
                     }
                 }
-                Passed::Heard(at) => figures.first_bytes.extend(rhythm.heard(at).map(TimeSpan::as_ms)),
+                Passed::Heard(at, _) => figures.first_bytes.extend(rhythm.heard(at).map(TimeSpan::as_ms)),
             }
         }
         for figures in [&mut figures.periods, &mut figures.with_command, &mut figures.first_bytes] {
@@ -142,11 +142,11 @@ fn at(sorted: &[f64], share: f64) -> Option<f64> {
     sorted.get(((sorted.len().checked_sub(1)?) as f64 * share).round() as usize).copied()
 }
 
-fn quantiles(sorted: &[f64]) -> serde_json::Value {
+pub(super) fn quantiles(sorted: &[f64]) -> serde_json::Value {
     serde_json::json!({ "median": at(sorted, 0.5), "p5": at(sorted, 0.05), "p95": at(sorted, 0.95), "max": at(sorted, 1.0) })
 }
 
-fn line(output: &mut dyn Write, name: &str, sorted: &[f64]) -> std::io::Result<()> {
+pub(super) fn line(output: &mut dyn Write, name: &str, sorted: &[f64]) -> std::io::Result<()> {
     let [Some(low), Some(median), Some(high), Some(most)] =
         [0.05, 0.5, 0.95, 1.0].map(|share| at(sorted, share))
     else {

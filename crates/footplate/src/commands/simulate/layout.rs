@@ -7,12 +7,13 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
+use footplate_sim::{BoardSwitches, LawFamily, Railway, Scenario, SimulatedRecording};
 use footplate_store::{layout_named, write_sensor_log, write_whole};
 
 use super::super::Outcome;
 use super::station::{Place, Wanted, place_named, serve};
 use super::{recording, truth};
+use crate::link::{StationKind, quirks};
 
 /// Let model trains run through a scenario, each on its own.
 ///
@@ -20,7 +21,7 @@ use super::{recording, truth};
 /// `footplate predict` read it; train-N-truth.csv, what was behind each line of it and where the train was; and
 /// train-N-truth.json, the true speeds, law, delays and lengths. The same seed writes the same bytes.
 ///
-/// With `--station` nothing is written: a simulated 6051 with trains on the layout serves other programs at a network port
+/// With `--station` nothing is written: a simulated station with trains on the layout serves other programs at a network port
 /// or a pseudo-terminal, whose link address is the one line it prints, until Ctrl-C.
 #[derive(Args)]
 #[command(
@@ -52,6 +53,12 @@ pub(super) struct Arguments {
     /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `pty` for a pseudo-terminal.
     #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
     station: Option<Place>,
+    /// What the station is: `marklin`, a 6051, or `dcc-ex`, a DCC-EX board.
+    #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
+    protocol: StationKind,
+    /// How a DCC-EX board behaves, with commas between: chatter, merged, split, lossy, silent.
+    #[arg(long, value_parser = quirks, requires = "station")]
+    quirks: Option<BoardSwitches>,
     /// How many times faster than real time the station runs.
     #[arg(long, default_value_t = 1.0, requires = "station")]
     speed: f64,
@@ -101,8 +108,15 @@ impl Arguments {
     fn serve(&self, layout: &Layout, output: &mut dyn Write) -> anyhow::Result<()> {
         let place = self.station.as_ref().context("say with --station where other programs find it")?;
         let trains = self.trains.as_deref();
-        let wanted =
-            Wanted { layout: &self.layout, seed: self.seed, trains, law: self.law, speed: self.speed };
+        let wanted = Wanted {
+            layout: &self.layout,
+            seed: self.seed,
+            trains,
+            law: self.law,
+            speed: self.speed,
+            protocol: self.protocol,
+            board: self.quirks.unwrap_or_default(),
+        };
         serve(place, &wanted, layout, output)
     }
 }

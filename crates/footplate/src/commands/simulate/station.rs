@@ -1,13 +1,15 @@
-//! `footplate simulate layout --station`: a simulated 6051 for any program that speaks to one.
+//! `footplate simulate layout --station`: a simulated station for any program that speaks to one.
 
 use std::io::Write;
 use std::sync::mpsc::Receiver;
 
 use anyhow::{Context, anyhow, bail};
 use footplate_core::track::Layout;
-use footplate_sim::LawFamily;
+use footplate_sim::{BoardSwitches, LawFamily};
 
-use crate::link::{Incoming, Server, SimulatedAddress, listen_on, open_pseudo_terminal, station, trains};
+use crate::link::{
+    Incoming, Server, SimulatedAddress, StationKind, listen_on, open_pseudo_terminal, station, trains,
+};
 use crate::runtime::StopFlag;
 
 /// Where a simulated station is put.
@@ -34,6 +36,8 @@ pub(super) struct Wanted<'a> {
     pub(super) trains: Option<&'a str>,
     pub(super) law: Option<LawFamily>,
     pub(super) speed: f64,
+    pub(super) protocol: StationKind,
+    pub(super) board: BoardSwitches,
 }
 
 /// Serves until somebody stops the program.
@@ -45,6 +49,7 @@ pub(super) fn serve(
 ) -> anyhow::Result<()> {
     let mut address = SimulatedAddress::of(wanted.layout).map_err(|error| anyhow!(error))?;
     (address.seed, address.law) = (wanted.seed, wanted.law);
+    (address.station, address.board) = (wanted.protocol, wanted.board);
     if let Some(named) = wanted.trains {
         address.trains = trains(named).map_err(|error| anyhow!(error))?;
     }
@@ -55,11 +60,21 @@ pub(super) fn serve(
     let (port, incoming) = open(place)?;
     let stop = StopFlag::install_saying("\nthe station is switched off");
     let speed = wanted.speed;
-    writeln!(output, "marklin-serial:{port}?pace=fast&speed={speed}")?;
+    let name = match wanted.protocol {
+        StationKind::Marklin => {
+            writeln!(output, "marklin-serial:{port}?pace=fast&speed={speed}")?;
+            "6051"
+        }
+        // A pseudo-terminal resets no board when it is opened.
+        StationKind::DccEx => {
+            writeln!(output, "dcc-ex:{port}?reset=no&speed={speed}")?;
+            "DCC-EX board"
+        }
+    };
     output.flush()?;
     let named: Vec<String> = address.trains.iter().map(ToString::to_string).collect();
     eprintln!(
-        "a simulated 6051 with trains {} on {}, seed {}; Ctrl-C ends it",
+        "a simulated {name} with trains {} on {}, seed {}; Ctrl-C ends it",
         named.join(", "),
         wanted.layout,
         address.seed

@@ -32,10 +32,7 @@ pub(super) fn begin(
     journal
         .begin_machine(NewMachine { kind: CalibrationBeginning::KIND, program: PROGRAM, body: &body }, now)?;
     // A simulated clock stands still for a slow disk; trains on a real track do not.
-    let when_full = match link {
-        Address::Simulated(_) => WhenFull::Wait,
-        Address::Serial(_) => WhenFull::Lose,
-    };
+    let when_full = if link.simulated().is_some() { WhenFull::Wait } else { WhenFull::Lose };
     Ok(SessionJournal::start(journal, Some(began_at), when_full, IfUnkept::Stop)?)
 }
 

@@ -75,6 +75,7 @@ impl<'l> VirtualLine<'l> {
             while let Some(transmit) = self.interface.poll_output() {
                 match transmit {
                     Transmit::Byte(byte) => self.station.write(byte),
+                    Transmit::Message(bytes) => bytes.iter().for_each(|byte| self.station.write(*byte)),
                     Transmit::Event(event) => machine.handle_event(now, &event),
                     Transmit::Notice(notice) => hear(machine, now, &notice),
                 }

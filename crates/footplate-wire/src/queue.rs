@@ -4,12 +4,13 @@ use alloc::collections::VecDeque;
 
 use footplate_core::{Command, SpeedStep, TrainId};
 
-/// More than this is no plan but a mistake: at 9 ms each it is more than two seconds of nothing but commands.
+/// More than this is no plan but a mistake: at 9 ms each, as on the fastest link, it is more than two seconds of nothing but
+/// commands.
 const LONGEST: usize = 256;
 
 /// The commands that wait, in the order in which they go.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Queue {
+pub(crate) struct Queue {
     /// Power off and speed 0.
     urgent: VecDeque<Command>,
     usual: VecDeque<Command>,
@@ -17,7 +18,7 @@ pub(super) struct Queue {
 
 impl Queue {
     /// Puts a command where it belongs; refuses it with the number of those that wait if there are too many.
-    pub(super) fn push(&mut self, command: Command) -> Result<(), usize> {
+    pub(crate) fn push(&mut self, command: Command) -> Result<(), usize> {
         match command {
             Command::PowerOff => {
                 self.usual.retain(|waiting| *waiting != Command::PowerOn);
@@ -66,45 +67,52 @@ impl Queue {
     }
 
     /// What was said already and goes again, unless something newer waits.
-    pub(super) fn push_again(&mut self, command: Command) -> bool {
-        let outdated = self.urgent.iter().chain(&self.usual).any(|waiting| match (command, waiting) {
+    pub(crate) fn push_again(&mut self, command: Command) -> bool {
+        !self.outdates(command) && self.push(command).is_ok()
+    }
+
+    /// Whether something waits that is newer than a command and concerns the same.
+    pub(crate) fn outdates(&self, command: Command) -> bool {
+        self.iter().any(|waiting| match (command, waiting) {
             (Command::Speed { train, .. }, waiting) => concerns(waiting, train),
             (Command::Turnout { turnout, .. }, Command::Turnout { turnout: other, .. }) => turnout == *other,
             (Command::PowerOff | Command::PowerOn, waiting) => {
                 matches!(waiting, Command::PowerOff | Command::PowerOn)
             }
             _ => false,
-        });
-        !outdated && self.push(command).is_ok()
+        })
     }
 
-    pub(super) fn has_urgent(&self) -> bool {
+    pub(crate) fn has_urgent(&self) -> bool {
         !self.urgent.is_empty()
     }
 
-    pub(super) fn next_urgent(&mut self) -> Option<Command> {
-        self.urgent.pop_front()
+    /// The next of those that stop something, of those that may go.
+    pub(crate) fn next_urgent(&mut self, may_go: impl Fn(&Command) -> bool) -> Option<Command> {
+        let at = self.urgent.iter().position(may_go)?;
+        self.urgent.remove(at)
     }
 
-    /// The next of the rest; turnouts wait in their order while one is powered.
-    pub(super) fn next_usual(&mut self, solenoid_powered: bool) -> Option<Command> {
-        let at = self.usual.iter().position(|waiting| may_go(waiting, solenoid_powered))?;
+    /// The next of the rest that may go.
+    pub(crate) fn next_usual(&mut self, may_go: impl Fn(&Command) -> bool) -> Option<Command> {
+        let at = self.usual.iter().position(may_go)?;
         self.usual.remove(at)
     }
 
-    /// Whether any of them may go.
-    pub(super) fn has_next(&self, solenoid_powered: bool) -> bool {
-        !self.urgent.is_empty() || self.usual.iter().any(|waiting| may_go(waiting, solenoid_powered))
+    /// Whether anything stops something or may go.
+    pub(crate) fn has_next(&self, may_go: impl Fn(&Command) -> bool) -> bool {
+        !self.urgent.is_empty() || self.usual.iter().any(may_go)
     }
 
-    pub(super) fn clear(&mut self) {
+    /// All that wait, in the order in which they would go.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Command> {
+        self.urgent.iter().chain(&self.usual)
+    }
+
+    pub(crate) fn clear(&mut self) {
         self.urgent.clear();
         self.usual.clear();
     }
-}
-
-fn may_go(waiting: &Command, solenoid_powered: bool) -> bool {
-    !(solenoid_powered && matches!(waiting, Command::Turnout { .. }))
 }
 
 fn is_speed_of(command: &Command, of: TrainId) -> bool {
@@ -139,7 +147,7 @@ mod tests {
         for command in commands {
             queue.push(*command).expect("few commands");
         }
-        core::iter::from_fn(|| queue.next_urgent().or_else(|| queue.next_usual(false))).collect()
+        core::iter::from_fn(|| queue.next_urgent(|_| true).or_else(|| queue.next_usual(|_| true))).collect()
     }
 
     #[test]
@@ -167,14 +175,15 @@ mod tests {
     }
 
     #[test]
-    fn turnouts_wait_for_the_coil_and_steps_do_not() {
+    fn what_may_not_go_yet_keeps_its_place() {
         let mut queue = Queue::default();
         for command in [turnout(3), turnout(4), speed(T24, 8)] {
             queue.push(command).expect("few commands");
         }
-        assert_eq!(queue.next_usual(true), Some(speed(T24, 8)));
-        assert_eq!(queue.next_usual(true), None);
-        assert_eq!(queue.next_usual(false), Some(turnout(3)));
+        let no_turnout = |waiting: &Command| !matches!(waiting, Command::Turnout { .. });
+        assert_eq!(queue.next_usual(no_turnout), Some(speed(T24, 8)));
+        assert_eq!(queue.next_usual(no_turnout), None);
+        assert_eq!(queue.next_usual(|_| true), Some(turnout(3)));
     }
 
     #[test]

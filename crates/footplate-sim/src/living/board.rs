@@ -1,0 +1,360 @@
+//! The virtual DCC-EX board: a living layout behind the texts that an EX-CommandStation exchanges.
+//!
+//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by what was
+//! measured on the real firmware. Directions are absolute, the decoders know 14 speed steps, sensors report by themselves.
+//! Whoever spoke to it is not watched: trains run on when they are gone.
+
+mod obeying;
+
+use std::collections::VecDeque;
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{Ratio, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_wire::dcc_ex::{
+    ANSWER_LONGEST, ANSWER_SHORTEST, Framing, Reply, Request, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST,
+    Throttle,
+};
+
+use crate::circuit::CircuitError;
+use crate::draws::{Draws, Purpose};
+use crate::living::board_switches::{BoardSwitches, Delivery};
+use crate::living::s88::Edge;
+use crate::living::switches::LivingSwitches;
+use crate::living::world::LivingLayout;
+
+/// What it says of itself.
+const IDENTITY: &str = "DCC-EX V-5.6.0 / SIMULATED / FOOTPLATE G-virtual";
+/// One byte on a serial line of 115200 baud: ten bits.
+const BYTE_TIME: TimeSpan = TimeSpan::from_ns(10 * 1_000_000_000 / 115_200);
+/// What the input buffer holds.
+const BUFFER: usize = 64;
+/// How long the board is busy with one request (chosen so that about half of 100 requests that are written without a pause
+/// are answered: on the firmware 54 were).
+const BUSY: TimeSpan = TimeSpan::from_us(1_400);
+/// The shape of the time to an answer between its limits: with u^1.6, half of the answers come within 3.4 ms, as measured.
+const ANSWER_SHAPE: f64 = 1.6;
+/// From a reset until the board says what it is (2 to 6 s are reported).
+const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
+/// From one line to the next when each arrives by itself: what 15 characters take at 115200 baud, and a little.
+const LINE_TIME: TimeSpan = TimeSpan::from_us(1_500);
+/// Messages that are merged wait for others for up to so long.
+const MERGED_EVERY: TimeSpan = TimeSpan::from_ms(20);
+/// The second part of a split message comes so much later (s).
+const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
+/// The world goes on in such steps, so that no sensor is seen later than its message is due: less than the shortest delay.
+const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(3);
+/// What is printed between replies when it chatters.
+const CHATTER: [&str; 3] = [
+    "<* LCD1: Free RAM= 5538b\n(largest <block> 5500b) *>\n",
+    "<@ 0 3 \"Ready\">\n",
+    "<* Opcode=s params=0 *>\n",
+];
+
+/// A locomotive that the board drives.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    cab: u16,
+    throttle: Throttle,
+    forward: bool,
+    functions: u32,
+}
+
+/// A living layout behind a DCC-EX board, on a clock of its own.
+#[derive(Debug, Clone)]
+pub struct VirtualBoard<'l> {
+    world: LivingLayout<'l>,
+    switches: BoardSwitches,
+    draws: Draws,
+    now: Timestamp,
+    /// Bytes on the line from the host.
+    incoming: VecDeque<(Timestamp, u8)>,
+    host_is_free: Timestamp,
+    /// Bytes that wait to be read, and when the board reads again.
+    buffer: VecDeque<u8>,
+    busy_until: Timestamp,
+    framing: Framing,
+    /// Replies and messages of sensors that are still to be said.
+    replies: VecDeque<(Timestamp, String)>,
+    pushes: Vec<(Timestamp, SensorId, bool)>,
+    /// What is on its way to the host.
+    outgoing: VecDeque<(Timestamp, Vec<u8>)>,
+    line_is_free: Timestamp,
+    slots: Vec<Slot>,
+    turnouts: Vec<(TurnoutId, bool)>,
+    /// Until when it is without power or starting.
+    dark_until: Option<Timestamp>,
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Incoming,
+    Reads,
+    Reply,
+    Push,
+    Outgoing,
+    Light,
+}
+
+impl<'l> VirtualBoard<'l> {
+    /// A board in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has
+    /// no power yet. The sensors have the numbers of the layout, the turnouts are defined under theirs.
+    #[must_use]
+    pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: BoardSwitches) -> Self {
+        let now = world.now();
+        let known = |train: TrainId| {
+            let forward = world.runs_forward(train).unwrap_or(true);
+            Slot { cab: train.0, throttle: Throttle::Speed(0), forward, functions: 0 }
+        };
+        let slots = world.train_ids().map(known).collect();
+        let turnouts = world.layout().turnouts();
+        let lies = |turnout| world.lies(turnout) == Some(Leg::Curved);
+        let turnouts = turnouts.map(|(turnout, _)| (turnout, lies(turnout))).collect();
+        world.power(false, now);
+        world.s88.take_edges(now);
+        Self {
+            world,
+            switches,
+            draws: Draws::new(seed, Purpose::Line),
+            now,
+            incoming: VecDeque::new(),
+            host_is_free: now,
+            buffer: VecDeque::new(),
+            busy_until: now,
+            framing: Framing::default(),
+            replies: VecDeque::new(),
+            pushes: Vec::new(),
+            outgoing: VecDeque::new(),
+            line_is_free: now,
+            slots,
+            turnouts,
+            dark_until: None,
+        }
+    }
+
+    /// A board and a layout on which trains have been put: see [`LivingLayout::draw`].
+    ///
+    /// # Errors
+    /// [`CircuitError`] when no train can run round on the layout.
+    pub fn draw(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        board: BoardSwitches,
+    ) -> Result<Self, CircuitError> {
+        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, board))
+    }
+
+    /// The time.
+    #[must_use]
+    pub const fn now(&self) -> Timestamp {
+        self.now
+    }
+
+    /// The layout.
+    #[must_use]
+    pub const fn world(&self) -> &LivingLayout<'l> {
+        &self.world
+    }
+
+    /// The layout, for a person's hands.
+    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
+        &mut self.world
+    }
+
+    /// Somebody presses its reset button, or opens its serial port: the track loses power, and for some seconds nothing is
+    /// read. Then it says what it is, if it does, and knows no locomotive.
+    pub fn restart(&mut self) {
+        let now = self.now;
+        self.world.power(false, now);
+        self.world.forget_all_told();
+        self.slots.clear();
+        (self.buffer.clear(), self.replies.clear(), self.pushes.clear(), self.outgoing.clear());
+        self.framing = Framing::default();
+        self.busy_until = now;
+        self.dark_until = Some(now + BOOT);
+    }
+
+    /// The host puts bytes on the line, behind those that are still on their way.
+    pub fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.host_is_free = self.host_is_free.max(self.now) + BYTE_TIME;
+            self.incoming.push_back((self.host_is_free, *byte));
+        }
+    }
+
+    /// Goes on until a time, or until something reaches the host before it: the bytes of one portion.
+    pub fn advance(&mut self, until: Timestamp) -> Option<Vec<u8>> {
+        loop {
+            let next = self.next().filter(|(at, _)| *at <= until);
+            let at = next.map_or(until, |(at, _)| at).max(self.now);
+            let looks = at.min(self.now + LOOK_EVERY);
+            self.world.advance(looks);
+            self.now = looks;
+            self.look(looks);
+            match next {
+                _ if looks < at => {}
+                Some((_, Next::Outgoing)) => {
+                    if let Some(portion) = self.portion() {
+                        return Some(portion);
+                    }
+                }
+                Some((_, next)) => self.happen(next),
+                // A push may have become due while the world went on.
+                None if self.next().is_none_or(|(at, _)| at > until) => return None,
+                None => {}
+            }
+        }
+    }
+
+    /// What happens next, and when; of things at one time the first in the order of this list.
+    fn next(&self) -> Option<(Timestamp, Next)> {
+        let reads = (!self.buffer.is_empty() && self.dark_until.is_none()).then_some(self.busy_until);
+        let pushes = self.pushes.iter().map(|(at, ..)| *at).min();
+        let coming = [
+            (self.incoming.front().map(|(at, _)| *at), Next::Incoming),
+            (reads, Next::Reads),
+            (self.replies.front().map(|(at, _)| *at), Next::Reply),
+            (pushes, Next::Push),
+            (self.outgoing.front().map(|(at, _)| *at), Next::Outgoing),
+            (self.dark_until, Next::Light),
+        ];
+        coming.into_iter().filter_map(|(at, next)| Some((at?, next))).min_by_key(|(at, _)| *at)
+    }
+
+    fn happen(&mut self, next: Next) {
+        match next {
+            Next::Incoming => {
+                let byte = self.incoming.pop_front();
+                let is_held = self.buffer.len() < BUFFER || !self.switches.overruns;
+                if let Some((_, byte)) = byte
+                    && is_held
+                    && !self.loses_one()
+                {
+                    self.buffer.push_back(byte);
+                }
+            }
+            Next::Reads => self.read(),
+            Next::Reply => {
+                if let Some((_, text)) = self.replies.pop_front() {
+                    self.say(&text);
+                }
+            }
+            Next::Push => {
+                let first = self.pushes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
+                if let Some(at) = first.map(|(at, _)| at) {
+                    let (_, sensor, active) = self.pushes.remove(at);
+                    self.say(&line(&Reply::Sensor { id: sensor.0, active }));
+                }
+            }
+            Next::Light => {
+                self.dark_until = None;
+                self.buffer.clear();
+                if self.switches.has_banner {
+                    self.say("<* License GPLv3 fsf.org (c) dcc-ex.com *>\n");
+                    self.say(&line(&Reply::Identity(IDENTITY.into())));
+                    self.say("<* Track A sensOffset=0 *>\n<@ 0 3 \"Ready\">\n");
+                }
+            }
+            Next::Outgoing => {}
+        }
+    }
+
+    /// What is on its way and due: one portion, less what the line loses of it.
+    fn portion(&mut self) -> Option<Vec<u8>> {
+        let (at, mut bytes) = self.outgoing.pop_front()?;
+        while self.switches.delivery == Delivery::Merged
+            && let Some((_, more)) = self.outgoing.pop_front_if(|(other, _)| *other <= at)
+        {
+            bytes.extend(more);
+        }
+        if self.switches.lost > Ratio::ZERO {
+            bytes.retain(|_| !self.draws.chance(self.switches.lost.as_parts()));
+        }
+        (!bytes.is_empty()).then_some(bytes)
+    }
+
+    fn loses_one(&mut self) -> bool {
+        let lost = self.switches.lost;
+        lost > Ratio::ZERO && self.draws.chance(lost.as_parts())
+    }
+
+    /// Sees which sensors have changed, and when that will be said.
+    fn look(&mut self, by: Timestamp) {
+        for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
+            if self.dark_until.is_some() {
+                continue;
+            }
+            let delays = SENSOR_DELAY_SHORTEST.as_s()..SENSOR_DELAY_LONGEST.as_s();
+            let due = at + TimeSpan::from_s(self.draws.uniform(delays));
+            // What is said of one sensor stays in order.
+            let last = self.pushes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
+            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
+            self.pushes.push((due, sensor, is_occupied));
+        }
+    }
+
+    /// Reads what waits until a request is complete, and does it.
+    fn read(&mut self) {
+        let at = self.busy_until.max(self.now);
+        while let Some(byte) = self.buffer.pop_front() {
+            let Some(text) = self.framing.push(byte) else { continue };
+            let request = Request::read(text);
+            self.busy_until = at + BUSY;
+            let answer = match request {
+                Some(request) => self.obey(at, request),
+                None => line(&Reply::Failed),
+            };
+            if !answer.is_empty() {
+                let limits = (ANSWER_SHORTEST.as_s(), ANSWER_LONGEST.as_s());
+                let part = libm::pow(self.draws.uniform(0.0..1.0), ANSWER_SHAPE);
+                let due = at + TimeSpan::from_s(limits.0 + part * (limits.1 - limits.0));
+                let last = self.replies.back().map_or(due, |(last, _)| *last);
+                self.replies.push_back((due.max(last), answer));
+            }
+            return;
+        }
+    }
+
+    /// Puts a text on its way to the host.
+    fn say(&mut self, text: &str) {
+        let chatter = self.switches.chatter;
+        if chatter > Ratio::ZERO && self.draws.chance(chatter.as_parts()) {
+            let noise = CHATTER[self.draws.below(CHATTER.len())];
+            self.post(noise.as_bytes());
+        }
+        self.post(text.as_bytes());
+    }
+
+    fn post(&mut self, bytes: &[u8]) {
+        let last = self.outgoing.back().map_or(self.now, |(last, _)| (*last).max(self.now));
+        match self.switches.delivery {
+            Delivery::Each => {
+                for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+                    let due = self.line_is_free.max(self.now);
+                    self.line_is_free = due + LINE_TIME;
+                    self.outgoing.push_back((due, line.to_vec()));
+                }
+            }
+            Delivery::Merged => {
+                let every = MERGED_EVERY.as_ns();
+                let due = (last - Timestamp::ZERO).as_ns().div_euclid(every) * every + every;
+                let due = Timestamp::ZERO + TimeSpan::from_ns(due);
+                let due = self.outgoing.back().map_or(due, |(last, _)| *last);
+                self.outgoing.push_back((due, bytes.to_vec()));
+            }
+            Delivery::Split => {
+                let (first, second) = bytes.split_at(self.draws.below(bytes.len() + 1));
+                self.outgoing.push_back((last, first.to_vec()));
+                let later = last + TimeSpan::from_s(self.draws.uniform(SPLIT_S));
+                self.outgoing.push_back((later, second.to_vec()));
+            }
+        }
+    }
+}
+
+/// A message as it is printed: a line.
+fn line(reply: &Reply) -> String {
+    format!("{reply}\n")
+}

@@ -1,0 +1,97 @@
+//! The end of a session: every train is stopped, then the power goes off, and the board has to confirm both.
+
+use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp};
+
+use super::Client;
+use crate::session::{Closing, Confirmation, LinkNotice};
+
+/// How long the end waits for all stops to be confirmed before the power goes off all the same: five repeats.
+const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
+
+/// How far the end has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Farewell {
+    #[default]
+    NotBegun,
+    /// Trains are being stopped.
+    Stopping { until: Timestamp },
+    /// The power is being switched off.
+    SwitchingOff { is_confirmed: bool },
+    /// All is confirmed.
+    Over,
+}
+
+impl Farewell {
+    pub(super) fn begin(&mut self, now: Timestamp) {
+        *self = Self::Stopping { until: now + STOPS_WITHIN };
+    }
+
+    pub(super) fn has_begun(self) -> bool {
+        self != Self::NotBegun
+    }
+
+    pub(super) fn is_over(self) -> bool {
+        self == Self::Over
+    }
+
+    pub(super) const fn due(self) -> Option<Timestamp> {
+        match self {
+            Self::Stopping { until } => Some(until),
+            _ => None,
+        }
+    }
+}
+
+impl Client {
+    /// Stops every train that ever had a speed.
+    pub(super) fn stop_driven(&mut self) {
+        for locomotive in self.locomotives.iter_mut().filter(|locomotive| locomotive.is_driven) {
+            locomotive.is_stopped = false;
+            // Stops are always taken.
+            let _ = self.waiting.push(Command::Speed { train: locomotive.train, step: SpeedStep::STAND });
+        }
+        if let Farewell::SwitchingOff { .. } = self.farewell {
+            self.farewell.begin(self.now);
+        }
+    }
+
+    /// Whether it is time to switch the power off at the end; true once.
+    pub(super) fn switch_off_is_due(&mut self, now: Timestamp) -> bool {
+        let Farewell::Stopping { until } = self.farewell else { return false };
+        let is_due = now >= until || self.locomotives.driven(false).is_empty();
+        if is_due {
+            self.farewell = Farewell::SwitchingOff { is_confirmed: false };
+        }
+        is_due
+    }
+
+    /// The board has said that the track has no power.
+    pub(super) fn power_went_off(&mut self) {
+        if let Farewell::SwitchingOff { is_confirmed } = &mut self.farewell {
+            *is_confirmed = true;
+        }
+    }
+
+    /// Ends the session when everything is confirmed.
+    pub(super) fn end_if_confirmed(&mut self) {
+        let is_off = self.farewell == Farewell::SwitchingOff { is_confirmed: true };
+        if is_off && self.locomotives.driven(false).is_empty() {
+            self.farewell = Farewell::Over;
+            let closing = self.statement();
+            self.notify(LinkNotice::Closed(closing));
+        }
+    }
+
+    pub(super) fn statement(&self) -> Closing {
+        Closing {
+            told_to_stand: self.locomotives.driven(true),
+            not_told: self.locomotives.driven(false),
+            solenoids_released: None,
+            power_off: matches!(
+                self.farewell,
+                Farewell::Over | Farewell::SwitchingOff { is_confirmed: true }
+            ),
+            confirmation: Confirmation::Replies,
+        }
+    }
+}

@@ -1,0 +1,395 @@
+//! The session with a DCC-EX board: its order, its pace, and what it does when something is lost.
+
+use footplate_core::{
+    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
+use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
+use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+
+const T24: TrainId = TrainId(24);
+const T58: TrainId = TrainId(58);
+
+fn ms(ms: i64) -> Timestamp {
+    Timestamp::ZERO + TimeSpan::from_ms(ms)
+}
+
+fn speed(train: TrainId, step: u8) -> Command {
+    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
+}
+
+/// A session and the line it writes to, with a board that answers what a table says.
+struct Desk {
+    client: Client,
+    now: Timestamp,
+    /// What was written, and when.
+    written: Vec<(i64, String)>,
+    events: Vec<Event>,
+    notices: Vec<LinkNotice>,
+    /// Answers by the text of the request; all others are not answered.
+    answers: Vec<(&'static str, &'static str)>,
+}
+
+/// As the firmware answers when one locomotive is known to run backwards.
+const ANSWERS: [(&str, &str); 14] = [
+    ("<s>", "<iDCC-EX V-5.6.0 / MEGA / STANDARD_MOTOR_SHIELD G-x>\n<p0 A>\n<p0 B>\n<p0>\n"),
+    ("<Q>", "<q 0>\n<Q 3>\n<q 5>\n"),
+    ("<T>", "<H 7 0>\n<H 9 1>\n"),
+    ("<1 MAIN>", "<p1 A>\n<p0 B>\n<p1 MAIN>\n"),
+    ("<0>", "<p0 A>\n<p0 B>\n<p0>\n"),
+    ("<#>", "<# 50>\n"),
+    ("<t 24>", "<l 24 0 0 0>\n"),
+    ("<t 58>", "<l 58 -1 128 0>\n"),
+    ("<t 24 72 0>", "<l 24 0 73 0>\n"),
+    ("<t 24 0 0>", "<l 24 0 0 0>\n"),
+    ("<t 24 0 1>", "<l 24 0 128 0>\n"),
+    ("<t 24 72 1>", "<l 24 0 201 0>\n"),
+    ("<t 58 81 1>", "<l 58 1 210 0>\n"),
+    ("<t 58 0 1>", "<l 58 1 128 0>\n"),
+];
+
+/// From a request to the answer: the median that was measured.
+const ANSWER: TimeSpan = TimeSpan::from_us(3_400);
+
+impl Desk {
+    fn new(settings: Settings) -> Self {
+        let client = Client::new(ms(0), settings);
+        let answers = ANSWERS.to_vec();
+        Self { client, now: ms(0), written: Vec::new(), events: Vec::new(), notices: Vec::new(), answers }
+    }
+
+    fn opened() -> Self {
+        let mut desk = Self::new(Settings::default());
+        desk.run_until(ms(1_000));
+        desk.written.clear();
+        desk
+    }
+
+    /// Runs on; each answer comes 3.4 ms after its request.
+    fn run_until(&mut self, end: Timestamp) {
+        let mut coming: Vec<(Timestamp, String)> = Vec::new();
+        loop {
+            while let Some(output) = self.client.poll_output() {
+                match output {
+                    Transmit::Message(bytes) => {
+                        let text = String::from_utf8(bytes).unwrap();
+                        let answer = self.answers.iter().find(|(request, _)| *request == text);
+                        coming.extend(answer.map(|(_, answer)| (self.now + ANSWER, (*answer).to_owned())));
+                        self.written.push(((self.now - ms(0)).as_ns() / 1_000_000, text));
+                    }
+                    Transmit::Event(event) => self.events.push(event),
+                    Transmit::Notice(notice) => self.notices.push(notice),
+                    Transmit::Byte(byte) => panic!("a lone byte {byte}"),
+                }
+            }
+            let next = [coming.first().map(|(at, _)| *at), self.client.next_timeout()];
+            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
+            self.now = at;
+            if coming.first().is_some_and(|(due, _)| *due <= at) {
+                let (_, answer) = coming.remove(0);
+                self.client.handle_bytes(at, answer.as_bytes());
+            } else {
+                self.client.handle_timeout(at);
+                let next = self.client.next_timeout();
+                assert!(next.is_none_or(|next| next > at), "a session that is never done");
+            }
+        }
+        self.now = end;
+    }
+
+    fn run_for(&mut self, span_ms: i64) {
+        self.run_until(self.now + TimeSpan::from_ms(span_ms));
+    }
+
+    fn command(&mut self, command: Command) {
+        self.client.handle_command(self.now, command).unwrap();
+    }
+
+    fn hear(&mut self, text: &str) {
+        self.client.handle_bytes(self.now, text.as_bytes());
+    }
+
+    fn texts(&self) -> Vec<&str> {
+        self.written.iter().map(|(_, text)| text.as_str()).collect()
+    }
+}
+
+#[test]
+fn a_network_board_is_asked_what_it_is_then_for_its_states() {
+    let mut desk = Desk::new(Settings { turnouts: TurnoutRequests::Defined, ..Settings::default() });
+    desk.run_until(ms(400));
+    assert_eq!(desk.texts(), ["<s>", "<Q>", "<T>", "<1 MAIN>", "<#>"]);
+    let identity = "DCC-EX V-5.6.0 / MEGA / STANDARD_MOTOR_SHIELD G-x".to_owned();
+    let expected = [
+        LinkNotice::Identified { identity },
+        LinkNotice::HeldClosed { sensor: SensorId(3) },
+        LinkNotice::Answers,
+    ];
+    assert_eq!(desk.notices, expected);
+    assert_eq!(desk.events, [], "states at the opening are no events");
+}
+
+#[test]
+fn nothing_is_written_before_the_banner_of_a_board_that_is_reset() {
+    let mut desk = Desk::new(Settings { resets_on_open: true, ..Settings::default() });
+    desk.command(speed(T24, 8));
+    desk.run_until(ms(3_000));
+    assert_eq!(desk.texts(), [""; 0]);
+    desk.hear("boot\r\n<* License GPLv3 *>\n<iDCC-EX V-5.6.0 / MEGA / X G-x>\n");
+    desk.run_for(300);
+    assert_eq!(desk.texts(), ["<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24 72 0>"]);
+    // A board that does not reset is asked after 6 s.
+    let mut desk = Desk::new(Settings { resets_on_open: true, ..Settings::default() });
+    desk.run_until(ms(7_000));
+    assert_eq!(desk.written[0], (6_000, "<s>".to_owned()));
+}
+
+#[test]
+fn the_direction_is_read_back_and_then_absolute() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(300);
+    assert_eq!(desk.texts(), ["<t 24>", "<t 58>", "<t 24 72 0>", "<t 58 81 1>"]);
+    desk.written.clear();
+    for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
+        desk.command(command);
+        desk.run_for(100);
+    }
+    assert_eq!(desk.texts(), ["<t 24 0 0>", "<t 24 0 1>", "<t 24 72 1>"]);
+    let kinds: Vec<EventKind> = desk.events.iter().skip(2).map(|event| event.kind).collect();
+    let step = |step| EventKind::Speed { train: T24, step: SpeedStep::new(step).unwrap() };
+    assert_eq!(kinds, [step(0), EventKind::Reverse { train: T24 }, step(8)]);
+}
+
+#[test]
+fn the_newest_speed_wins_and_a_stop_goes_first() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.written.clear();
+    desk.answers.push(("<t 58 90 1>", "<l 58 1 219 0>\n"));
+    // Twenty more speeds at once, a turnout, and a stop behind them.
+    for step in 1..=10 {
+        desk.command(speed(T58, step));
+        desk.command(Command::Turnout { turnout: TurnoutId(step.into()), curved: true });
+    }
+    desk.command(speed(T24, 0));
+    desk.run_for(2_000);
+    let stop = desk.written.iter().position(|(_, text)| text == "<t 24 0 0>").unwrap();
+    assert!(desk.written[stop].0 - desk.written[0].0 <= 30, "{:?}", desk.written);
+    let driven: Vec<&str> = desk.texts().into_iter().filter(|text| text.starts_with("<t 58 ")).collect();
+    assert!(driven.len() <= 3 && driven.last() == Some(&"<t 58 90 1>"), "{driven:?}");
+    // No second holds more than 20 and the three that go at once.
+    for (at, _) in &desk.written {
+        let within = desk.written.iter().filter(|(other, _)| (*at..*at + 1_000).contains(other));
+        assert!(within.count() <= 23);
+    }
+}
+
+#[test]
+fn what_is_not_answered_is_repeated_and_given_up_if_it_stops_nothing() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.answers.retain(|(request, _)| !request.starts_with("<t 24"));
+    desk.written.clear();
+    desk.command(speed(T24, 9));
+    desk.run_for(3_000);
+    let times: Vec<i64> =
+        desk.written.iter().filter(|(_, text)| text == "<t 24 81 0>").map(|(at, _)| *at).collect();
+    assert_eq!(times.len(), 4, "{:?}", desk.written);
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 250), "{times:?}");
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed { command: speed(T24, 9) }));
+    desk.written.clear();
+    desk.command(speed(T24, 0));
+    desk.run_for(3_000);
+    assert!(desk.texts().iter().filter(|text| **text == "<t 24 0 0>").count() >= 12, "{:?}", desk.written);
+}
+
+#[test]
+fn a_sensor_is_an_event_with_the_span_that_was_measured() {
+    let mut desk = Desk::opened();
+    desk.run_for(100);
+    desk.hear("<Q 5>\n<Q");
+    desk.hear(" 0><Q 5>");
+    desk.run_for(50);
+    desk.hear("<q 5><q 3><Q 3>");
+    desk.run_for(1);
+    let reports: Vec<(i64, u16, Option<TimeSpan>)> = desk
+        .events
+        .iter()
+        .filter_map(|event| match event.kind {
+            EventKind::Sensor(Report { sensor, poll_interval }) => {
+                Some(((event.time - ms(0)).as_ns() / 1_000, sensor.0, poll_interval))
+            }
+            _ => None,
+        })
+        .collect();
+    // Heard at 1100 ms and at 1150 ms; 3.6 to 23.1 ms earlier it happened.
+    let width = |us| Some(TimeSpan::from_us(us));
+    assert_eq!(
+        reports,
+        [(1_096_400, 5, width(19_500)), (1_096_400, 0, width(19_500)), (1_146_400, 3, width(19_500))]
+    );
+}
+
+#[test]
+fn turnouts_that_are_defined_are_awaited_only_when_they_move() {
+    let mut desk = Desk::new(Settings { turnouts: TurnoutRequests::Defined, ..Settings::default() });
+    desk.answers.push(("<T 7 1>", "<H 7 1>\n"));
+    desk.answers.push(("<T 8 1>", "<X>\n"));
+    desk.run_until(ms(1_000));
+    desk.written.clear();
+    // 9 lies curved already, 7 answers, 8 is not defined.
+    for number in [9, 7, 8] {
+        desk.command(Command::Turnout { turnout: TurnoutId(number), curved: true });
+    }
+    desk.run_for(450);
+    assert_eq!(desk.texts(), ["<T 9 1>", "<T 7 1>", "<T 8 1>"]);
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::TurnoutRefused { turnout: TurnoutId(8) }));
+}
+
+#[test]
+fn silence_is_noticed_and_everything_asked_again_after_it() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    let answers = std::mem::take(&mut desk.answers);
+    desk.run_for(2_500);
+    let silent = |notice: &LinkNotice| matches!(notice, LinkNotice::Silent { .. });
+    assert_eq!(desk.notices.iter().filter(|notice| silent(notice)).count(), 1);
+    let text = desk.notices.iter().find(|notice| silent(notice)).unwrap().to_string();
+    assert!(text.contains("check its power, the cable and the port"), "{text}");
+    // It answers again: states and the locomotive are asked for, and only then it is said to answer.
+    (desk.answers, desk.written) = (answers, Vec::new());
+    desk.answers
+        .iter_mut()
+        .filter(|(request, _)| *request == "<t 24>")
+        .for_each(|(_, answer)| *answer = "<l 24 0 73 0>\n");
+    desk.answers
+        .iter_mut()
+        .filter(|(request, _)| *request == "<Q>")
+        .for_each(|(_, answer)| *answer = "<Q 0><q 5>");
+    desk.run_for(800);
+    for request in ["<Q>", "<1 MAIN>", "<#>", "<t 24>"] {
+        assert!(desk.texts().contains(&request), "{request} in {:?}", desk.written);
+    }
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers));
+    // Sensor 0 became occupied at some time of the silence.
+    let Some(Event { kind: EventKind::Sensor(report), .. }) = desk.events.last() else {
+        panic!("{:?}", desk.events)
+    };
+    assert!(
+        report.sensor == SensorId(0) && report.poll_interval.unwrap() > TimeSpan::from_ms(2_000),
+        "{report:?}"
+    );
+}
+
+#[test]
+fn a_reset_stops_trains_and_writes_their_direction_again() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(3_000);
+    desk.written.clear();
+    desk.hear("<iDCC-EX V-5.6.0 / MEGA / X G-x>\n");
+    desk.run_for(600);
+    assert!(desk.notices.contains(&LinkNotice::Restarted));
+    assert_eq!(desk.texts(), ["<t 24 0 0>", "<Q>", "<1 MAIN>", "<#>", "<t 24>"]);
+}
+
+#[test]
+fn a_board_that_restarted_behind_a_network_is_recognised_by_what_it_forgot() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(500);
+    desk.written.clear();
+    desk.answers
+        .iter_mut()
+        .filter(|(request, _)| *request == "<t 24>")
+        .for_each(|(_, answer)| *answer = "<l 24 -1 128 0>\n");
+    desk.client.handle_reopened(desk.now);
+    desk.run_for(1_000);
+    assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
+    assert_eq!(desk.texts()[..6], ["<s>", "<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24 0 0>"]);
+}
+
+#[test]
+fn another_throttle_is_noticed() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.hear("<l 24 0 201 0>\n");
+    desk.hear("<p0 A>\n");
+    desk.run_for(1);
+    assert!(desk.notices.contains(&LinkNotice::OtherThrottle { train: T24, reversed: true }));
+    assert!(desk.notices.contains(&LinkNotice::PowerLost));
+}
+
+#[test]
+fn the_end_is_confirmed_by_the_board() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(500);
+    desk.written.clear();
+    desk.client.close(desk.now);
+    desk.run_for(500);
+    assert_eq!(desk.texts(), ["<t 24 0 0>", "<t 58 0 1>", "<0>"]);
+    let closing = desk.client.closing();
+    assert!(closing.is_complete(), "{closing}");
+    assert_eq!(
+        closing.to_string(),
+        "told to stand: 24, 58; track power switched off; the station has confirmed it"
+    );
+    assert_eq!(desk.client.handle_command(desk.now, speed(T24, 3)), Err(CommandError::Closed));
+}
+
+#[test]
+fn what_was_not_confirmed_at_the_end_is_named() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(500);
+    desk.answers.retain(|(request, _)| *request != "<t 58 0 1>");
+    desk.client.close(desk.now);
+    desk.run_for(5_000);
+    let closing = desk.client.closing();
+    assert!(!closing.is_complete() && closing.power_off, "{closing}");
+    assert_eq!((closing.told_to_stand, closing.not_told), (vec![T24], vec![T58]));
+}
+
+#[test]
+fn noise_is_called_noise_once() {
+    let mut desk = Desk::opened();
+    for _ in 0..20 {
+        desk.hear("\u{fffd}\u{fffd}xyz~~");
+        desk.run_for(20);
+    }
+    let noise: Vec<String> = desk
+        .notices
+        .iter()
+        .filter(|notice| matches!(notice, LinkNotice::Unreadable { .. }))
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(noise.len(), 1);
+    assert!(noise[0].contains("115200 baud"), "{}", noise[0]);
+}
+
+#[test]
+fn what_the_board_does_not_know_is_refused() {
+    let mut desk = Desk::opened();
+    let refusals = [
+        (speed(TrainId(0), 3), "train 0 has no address here; addresses are 1 to 10239"),
+        (speed(T24, 15), "step 15 is beyond the decoder; steps are 0 to 14"),
+        (
+            Command::Turnout { turnout: TurnoutId(2045), curved: true },
+            "turnout 2045 has no address here; addresses are 1 to 2044",
+        ),
+    ];
+    for (command, reason) in refusals {
+        assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
+    }
+}

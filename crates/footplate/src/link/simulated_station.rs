@@ -1,0 +1,97 @@
+//! A simulated layout behind either kind of station.
+
+use std::collections::VecDeque;
+
+use footplate_core::Timestamp;
+use footplate_sim::living::{CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualStation};
+
+/// A simulated station and the world behind it.
+#[derive(Debug, Clone)]
+pub(crate) enum SimulatedStation<'l> {
+    /// A 6051.
+    Marklin(Box<VirtualStation<'l>>),
+    /// A DCC-EX board.
+    DccEx(Box<VirtualBoard<'l>>),
+}
+
+impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
+    fn from(station: VirtualStation<'l>) -> Self {
+        Self::Marklin(Box::new(station))
+    }
+}
+
+impl<'l> From<VirtualBoard<'l>> for SimulatedStation<'l> {
+    fn from(board: VirtualBoard<'l>) -> Self {
+        Self::DccEx(Box::new(board))
+    }
+}
+
+/// What reaches the host from either.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum FromSimulated {
+    /// Bytes in one portion.
+    Bytes(VecDeque<u8>),
+    /// The hand-shake line is up or down.
+    Cts(bool),
+}
+
+impl<'l> SimulatedStation<'l> {
+    /// The station's time.
+    pub(crate) const fn now(&self) -> Timestamp {
+        match self {
+            Self::Marklin(station) => station.now(),
+            Self::DccEx(board) => board.now(),
+        }
+    }
+
+    /// Goes on until a time, or until something reaches the host before it.
+    pub(crate) fn advance(&mut self, until: Timestamp) -> Option<FromSimulated> {
+        match self {
+            Self::Marklin(station) => station.advance(until).map(|heard| match heard {
+                FromStation::Byte(byte) => FromSimulated::Bytes(VecDeque::from([byte])),
+                FromStation::Cts(up) => FromSimulated::Cts(up),
+            }),
+            Self::DccEx(board) => board.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
+        }
+    }
+
+    /// The host puts bytes on the line.
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
+        match self {
+            Self::Marklin(station) => bytes.iter().for_each(|byte| station.write(*byte)),
+            Self::DccEx(board) => board.write(bytes),
+        }
+    }
+
+    /// Whether the station is ready for a byte; `None` if it has no line that says so.
+    pub(crate) const fn cts(&self) -> Option<bool> {
+        match self {
+            Self::Marklin(station) => Some(station.cts()),
+            Self::DccEx(_) => None,
+        }
+    }
+
+    /// The world behind it.
+    pub(crate) const fn world(&self) -> &LivingLayout<'l> {
+        match self {
+            Self::Marklin(station) => station.world(),
+            Self::DccEx(board) => board.world(),
+        }
+    }
+
+    /// The same, to change it with.
+    pub(crate) const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
+        match self {
+            Self::Marklin(station) => station.world_mut(),
+            Self::DccEx(board) => board.world_mut(),
+        }
+    }
+
+    /// Solenoids that were left powered for too long; a DCC-EX board leaves that to the decoders of turnouts.
+    pub(crate) fn alarms(&self) -> &[CoilAlarm] {
+        match self {
+            Self::Marklin(station) => station.alarms(),
+            Self::DccEx(_) => &[],
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The session that an open line is used with: the one of its kind of station.
+
+use footplate_core::{Command, SensorId, Timestamp};
+use footplate_wire::marklin_serial::Interface;
+use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex};
+
+/// A session with any station that there is.
+#[derive(Debug, Clone)]
+pub(crate) enum StationSession {
+    /// A Märklin 6050 or 6051.
+    Marklin(Interface),
+    /// A DCC-EX board.
+    DccEx(dcc_ex::Client),
+}
+
+impl From<Interface> for StationSession {
+    fn from(session: Interface) -> Self {
+        Self::Marklin(session)
+    }
+}
+
+impl From<dcc_ex::Client> for StationSession {
+    fn from(session: dcc_ex::Client) -> Self {
+        Self::DccEx(session)
+    }
+}
+
+impl StationSession {
+    fn any(&self) -> &dyn Session {
+        match self {
+            Self::Marklin(session) => session,
+            Self::DccEx(session) => session,
+        }
+    }
+
+    fn any_mut(&mut self) -> &mut dyn Session {
+        match self {
+            Self::Marklin(session) => session,
+            Self::DccEx(session) => session,
+        }
+    }
+}
+
+impl Session for StationSession {
+    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.any_mut().handle_bytes(now, bytes);
+    }
+    fn handle_cts(&mut self, now: Timestamp, up: bool) {
+        self.any_mut().handle_cts(now, up);
+    }
+    fn handle_reopened(&mut self, now: Timestamp) {
+        self.any_mut().handle_reopened(now);
+    }
+    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        self.any_mut().handle_command(now, command)
+    }
+    fn hold_line(&mut self, until: Option<Timestamp>) {
+        self.any_mut().hold_line(until);
+    }
+    fn watch(&mut self, sensor: Option<SensorId>) {
+        self.any_mut().watch(sensor);
+    }
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.any_mut().handle_timeout(now);
+    }
+    fn poll_output(&mut self) -> Option<Transmit> {
+        self.any_mut().poll_output()
+    }
+    fn next_timeout(&self) -> Option<Timestamp> {
+        self.any().next_timeout()
+    }
+    fn close(&mut self, now: Timestamp) {
+        self.any_mut().close(now);
+    }
+    fn closing(&self) -> Closing {
+        self.any().closing()
+    }
+}
