@@ -1,6 +1,7 @@
 //! The program as a person in a shell sees it, what it prints and the status it ends with, and what its numbers
 //! promise, checked against trains whose truth is known.
 
+mod board;
 mod calibrate;
 mod calibrations_are_true;
 mod compare;

@@ -13,8 +13,13 @@ pub(crate) struct Standing {
 
 impl Standing {
     pub(crate) fn at(place: &str) -> Self {
+        Self::with(place, "20", &[])
+    }
+
+    pub(crate) fn with(place: &str, speed: &str, more: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
-            .args(["simulate", "layout", "--station", place, "--speed", "20", "--trains", "24"])
+            .args(["simulate", "layout", "--station", place, "--speed", speed, "--trains", "24"])
+            .args(more)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

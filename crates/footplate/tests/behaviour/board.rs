@@ -1,0 +1,111 @@
+//! A train behind a DCC-EX board is calibrated and stopped where it should; the truth is the simulated world's.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::program::{Run, footplate};
+use crate::station::Standing;
+
+const LINK: &str = "sim:track-a?faults=none&trains=24&station=dcc-ex&seed=";
+
+/// Stops at two places of one circuit.
+const SCRIPT: &str = "\
+turnout all straight
+speed 24 9
+wait 24 located
+stop 24
+wait 24 at rest
+stop 24 at C13+120mm
+stop 24 at E7+200mm
+stop 24 at C13+120mm
+stop 24 at E7+200mm
+stop 24 at C13+120mm
+stop 24 at E7+200mm
+";
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("board").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    folder
+}
+
+/// A folder with the store of a train that was calibrated for five minutes behind the simulated board of a seed.
+fn calibrated(name: &str, seed: u64) -> PathBuf {
+    let folder = folder(name);
+    let (link, store) = (format!("{LINK}{seed}"), folder.join("railway.db").display().to_string());
+    let over = ["--link", &link, "--layout", "track-a", "--store", &store];
+    let calibrated = footplate(&[&["calibrate", "--train", "24", "--budget", "5m"], &over[..]].concat());
+    assert_eq!(calibrated.status, 0, "{}{}", calibrated.output, calibrated.errors);
+    folder
+}
+
+/// Has a script carried out over a link, and returns what came of its stops.
+fn driven(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
+    let [store, file] = ["railway.db", "script.txt"].map(|file| folder.join(file).display().to_string());
+    std::fs::write(&file, script).expect("a test file");
+    let over = ["--link", link, "--layout", "track-a", "--store", &store];
+    let run = footplate(&[&["drive", "--script", &file, "--json"], &over[..]].concat());
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    let lines = run.output.lines().map(|line| serde_json::from_str(line).expect(line));
+    let stops = lines.filter(|line: &Value| !line["target"].is_null()).collect();
+    (run, stops)
+}
+
+#[test]
+fn a_train_is_calibrated_and_stops_where_it_should() {
+    let mut errors: Vec<f64> = Vec::new();
+    let mut broken = 0;
+    // Worlds whose train faces the way of the script's places.
+    for seed in [7, 10, 11] {
+        let folder = calibrated(&format!("truth-{seed}"), seed);
+        for stop in driven(&folder, &format!("{LINK}{seed}"), SCRIPT).1 {
+            let number = |field: &str| stop[field].as_f64().unwrap_or_else(|| panic!("{field}: {stop}"));
+            // A stop whose train was lost on its way has no error.
+            let Some(truth) = stop["true_error_mm"].as_f64() else { continue };
+            errors.push(truth.abs());
+            broken += u32::from(!(number("promised_low_mm")..=number("promised_high_mm")).contains(&truth));
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    println!("{} stops, errors in mm: {errors:.1?}, {broken} promises of 95 % broken", errors.len());
+    assert!(errors.len() >= 17, "{errors:?}");
+    assert!(errors[errors.len() / 2] < 12.0 && errors[errors.len() - 1] < 40.0, "{errors:?}");
+    assert!(broken <= 3, "{broken} of {} promises of 95 % broken", errors.len());
+}
+
+#[test]
+fn it_stops_there_over_a_network_with_messages_in_parts_and_other_text_between_them() {
+    let folder = calibrated("network", 7);
+    let quirks = ["--protocol", "dcc-ex", "--quirks", "chatter,split", "--seed", "7"];
+    let board = Standing::with("tcp:127.0.0.1:0", "5", &quirks);
+    assert!(board.address.starts_with("dcc-ex:tcp://"), "{}", board.address);
+    let doctor = footplate(&["doctor", "--link", &board.address, "--seconds", "20", "--json"]);
+    let figures: Value = serde_json::from_str(&doctor.output).expect("JSON");
+    assert_eq!(figures["sensors"].as_u64(), Some(80), "{figures}{}", doctor.errors);
+    assert_eq!(figures["identity"], "DCC-EX V-5.6.0 / SIMULATED / FOOTPLATE G-virtual");
+    let script: String = SCRIPT.lines().take(7).map(|line| format!("{line}\n")).collect();
+    let (run, stops) = driven(&folder, &board.address, &script);
+    assert_eq!(stops.len(), 2, "{}", run.output);
+    assert!(stops.iter().all(|stop| stop["achieved"].is_string()), "{}", run.output);
+    assert!(!run.errors.contains("not told") && !run.errors.contains("did not confirm"), "{}", run.errors);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_board_at_a_pseudo_terminal_is_found() {
+    let board = Standing::with("pty", "20", &["--protocol", "dcc-ex"]);
+    let doctor = footplate(&["doctor", "--link", &board.address, "--seconds", "20"]);
+    assert_eq!(doctor.status, 0, "{}{}", doctor.output, doctor.errors);
+    assert!(doctor.output.contains("0 without an answer"), "{}", doctor.output);
+}
+
+#[test]
+fn a_port_where_no_board_answers_is_said_so_with_status_2() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let link = format!("dcc-ex:tcp://{}", listener.local_addr().expect("an address"));
+    let doctor = footplate(&["doctor", "--link", &link, "--seconds", "60"]);
+    assert_eq!(doctor.status, 2, "{}", doctor.errors);
+    assert!(doctor.errors.contains("check its power, the cable and the port"), "{}", doctor.errors);
+}
