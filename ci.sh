@@ -11,6 +11,7 @@
 #   examples     the numbered examples print what is committed in testdata/examples
 #   scenarios    the tables in docs/tables are what the program and its examples print
 #   browser      a report opens in a browser: every chart drawn, dark and light, on a phone, by keyboard
+#   stations     programs of others drive trains behind our virtual stations
 #
 # And two that are never part of "every step". One drives every scorer on seeds that nobody chose, drawn from the hash of
 # the commit, prints how often happened what must not, with 95 % intervals, and fails on grief: trains that touched,
@@ -29,7 +30,7 @@ shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")"
 export PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 
-readonly ALL_STEPS=(lint test bare-metal docs examples scenarios browser)
+readonly ALL_STEPS=(lint test bare-metal docs examples scenarios browser stations)
 readonly EXPECTED_EXAMPLES=testdata/examples
 readonly TABLES=docs/tables
 readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
@@ -188,6 +189,26 @@ step_browser() {
   [[ -d $at/node_modules/axe-core ]] || npm install --silent --no-save --prefix "$at" "$PLAYWRIGHT" "$AXE"
   cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" BROWSER_AT="$at" node --test crates/footplate/tests/browser/*.test.mjs
+}
+
+# The exact versions, as above.
+readonly DCC_EX_PY=DCC-EX-py==1.0.0
+readonly DCC_EX_COMMANDS=@cloudthrottle/dcc-ex--commands@0.12.0
+
+# Two ends of our own that agree prove nothing.
+step_stations() {
+  need_compiler
+  need python3 python3
+  need node nodejs
+  need npm npm
+  local at="$TARGET/stations"
+  python3 -c "import ensurepip, venv" 2>/dev/null || need pip3-venv python3-venv
+  [[ -x $at/venv/bin/python ]] || python3 -m venv "$at/venv"
+  "$at/venv/bin/python" -c "import dcc_ex_py" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$DCC_EX_PY"
+  [[ -d $at/node_modules/@cloudthrottle ]] || npm install --silent --no-save --prefix "$at" "$DCC_EX_COMMANDS"
+  cargo build --quiet --workspace --bins --profile test
+  FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/dcc_ex_client.py
+  FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/dcc_ex_commands.mjs
 }
 
 refresh_table() {
