@@ -186,11 +186,11 @@ impl IntegerStop {
         let whole = i128::from(self.steady_time() - self.delay);
         let steady = if braking < ramp {
             let behind = braking - part(lag, (1 << POWER_BITS) - self.left(braking));
-            braking - (braking * braking / 2 - lag * behind) / ramp
+            braking - (braking * braking / 2 - lag * behind) / ramp.max(1)
         } else {
             whole - part(i128::from(self.tail), self.left(braking - ramp))
         };
-        // `clamp` could panic, of which no controller should have to hold the code.
+        // Neither `clamp` nor a divisor that may be zero: a controller need not hold the code of their panics.
         steady.min(whole).max(0)
     }
 

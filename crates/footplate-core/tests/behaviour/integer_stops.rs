@@ -1,4 +1,5 @@
 //! A stop in integers decides as the one in floating point does: in a million drawn situations, and at the ends of all ranges.
+#![expect(clippy::expect_used, reason = "drawn situations are within all ranges")]
 
 use footplate_core::kinematics::{
     Braking, FromCommand, IntegerStop, IntegerStopError, Lag, Motion, RampedLag, StoppingLaw,
