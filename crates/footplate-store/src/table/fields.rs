@@ -11,16 +11,12 @@ pub(crate) struct Fields {
     ends: Vec<usize>,
     /// Where the parser writes, kept for the next line.
     parsed: Vec<u8>,
+    separator: u8,
 }
 
 impl Default for Fields {
     fn default() -> Self {
-        Self {
-            parser: ReaderBuilder::new().terminator(Terminator::Any(b'\n')).build(),
-            text: String::new(),
-            ends: Vec::new(),
-            parsed: Vec::new(),
-        }
+        Self::separated_by(b',')
     }
 }
 
@@ -31,6 +27,12 @@ pub(crate) enum SplitError {
 }
 
 impl Fields {
+    /// Fields with this ASCII character between them.
+    pub(crate) fn separated_by(separator: u8) -> Self {
+        let parser = ReaderBuilder::new().delimiter(separator).terminator(Terminator::Any(b'\n')).build();
+        Self { parser, text: String::new(), ends: Vec::new(), parsed: Vec::new(), separator }
+    }
+
     /// Splits a line that ends with a line feed.
     pub(crate) fn split(&mut self, line: &[u8]) -> Result<(), SplitError> {
         self.text.clear();
@@ -40,9 +42,9 @@ impl Fields {
         if text.trim().is_empty() {
             return Ok(());
         }
-        // Unquoting only removes bytes, and a line of n commas has at most n + 1 fields.
+        // Unquoting only removes bytes, and a line of n separators has at most n + 1 fields.
         self.parsed.resize(line.len(), 0);
-        self.ends.resize(line.iter().filter(|byte| **byte == b',').count() + 1, 0);
+        self.ends.resize(line.iter().filter(|byte| **byte == self.separator).count() + 1, 0);
         self.parser.reset();
         let (result, _, written, fields) = self.parser.read_record(line, &mut self.parsed, &mut self.ends);
         self.ends.truncate(fields);

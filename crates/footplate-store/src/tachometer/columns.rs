@@ -63,7 +63,8 @@ pub(super) enum Slot {
     Unused,
 }
 
-const KNOWN: [(&str, Slot); 17] = [
+/// What our columns are called.
+pub(super) const KNOWN: [(&str, Slot); 17] = [
     ("t_s", Slot::Time),
     ("pulses_1", Slot::Pulses(0)),
     ("pulses_2", Slot::Pulses(1)),

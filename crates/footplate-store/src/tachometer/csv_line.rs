@@ -16,7 +16,7 @@ const LARGEST_EXACT: f64 = (1_u64 << 53) as f64;
 /// Splits lines and reads what is in them.
 #[derive(Default)]
 pub(super) struct LineReader {
-    fields: Fields,
+    pub(super) fields: Fields,
 }
 
 /// The line that is being read.
@@ -29,6 +29,11 @@ pub(super) struct Line<'l> {
 }
 
 impl LineReader {
+    /// Reads lines with this ASCII character between fields.
+    pub(super) fn separated_by(separator: u8) -> Self {
+        Self { fields: Fields::separated_by(separator) }
+    }
+
     /// The fields of a header; none if the line is empty.
     pub(super) fn header(&mut self, line: Line<'_>) -> Result<Vec<String>, TableError> {
         self.split(line)?;
@@ -77,7 +82,8 @@ impl LineReader {
         Ok(true)
     }
 
-    fn split(&mut self, line: Line<'_>) -> Result<(), TableError> {
+    /// Splits a line into `fields`; none if it is empty.
+    pub(super) fn split(&mut self, line: Line<'_>) -> Result<(), TableError> {
         let (file, number) = (line.file.to_owned(), line.number);
         self.fields.split(line.bytes).map_err(|error| match error {
             SplitError::NotText { byte } => TableError::NotText { file, line: number, byte },
@@ -87,7 +93,7 @@ impl LineReader {
 }
 
 /// Adds one field to the block, or says what would be right.
-fn read_field(
+pub(super) fn read_field(
     slot: Slot,
     text: &str,
     runs: &mut RunNames,
@@ -131,7 +137,7 @@ fn read_field(
     Ok(())
 }
 
-fn is_missing(text: &str) -> bool {
+pub(super) fn is_missing(text: &str) -> bool {
     text.is_empty() || text.eq_ignore_ascii_case("nan")
 }
 

@@ -22,6 +22,35 @@ pub enum TachometerError {
         /// What is missing.
         missing: Vec<&'static str>,
     },
+    /// Columns that no recording can do without, even with a mapping.
+    #[error(
+        "{file}: no column is mapped to {}; the header names {found} (docs/formats/column-mapping.md)",
+        missing.join(" and to ")
+    )]
+    MappedColumns {
+        /// The file.
+        file: String,
+        /// What the header names, shortened if long.
+        found: String,
+        /// What is missing.
+        missing: Vec<&'static str>,
+    },
+    /// A mapping that does not fit the file.
+    #[error("{file}: {problem}")]
+    Mapping {
+        /// The file, and the line if it is of one.
+        file: String,
+        /// What does not fit, and what to do.
+        problem: String,
+    },
+    /// A mapping for a file that has its units and types in itself.
+    #[error(
+        "{file}: columns of Parquet files cannot be mapped; rename them where the file is written, or write CSV"
+    )]
+    MappedParquet {
+        /// The file.
+        file: String,
+    },
     /// There is a header and nothing below it.
     #[error("{file}: no rows below the header; a recording has at least one")]
     NoRows {

@@ -45,6 +45,8 @@ pub enum TachometerOddity {
         /// 1 or 2.
         wheelset: usize,
     },
+    /// Wheels are recorded as speeds, which are added up to pulses.
+    SpeedsAddedUp,
     /// A row has the time of the row before it.
     TimeStoodStill,
     /// A row is earlier than the row before it.
@@ -79,6 +81,10 @@ impl fmt::Display for TachometerOddity {
             Self::CountedTwice { wheelset } => {
                 write!(f, "counter_{wheelset} is not used, because pulses_{wheelset} is there")
             }
+            Self::SpeedsAddedUp => write!(
+                f,
+                "wheel speeds are added up to pulses; bounds of the distance hold as far as these speeds and times are exact"
+            ),
             Self::TimeStoodStill => write!(f, "t_s is that of the row before it"),
             Self::TimeWentBack { by } => write!(f, "t_s goes back by {} s", by.as_s()),
             Self::Gap { lasting } => write!(f, "{} s have passed since the row before it", lasting.as_s()),

@@ -5,10 +5,13 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use footplate_core::wheels::Vehicle;
+
 use super::block::TachometerBlock;
 use super::columns::TachometerColumns;
 use super::csv::CsvReader;
 use super::error::TachometerError;
+use super::mapping::{ColumnMapping, MappedReader};
 use super::parquet::{PARQUET_MAGIC, ParquetReader};
 use crate::table::TableError;
 
@@ -21,6 +24,7 @@ pub struct TachometerReader {
 enum Form {
     Csv(Box<CsvReader<Box<dyn Read + Send>>>),
     Parquet(Box<ParquetReader>),
+    Mapped(Box<MappedReader>),
 }
 
 impl TachometerReader {
@@ -70,6 +74,45 @@ impl TachometerReader {
         Self::csv(name, Box::new(whole), None)
     }
 
+    /// Opens a CSV file at `path` whose columns a mapping names; wheel speeds become pulses of this vehicle.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and where the mapping does not fit the file.
+    pub fn open_mapped(
+        path: &Path,
+        mapping: &ColumnMapping,
+        vehicle: &Vehicle,
+    ) -> Result<Self, TachometerError> {
+        let file = path.display().to_string();
+        let opened = File::open(path).and_then(|input| {
+            let about = input.metadata()?;
+            if about.is_dir() { Err(io::Error::other("it is a folder")) } else { Ok((input, about)) }
+        });
+        let (input, about) = opened.map_err(|source| TableError::Read { file: file.clone(), source })?;
+        let reader = Self::mapped_stream(&file, Box::new(input), mapping, vehicle)?;
+        Ok(Self { extent: about.is_file().then_some(about.len()), ..reader })
+    }
+
+    /// Reads such a file from an input that comes as it likes. `name` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`open_mapped`](Self::open_mapped).
+    pub fn mapped_stream(
+        name: &str,
+        mut input: Box<dyn Read + Send>,
+        mapping: &ColumnMapping,
+        vehicle: &Vehicle,
+    ) -> Result<Self, TachometerError> {
+        let unreadable = |source| TableError::Read { file: name.to_owned(), source };
+        let begin = beginning(&mut input).map_err(unreadable)?;
+        if begin == PARQUET_MAGIC {
+            return Err(TachometerError::MappedParquet { file: name.to_owned() });
+        }
+        let whole = Box::new(io::Cursor::new(begin).chain(input));
+        let reader = MappedReader::open(name, whole, mapping, vehicle)?;
+        Ok(Self { form: Form::Mapped(Box::new(reader)), extent: None })
+    }
+
     fn csv(name: &str, input: Box<dyn Read + Send>, extent: Option<u64>) -> Result<Self, TachometerError> {
         Ok(Self { form: Form::Csv(Box::new(CsvReader::open(name, input)?)), extent })
     }
@@ -85,6 +128,7 @@ impl TachometerReader {
         match &self.form {
             Form::Csv(reader) => reader.columns(),
             Form::Parquet(reader) => reader.columns(),
+            Form::Mapped(reader) => reader.columns(),
         }
     }
 
@@ -102,6 +146,7 @@ impl TachometerReader {
     pub fn read_block(&mut self, block: &mut TachometerBlock) -> Result<bool, TachometerError> {
         match &mut self.form {
             Form::Csv(reader) => reader.read_block(block),
+            Form::Mapped(reader) => reader.read_block(block),
             Form::Parquet(reader) => {
                 let name = reader.file().to_owned();
                 guarded(&name, || reader.read_block(block))
