@@ -4,6 +4,7 @@
 //! [`Recording`]. [`score`] walks one and says how good the forecasts of it are. What was measured is
 //! kept for ever in a [`Store`].
 
+pub mod accelerometer;
 mod batch;
 mod content_hash;
 mod decimal;
@@ -72,8 +73,8 @@ pub use store::{
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{
-    RowPlace, TachometerBlock, TachometerColumns, TachometerError, TachometerNote, TachometerOddity,
-    TachometerReader, TachometerWriter, TimeFaults, Truth, WrittenColumns,
+    ColumnMapping, MappingError, RowPlace, TachometerBlock, TachometerColumns, TachometerError,
+    TachometerNote, TachometerOddity, TachometerReader, TachometerWriter, TimeFaults, Truth, WrittenColumns,
 };
 pub use taped_moves::{TapedMoves, TapedMovesError};
 pub use train_file::{TrainFile, TrainFileForm, parse_train, read_train, write_train};

@@ -1,5 +1,6 @@
 //! What the store promises, a file a promise.
 
+mod accelerometer_recordings;
 mod bad_layouts;
 mod bad_logs;
 mod bad_tachometer_recordings;
@@ -15,6 +16,7 @@ mod journal_survives;
 mod layout_tables;
 mod layouts_of_any_text;
 mod logs_round_trip;
+mod mapped_recordings;
 mod metro_trips;
 mod models_of_logs;
 mod no_look_ahead;

@@ -20,6 +20,6 @@ pub use axis_alignment::{AxisAlignment, ForwardAxis};
 pub use high_pass::HighPassRestorer;
 pub use inertial_bounds::{InertialBounds, InertialLimits};
 pub use inertial_filter::{InertialFilter, InertialNoise, SpeedInnovation};
-pub use standstill::{DriftLimits, Standing, StandstillDetector};
+pub use standstill::{DriftLimits, Standing, StandstillDetector, StandstillThresholds};
 pub use trip::{RunningTrip, Trip, TripRecorder};
 pub use trip_closure::{BiasWalk, TripClosure};

@@ -14,19 +14,12 @@ use crate::time::Timestamp;
 pub(super) const WATCHED: usize = 15;
 /// Over so many of the latest blocks an acceleration has to last to be a departure: 0.5 s.
 pub(super) const DEPARTING: usize = 5;
-/// A standing train trembles less than this part of what is usual while it runs. Measured on three trips of a metro: 0.3
-/// misses stops, 0.5 takes one slow stretch for a stop.
-const QUIET: f64 = 0.45;
-/// A train trembles as a running one does from this part of it on.
-const LOUD: f64 = 0.8;
 /// What is usual before anything was learnt (m/s²). Measured in a metro: 0.17 to 0.26.
 const USUAL: f64 = 0.2;
 /// What is usual is followed by at most one e-fold in this time (s), which makes it the median.
 const USUAL_FOLLOWS_S: f64 = 40.0;
 /// Jerk below which an acceleration is steady (m/s³). Chosen: an eighth of the jerk of comfortable driving.
 const STEADY_JERK: f64 = 0.12;
-/// Acceleration that is a departure (m/s²). Chosen: half of what a full-size train starts with on a bad day.
-const DEPARTURE: f64 = 0.2;
 /// While a train stands, what is read is followed as offset within this time (s).
 const OFFSET_FOLLOWS_S: f64 = 1.0;
 /// A speed up to this counts as none, drift apart (m/s).
@@ -64,6 +57,25 @@ impl DriftLimits {
     }
 }
 
+/// What tells a standing train from a running one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StandstillThresholds {
+    /// A standing train trembles less than this part of what is usual while it runs.
+    pub quiet: f64,
+    /// A train trembles as a running one does from this part of it on.
+    pub loud: f64,
+    /// Acceleration that is a departure (m/s²).
+    pub departure_m_per_s2: f64,
+}
+
+impl Default for StandstillThresholds {
+    /// Measured on three trips of a metro: quiet below 0.45 (0.3 misses stops, 0.5 takes one slow stretch for a stop), loud from
+    /// 0.8 on. Departures are chosen: half of what a full-size train starts with on a bad day.
+    fn default() -> Self {
+        Self { quiet: 0.45, loud: 0.8, departure_m_per_s2: 0.2 }
+    }
+}
+
 /// Whether the train stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
@@ -79,6 +91,7 @@ pub enum Standing {
 #[derive(Debug, Clone)]
 pub struct StandstillDetector {
     drift: DriftLimits,
+    thresholds: StandstillThresholds,
     /// The latest blocks, the newest last.
     blocks: [Option<AccelerationBlock>; WATCHED],
     standing: Standing,
@@ -95,8 +108,15 @@ impl StandstillDetector {
     /// Has seen nothing yet.
     #[must_use]
     pub fn new(drift: DriftLimits) -> Self {
+        Self::with_thresholds(drift, StandstillThresholds::default())
+    }
+
+    /// The same with thresholds of its own.
+    #[must_use]
+    pub fn with_thresholds(drift: DriftLimits, thresholds: StandstillThresholds) -> Self {
         Self {
             drift,
+            thresholds,
             blocks: [None; WATCHED],
             standing: Standing::Unknown,
             offset: 0.0,
@@ -147,7 +167,7 @@ impl StandstillDetector {
         let possible = self.running.is_none_or(|seconds| {
             self.speed.abs() < self.drift.speed(seconds) && off.abs() < self.drift.acceleration(seconds)
         });
-        if possible && window.tremor < QUIET * self.usual && window.jerk.abs() < STEADY_JERK {
+        if possible && window.tremor < self.thresholds.quiet * self.usual && window.jerk.abs() < STEADY_JERK {
             self.standing = Standing::Since(window.start);
             self.offset = window.along;
             self.running = None;
@@ -159,7 +179,8 @@ impl StandstillDetector {
 
     fn watch_standing(&mut self, window: &Window) {
         let departing = window.latest_along - self.offset;
-        if departing.abs() > DEPARTURE || window.tremor > LOUD * self.usual {
+        let StandstillThresholds { loud, departure_m_per_s2, .. } = self.thresholds;
+        if departing.abs() > departure_m_per_s2 || window.tremor > loud * self.usual {
             self.standing = Standing::LeftAt(window.latest_start);
             self.running = Some(window.latest_lasted);
             self.speed = departing * window.latest_lasted;

@@ -3,7 +3,9 @@
 //! Everything that is needed of a trip is a sum, so that nothing is kept but the sums.
 
 use super::acceleration_block::AccelerationBlock;
-use super::standstill::{DEPARTING, DriftLimits, Standing, StandstillDetector, WATCHED};
+use super::standstill::{
+    DEPARTING, DriftLimits, Standing, StandstillDetector, StandstillThresholds, WATCHED,
+};
 use super::trip_closure::{BiasWalk, TripClosure};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Acceleration, Length, Speed};
@@ -62,8 +64,14 @@ impl TripRecorder {
     /// Has seen nothing yet.
     #[must_use]
     pub fn new(drift: DriftLimits) -> Self {
+        Self::with_thresholds(drift, StandstillThresholds::default())
+    }
+
+    /// The same with thresholds of its own.
+    #[must_use]
+    pub fn with_thresholds(drift: DriftLimits, thresholds: StandstillThresholds) -> Self {
         Self {
-            detector: StandstillDetector::new(drift),
+            detector: StandstillDetector::with_thresholds(drift, thresholds),
             running: None,
             settling: 0,
             walk: BiasWalk::default(),
