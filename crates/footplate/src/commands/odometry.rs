@@ -1,6 +1,7 @@
 //! `footplate odometry`: tachometer recordings to speed, distance and bounds that hold.
 
 mod block_stream;
+mod imu;
 pub(super) mod json;
 mod recording;
 mod report;
@@ -16,12 +17,12 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use footplate_store::odometry::{Preset, RunContext};
-use footplate_store::{default_vehicle, read_vehicle};
+use footplate_store::{ColumnMapping, default_vehicle, read_vehicle};
 
 use super::Outcome;
 use super::plot::PictureFile;
 use super::web_page::Language;
-use recording::{OpenRecording, WalkedRecording};
+use recording::{Mapped, OpenRecording, WalkedRecording};
 use results::Results;
 pub(super) use uploaded::uploaded_page;
 use walked::Walked;
@@ -39,7 +40,9 @@ pub(super) use watched_slide::WatchedSlide;
     after_help = "Example: footplate odometry run.csv --vehicle train.toml --score --out result.parquet\n\
                   Charts:  footplate odometry run.csv --vehicle train.toml --report run.html\n\
                   Picture: footplate odometry run.csv --vehicle train.toml --plot run.svg\n\
-                  Live:    tachometer | footplate odometry - --out -\n\n\
+                  Live:    tachometer | footplate odometry - --out -\n\
+                  Phone:   footplate odometry --imu trip_accel.csv --score\n\
+                  Foreign: footplate odometry drive.csv --vehicle tram.toml --map t_ms=time --map speed_1_km_h=v1\n\n\
                   Exit status: 0 done, 1 the truth left the guaranteed bounds (--score), a claim of the
                   vehicle file does not hold, or there is no vehicle file, 2 wrong usage or input."
 )]
@@ -51,6 +54,13 @@ pub(crate) struct Arguments {
     /// wheelsets of 80 teeth, and the exit status is 1.
     #[arg(long, value_name = "V.toml")]
     vehicle: Option<PathBuf>,
+    /// Which column holds what, where they have other names, units or separators than ours (CSV only): our name=theirs, as in
+    /// speed_1_km_h=v1; also separator, decimal and period_s (docs/formats/column-mapping.md).
+    #[arg(long, value_name = "NAME=COLUMN")]
+    map: Vec<String>,
+    /// The same pairs in a TOML file; pairs of the command line replace them.
+    #[arg(long, value_name = "M.toml")]
+    map_file: Option<PathBuf>,
     /// Which of the ways to estimate.
     #[arg(long, value_enum, default_value_t = PresetName::Recommended)]
     preset: PresetName,
@@ -69,6 +79,13 @@ pub(crate) struct Arguments {
     /// Draw the first run to this file, SVG or PNG by its ending.
     #[arg(long, value_name = "FILE")]
     plot: Option<PictureFile>,
+    /// The files are recordings of an accelerometer alone: find standstills and the hops between them
+    /// (docs/formats/accelerometer-recording.md). With `--score`, beside the stops marked in `x_stops.csv`.
+    #[arg(long, conflicts_with_all = ["vehicle", "map", "map_file", "out", "report", "plot"])]
+    imu: bool,
+    /// With --imu --score: print the score as a table for documentation.
+    #[arg(long, requires_all = ["imu", "score"], conflicts_with = "json")]
+    markdown: bool,
     /// Compare with the truth that the recording holds.
     #[arg(long)]
     score: bool,
@@ -112,6 +129,14 @@ const STANDARD: &str = "-";
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if self.imu {
+            let style = match (self.json, self.markdown) {
+                (true, _) => imu::Style::Json,
+                (_, true) => imu::Style::Markdown,
+                _ => imu::Style::Text,
+            };
+            return imu::run(&self.files, self.score, style, output);
+        }
         let to_standard = self.out.as_ref().is_some_and(|out| out.as_os_str() == STANDARD);
         if to_standard && (self.json || self.score) {
             bail!(
@@ -128,7 +153,8 @@ impl Arguments {
         let preset = Preset::from(self.preset);
         let context =
             RunContext { vehicle: vehicle.vehicle, preset, score: self.score, confidence: self.confidence };
-        let recordings = self.walk(&context, output)?;
+        let mapping = self.mapping()?;
+        let recordings = self.walk(&context, mapping.as_ref(), output)?;
         let walked = Walked {
             vehicle: vehicle.name,
             preset,
@@ -160,15 +186,36 @@ impl Arguments {
         Ok(outcome)
     }
 
+    /// What the columns are called, if that is said.
+    fn mapping(&self) -> anyhow::Result<Option<ColumnMapping>> {
+        if self.map.is_empty() && self.map_file.is_none() {
+            return Ok(None);
+        }
+        let mut mapping = ColumnMapping::default();
+        if let Some(file) = &self.map_file {
+            mapping.take_file(file)?;
+        }
+        for pair in &self.map {
+            mapping.take_pair(pair)?;
+        }
+        Ok(Some(mapping))
+    }
+
     /// Walks all recordings and writes what was asked for of their estimates.
-    fn walk(&self, context: &RunContext, output: &mut dyn Write) -> anyhow::Result<Vec<WalkedRecording>> {
+    fn walk(
+        &self,
+        context: &RunContext,
+        mapping: Option<&ColumnMapping>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<Vec<WalkedRecording>> {
         let mut output = Some(output);
         let mut results = None;
         let is_drawn = self.report.is_some() || self.plot.is_some();
         let mut charts_left = if is_drawn { report::MOST_RUNS } else { 0 };
         let mut walked = Vec::new();
         for file in &self.files {
-            let recording = OpenRecording::open(file, self.score)?;
+            let mapped = mapping.map(|mapping| Mapped { mapping, vehicle: &context.vehicle });
+            let recording = OpenRecording::open(file, self.score, mapped)?;
             if let (Some(out), Some(output)) = (&self.out, output.take()) {
                 let with_runs = self.files.len() > 1 || recording.has_run_ids();
                 results = Some(Results::begin(out, output, with_runs)?);

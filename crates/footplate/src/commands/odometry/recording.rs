@@ -5,8 +5,9 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use anyhow::bail;
+use footplate_core::wheels::Vehicle;
 use footplate_store::odometry::{OdometryRun, RunContext};
-use footplate_store::{TachometerBlock, TachometerNote, TachometerReader, TimeFaults};
+use footplate_store::{ColumnMapping, TachometerBlock, TachometerNote, TachometerReader, TimeFaults};
 
 use super::STANDARD;
 use super::block_stream::each_block;
@@ -18,6 +19,14 @@ use crate::progress::with_progress;
 pub(super) struct OpenRecording {
     file: String,
     reader: TachometerReader,
+}
+
+/// How a recording with columns of other names is read.
+#[derive(Clone, Copy)]
+pub(super) struct Mapped<'m> {
+    pub(super) mapping: &'m ColumnMapping,
+    /// Whose wheels turn the recorded speeds.
+    pub(super) vehicle: &'m Vehicle,
 }
 
 /// What a recording comes to.
@@ -45,13 +54,18 @@ pub(super) struct WalkedRun {
 
 impl OpenRecording {
     /// Opens a recording; with `score`, one that holds the truth.
-    pub(super) fn open(path: &Path, score: bool) -> anyhow::Result<Self> {
+    pub(super) fn open(path: &Path, score: bool, mapped: Option<Mapped<'_>>) -> anyhow::Result<Self> {
         let is_standard = path.as_os_str() == STANDARD;
         let file = if is_standard { "standard input".to_owned() } else { path.display().to_string() };
-        let reader = if is_standard {
-            TachometerReader::of_stream(&file, Box::new(io::stdin()))?
-        } else {
-            TachometerReader::open(path)?
+        let reader = match (mapped, is_standard) {
+            (None, true) => TachometerReader::of_stream(&file, Box::new(io::stdin()))?,
+            (None, false) => TachometerReader::open(path)?,
+            (Some(Mapped { mapping, vehicle }), true) => {
+                TachometerReader::mapped_stream(&file, Box::new(io::stdin()), mapping, vehicle)?
+            }
+            (Some(Mapped { mapping, vehicle }), false) => {
+                TachometerReader::open_mapped(path, mapping, vehicle)?
+            }
         };
         let recording = Self { file, reader };
         if score && !recording.has_truth() {

@@ -70,7 +70,7 @@ fn walked_page(
     language: Language,
 ) -> anyhow::Result<String> {
     let preset = Preset::Recommended;
-    let recording = OpenRecording::open(path, false)?;
+    let recording = OpenRecording::open(path, false, None)?;
     let context = RunContext::new(vehicle.vehicle, preset, recording.has_truth());
     let mut charts_left = MOST_RUNS;
     let recordings = vec![recording.walk(&context, None, &mut charts_left)?];
