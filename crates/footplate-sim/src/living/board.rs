@@ -170,7 +170,10 @@ impl<'l> VirtualBoard<'l> {
         self.world.power(false, now);
         self.world.forget_all_told();
         self.slots.clear();
-        (self.buffer.clear(), self.replies.clear(), self.pushes.clear(), self.outgoing.clear());
+        self.buffer.clear();
+        self.replies.clear();
+        self.pushes.clear();
+        self.outgoing.clear();
         self.framing = Framing::default();
         self.busy_until = now;
         self.dark_until = Some(now + BOOT);

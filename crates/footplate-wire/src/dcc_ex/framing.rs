@@ -35,7 +35,7 @@ impl Framing {
         match self.place {
             Place::Outside if byte == b'<' => self.begin(),
             Place::Outside => {
-                self.unread = self.unread.saturating_add(usize::from(!byte.is_ascii_whitespace()))
+                self.unread = self.unread.saturating_add(usize::from(!byte.is_ascii_whitespace()));
             }
             Place::Message if byte == b'>' => {
                 self.place = Place::Outside;

@@ -55,6 +55,7 @@ pub struct Client {
 }
 
 /// A request that is about to be written.
+#[derive(Clone, Copy)]
 struct Outgoing {
     request: Request,
     awaited: Option<Awaited>,
@@ -185,11 +186,12 @@ impl Client {
             if command.is_some_and(|command| self.waiting.outdates(command)) {
                 continue;
             }
-            if tries >= MOST_TRIES && !due.is_urgent() {
-                if let Some(command) = command {
-                    self.notify(LinkNotice::Unconfirmed { command });
-                    continue;
-                }
+            if tries >= MOST_TRIES
+                && !due.is_urgent()
+                && let Some(command) = command
+            {
+                self.notify(LinkNotice::Unconfirmed { command });
+                continue;
             }
             if let Some(command) = command {
                 self.notify(LinkNotice::Repeated { command });

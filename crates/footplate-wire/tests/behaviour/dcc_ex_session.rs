@@ -78,7 +78,7 @@ impl Desk {
                     }
                     Transmit::Event(event) => self.events.push(event),
                     Transmit::Notice(notice) => self.notices.push(notice),
-                    Transmit::Byte(byte) => panic!("a lone byte {byte}"),
+                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
                 }
             }
             let next = [coming.first().map(|(at, _)| *at), self.client.next_timeout()];

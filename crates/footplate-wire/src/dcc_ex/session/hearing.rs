@@ -1,7 +1,6 @@
 //! What becomes of the messages that come.
 
 use alloc::borrow::ToOwned;
-use alloc::string::String;
 
 use footplate_core::{Command, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
@@ -50,14 +49,14 @@ impl Client {
             self.hear_power(on);
         }
         match reply {
-            Reply::Identity(identity) => self.identified(now, identity, answered.is_some()),
+            Reply::Identity(identity) => self.identified(now, identity.trim(), answered.is_some()),
             Reply::Locomotive { cab, register, throttle, forward, .. } => {
                 let driven =
                     matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..)));
                 self.hear_of_locomotive(TrainId(cab), Driven { register, throttle, forward }, driven);
             }
             Reply::Turnout { id, thrown } => {
-                self.hear_of_turnout(now, TurnoutId(id), thrown, answered.is_some())
+                self.hear_of_turnout(now, TurnoutId(id), thrown, answered.is_some());
             }
             Reply::Sensor { id, active } => self.hear_of_sensor(now, id, active),
             Reply::Slots(_) if matches!(&self.opening, Opening::States(requests) if requests.is_empty()) => {
@@ -73,12 +72,11 @@ impl Client {
         self.end_if_confirmed();
     }
 
-    fn identified(&mut self, now: Timestamp, identity: String, was_asked: bool) {
-        let identity = identity.trim().to_owned();
+    fn identified(&mut self, now: Timestamp, identity: &str, was_asked: bool) {
         match &self.opening {
             Opening::Banner { .. } | Opening::Identity => {
                 let was_reset = self.opening.awaits_banner() && self.locomotives.iter().next().is_some();
-                self.notify(LinkNotice::Identified { identity });
+                self.notify(LinkNotice::Identified { identity: identity.to_owned() });
                 if was_reset {
                     self.restarted();
                 }
