@@ -35,6 +35,7 @@ impl Dispatcher {
                     // What it was granted is long behind it.
                     known.held = Footprint::empty();
                     known.kept = Footprint::empty();
+                    known.seen_since_start = true;
                 }
                 self.halted(now, *train, true);
             }

@@ -85,6 +85,8 @@ pub(super) struct DispatchedTrain {
     pub(super) no_room_until: Timestamp,
     /// Whether a contact has reported it since it turned around, or since a person put it there.
     pub(super) seen_since_turn: bool,
+    /// Whether a contact has reported it since it set out last. Until then it may not have left at all: starts get stuck on dirt.
+    pub(super) seen_since_start: bool,
     /// It was not seen where it should have been, and ahead of it there is nowhere to be seen: it is looked for behind.
     pub(super) looks_back: bool,
     /// How long it would take from where it stands if nobody were in its way, in seconds; `None` until it was looked for.
@@ -120,6 +122,7 @@ impl DispatchedTrain {
             rooms_made: 0,
             no_room_until: Timestamp::ZERO,
             seen_since_turn: false,
+            seen_since_start: true,
             looks_back: false,
             unobstructed_s: None,
             caution: 1.0,

@@ -167,6 +167,7 @@ impl Dispatcher {
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
             known.seen_since_turn = false;
+            known.seen_since_start = true;
             known.course.clear();
             known.unobstructed_s = None;
             known.held = Footprint::empty();

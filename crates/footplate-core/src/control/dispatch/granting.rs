@@ -188,7 +188,7 @@ impl Dispatcher {
         let mut near = self.driver.turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
         let looks_back = train.looks_back;
-        if looks_back {
+        if looks_back || !train.seen_since_start {
             near.extend(train.held.turnouts());
         }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();

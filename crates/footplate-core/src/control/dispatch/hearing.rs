@@ -32,6 +32,7 @@ impl Dispatcher {
             DriveNotice::Passed { train, passed, .. } => {
                 if let Some(train) = self.trains.get_mut(train) {
                     train.seen_since_turn = true;
+                    train.seen_since_start = true;
                 }
                 let node = self.driver.layout().sensor_node(passed.sensor);
                 let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));

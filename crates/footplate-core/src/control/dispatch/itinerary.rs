@@ -29,6 +29,9 @@ pub(super) struct Pace {
     pub(super) turn_s: f64,
 }
 
+/// How far beyond a contact a train stops that has only gone there to be seen.
+const PAST_CONTACT: Length = Length::from_mm(60.0);
+
 /// A run without turning around: edges from the one it begins on to the one it ends on.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Run {
@@ -179,13 +182,20 @@ impl<'a> Search<'a> {
         self.layout.node(node).is_some_and(|node| matches!(node.kind, NodeKind::Merge(_)))
     }
 
+    fn is_contact(&self, node: NodeId) -> bool {
+        self.layout.node(node).is_some_and(|node| matches!(node.kind, NodeKind::Sensor(_)))
+    }
+
     /// Ways beyond a node, as a turnout that was met from a leg, each long enough to come back.
     fn shunt(&self, reached: &mut Reached<'_>, at: Open, needs: &[TurnoutNeed], open: &mut BinaryHeap<Open>) {
         let mut paths: Vec<(Vec<EdgeId>, NodeId, Length, f64)> =
             vec![(Vec::new(), at.node, self.clears, 0.0)];
-        let is_contact =
-            self.layout.node(at.node).is_some_and(|node| matches!(node.kind, NodeKind::Sensor(_)));
-        let is_sure = is_contact || self.is_merge(at.node);
+        let is_sure = self.is_contact(at.node) || self.is_merge(at.node);
+        // Without a contact on the way nobody knows whether it has left at all, and nothing is thrown behind it.
+        let is_seen = |path: &[EdgeId]| {
+            path.iter().filter_map(|id| self.layout.edge(*id)).any(|edge| self.is_contact(edge.to))
+        };
+        let is_seen_before = reached.run_to(at.node).is_some_and(|(edges, _)| is_seen(&edges));
         let mut looked_at = 0;
         while let Some((path, node, left, cost)) = paths.pop() {
             looked_at += 1;
@@ -194,15 +204,18 @@ impl<'a> Search<'a> {
             }
             for id in self.layout.ways(node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(needs, id)) else { continue };
+                let seen = is_seen_before || is_seen(&path);
                 // Where it only backs away it comes over turnouts only behind a contact, which says where it is.
-                if !is_sure && !self.is_plain(id) {
+                if !is_sure && !seen && !self.is_plain(id) {
                     continue;
                 }
-                let Some(more) = self.seconds(id, Length::ZERO, edge.length.min(left)) else { continue };
+                let goes_on = edge.length < left || !seen;
+                let run = if goes_on { edge.length } else { left };
+                let Some(more) = self.seconds(id, Length::ZERO, run) else { continue };
                 let mut longer = path.clone();
                 longer.push(id);
-                if edge.length < left {
-                    paths.push((longer, edge.to, left - edge.length, cost + more));
+                if goes_on {
+                    paths.push((longer, edge.to, (left - edge.length).max(PAST_CONTACT), cost + more));
                     continue;
                 }
                 let stop = Position { edge: id, offset: left };

@@ -168,6 +168,7 @@ impl Dispatcher {
                 self.set_state(id, State::Running { order, rear, confirmed: false });
                 if let Some(train) = self.trains.get_mut(&id) {
                     train.withdrawn = 0;
+                    train.seen_since_start = false;
                 }
                 self.hold(now, id);
             }
@@ -221,7 +222,9 @@ impl Dispatcher {
             train.unobstructed_s = None;
         }
         self.driver.set_limit(now, id, None);
-        if is_sure && confirmed {
+        if !is_sure {
+            self.say(DispatchNotice::HeldAsUnknown { train: id });
+        } else if confirmed {
             self.stand(now, id);
         }
         self.forgive(now, id);

@@ -57,8 +57,12 @@ impl Dispatcher {
             }
             return ready <= now;
         }
+        let mut frozen = anchors;
+        if !train.seen_since_start {
+            frozen.extend(train.kept.turnouts());
+        }
         let mut held_down = self.driver.turnouts_under(id, now);
-        held_down.extend(&anchors);
+        held_down.extend(&frozen);
         if self.is_in_its_own_way(now, id, &missing, &held_down) {
             return false;
         }
@@ -69,7 +73,7 @@ impl Dispatcher {
                 continue;
             }
             let order = Order::Turnout { turnout: need.turnout, curved: need.leg.is_curved() };
-            let taken = if anchors.contains(&need.turnout) {
+            let taken = if frozen.contains(&need.turnout) {
                 Err(Refusal::TurnoutOccupied { turnout: need.turnout, train: id })
             } else {
                 self.driver.order(now, order)
