@@ -16,13 +16,17 @@ pub struct Period {
     pub acceleration: Option<Acceleration>,
     /// A known place that the train passed within this period.
     pub balise: Option<Length>,
+    /// The standard deviation of that place, where one is stated. It may then be wrong by far more, bounds nothing, and is weighed
+    /// with all others ([`StatedPlaces`](crate::estimation::odometry::StatedPlaces)) instead of by the odometer.
+    pub balise_deviation: Option<Length>,
 }
 
 impl Period {
     /// A period of which nothing is known but its end.
     #[must_use]
     pub const fn empty(time: Timestamp) -> Self {
-        Self { time, wheels: [WheelReading::MISSING; 2], effort: None, acceleration: None, balise: None }
+        let wheels = [WheelReading::MISSING; 2];
+        Self { time, wheels, effort: None, acceleration: None, balise: None, balise_deviation: None }
     }
 
     /// A period with the pulses of two tachometers and nothing else.
@@ -30,7 +34,7 @@ impl Period {
     pub const fn with_pulses(time: Timestamp, pulses: [i64; 2]) -> Self {
         let [first, second] = pulses;
         let wheels = [WheelReading::pulses(first), WheelReading::pulses(second)];
-        Self { time, wheels, effort: None, acceleration: None, balise: None }
+        Self { wheels, ..Self::empty(time) }
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod counted_way;
 mod detection;
+mod placed_run;
 mod result_rows;
 mod rival;
 mod run;

@@ -1,10 +1,15 @@
 //! One run of a train through the odometer.
 
-use footplate_core::estimation::odometry::{DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings};
+use footplate_core::Estimate;
+use footplate_core::calibration::WheelScale;
+use footplate_core::estimation::odometry::{
+    DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue,
+};
 use footplate_core::wheels::{Period, Vehicle, VehicleError};
 
 use super::counted_way::WayCounter;
 use super::detection::{FlagWatch, SlipWatch};
+use super::placed_run::PlacedRun;
 use super::rival::{Rival, RivalOdometer};
 use super::score::{Claim, OdometryScore, Scorer};
 use super::summary::RunSummary;
@@ -86,6 +91,9 @@ pub struct OdometryRun {
     odometer: Odometer,
     summary: RunSummary,
     scoring: Option<Box<Scoring>>,
+    context: RunContext,
+    /// From the first place of stated accuracy on.
+    placed: Option<Box<PlacedRun>>,
 }
 
 /// How good each estimate of a run was, or of several.
@@ -115,18 +123,49 @@ impl OdometryRun {
     pub fn new(context: &RunContext) -> Result<Self, VehicleError> {
         let odometer = Odometer::new(context.vehicle, context.settings(context.preset))?;
         let scoring = if context.score { Some(Box::new(Scoring::new(context)?)) } else { None };
-        Ok(Self { odometer, summary: RunSummary::default(), scoring })
+        let context = *context;
+        Ok(Self { odometer, summary: RunSummary::default(), scoring, context, placed: None })
     }
 
     /// Takes in the readings of one period. The truth is for the score only.
     #[inline]
     pub fn step(&mut self, period: &Period, truth: impl FnOnce() -> Truth) -> MotionEstimate {
-        let estimate = self.odometer.step(period);
+        let mut estimate = self.odometer.step(period);
+        if self.placed.is_some() || period.balise_deviation.is_some() {
+            estimate = self.place(period, &estimate);
+        }
         self.summary.see(&estimate);
         if let Some(scoring) = &mut self.scoring {
             scoring.see(period, &estimate, &truth());
         }
         estimate
+    }
+
+    #[cold]
+    fn place(&mut self, period: &Period, estimate: &MotionEstimate) -> MotionEstimate {
+        let vehicle = self.context.vehicle;
+        let new = || Box::new(PlacedRun::new(&vehicle, estimate.distance));
+        self.placed.get_or_insert_with(new).step(period, estimate)
+    }
+
+    /// True over believed diameter of each wheelset, as far as known places say.
+    #[must_use]
+    pub fn wheel_scales(&self) -> [Option<PlacedValue>; 2] {
+        if let Some(placed) = &self.placed {
+            return placed.scales();
+        }
+        let learnt = self.odometer.diameters();
+        let value = |scale: WheelScale| {
+            let Estimate { value, uncertainty, count, .. } = scale.estimate;
+            (count > 0).then_some(PlacedValue { value, deviation: uncertainty })
+        };
+        learnt.map_or([None; 2], |scales| scales.map(value))
+    }
+
+    /// How many places of stated accuracy were passed, and how many of those that are remembered are wrong.
+    #[must_use]
+    pub fn places_passed_and_wrong(&self) -> Option<[usize; 2]> {
+        self.placed.as_ref().map(|placed| placed.passed_and_wrong())
     }
 
     /// What it comes to up to now.

@@ -42,6 +42,7 @@ pub fn simulated_columns(run: &LineRun) -> WrittenColumns {
         effort: true,
         acceleration: run.samples.iter().any(|sample| sample.acceleration.is_some()),
         balise: run.samples.iter().any(|sample| sample.balise.is_some()),
+        balise_deviation: false,
         run_id: false,
         truth: true,
         true_wheels: true,
@@ -73,6 +74,7 @@ fn period(sample: &LineSample, by_counter: [bool; 2]) -> Period {
         effort: Some(sample.effort),
         acceleration: sample.acceleration,
         balise: sample.balise,
+        balise_deviation: None,
     }
 }
 

@@ -76,6 +76,7 @@ impl TachometerBlock {
             effort: self.number(row, Quantity::Effort),
             acceleration: self.number(row, Quantity::Acceleration).map(Acceleration::from_m_per_s2),
             balise: self.number(row, Quantity::Balise).map(Length::from_m),
+            balise_deviation: self.number(row, Quantity::BaliseDeviation).map(Length::from_m),
         }
     }
 

@@ -10,6 +10,7 @@ pub(super) enum Quantity {
     Effort,
     Acceleration,
     Balise,
+    BaliseDeviation,
     TrueSpeed,
     TrueDistance,
     TrueWheel1,
@@ -17,7 +18,7 @@ pub(super) enum Quantity {
 }
 
 impl Quantity {
-    pub(super) const COUNT: usize = 7;
+    pub(super) const COUNT: usize = 8;
 
     pub(super) const fn slot(self) -> usize {
         self as usize
@@ -31,6 +32,7 @@ impl Quantity {
             }
             Self::Acceleration => "a finite number of m/s², or nothing where it is missing",
             Self::Balise | Self::TrueDistance => "a finite number of metres, or nothing where it is missing",
+            Self::BaliseDeviation => "a standard deviation in metres above 0, or nothing where it is missing",
             Self::TrueSpeed | Self::TrueWheel1 | Self::TrueWheel2 => {
                 "a finite number of m/s, or nothing where it is missing"
             }
@@ -42,6 +44,7 @@ impl Quantity {
     pub(super) fn fits(self, value: f64) -> bool {
         match self {
             Self::Effort => (-1.0..=1.0).contains(&value),
+            Self::BaliseDeviation => value.is_finite() && value > 0.0,
             _ => value.is_finite(),
         }
     }
@@ -64,7 +67,7 @@ pub(super) enum Slot {
 }
 
 /// What our columns are called.
-pub(super) const KNOWN: [(&str, Slot); 17] = [
+pub(super) const KNOWN: [(&str, Slot); 18] = [
     ("t_s", Slot::Time),
     ("pulses_1", Slot::Pulses(0)),
     ("pulses_2", Slot::Pulses(1)),
@@ -77,6 +80,7 @@ pub(super) const KNOWN: [(&str, Slot); 17] = [
     ("effort", Slot::Number(Quantity::Effort)),
     ("accel_m_s2", Slot::Number(Quantity::Acceleration)),
     ("balise_m", Slot::Number(Quantity::Balise)),
+    ("balise_sd_m", Slot::Number(Quantity::BaliseDeviation)),
     ("run_id", Slot::Run),
     ("true_speed_m_s", Slot::Number(Quantity::TrueSpeed)),
     ("true_distance_m", Slot::Number(Quantity::TrueDistance)),

@@ -23,6 +23,8 @@ pub struct WrittenColumns {
     pub acceleration: bool,
     /// `balise_m`.
     pub balise: bool,
+    /// `balise_sd_m`.
+    pub balise_deviation: bool,
     /// `run_id`.
     pub run_id: bool,
     /// `true_speed_m_s`, `true_distance_m`.
@@ -33,7 +35,7 @@ pub struct WrittenColumns {
 
 impl WrittenColumns {
     /// All columns that there can be and whether each is written.
-    fn all(&self) -> [(&'static str, Kind, bool); 15] {
+    fn all(&self) -> [(&'static str, Kind, bool); 16] {
         let [first, second] = self.counters.map(|counter| if counter { 1 } else { 0 });
         [
             ("t_s", Kind::Time, true),
@@ -46,6 +48,7 @@ impl WrittenColumns {
             ("effort", Kind::OptionalNumber, self.effort),
             ("accel_m_s2", Kind::OptionalNumber, self.acceleration),
             ("balise_m", Kind::OptionalNumber, self.balise),
+            ("balise_sd_m", Kind::OptionalNumber, self.balise_deviation),
             ("run_id", Kind::Text, self.run_id),
             ("true_speed_m_s", Kind::OptionalNumber, self.truth),
             ("true_distance_m", Kind::OptionalNumber, self.truth),
@@ -59,7 +62,7 @@ impl WrittenColumns {
 #[derive(Debug)]
 pub struct TachometerWriter<W: Write + Send> {
     table: TableWriter<W>,
-    is_written: [bool; 15],
+    is_written: [bool; 16],
 }
 
 impl<W: Write + Send> TachometerWriter<W> {
@@ -93,6 +96,7 @@ impl<W: Write + Send> TachometerWriter<W> {
             Cell::optional_number(period.effort),
             Cell::optional_number(period.acceleration.map(Acceleration::as_m_per_s2)),
             length(period.balise),
+            length(period.balise_deviation),
             Cell::Text(run),
             speed(truth.speed),
             length(truth.distance),

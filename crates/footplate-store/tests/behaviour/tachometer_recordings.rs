@@ -110,6 +110,7 @@ fn every_column_finds_its_place() {
         effort: Some(-0.5),
         acceleration: Some(Acceleration::from_m_per_s2(-0.4)),
         balise: Some(Length::from_m(1250.5)),
+        balise_deviation: None,
     };
     assert_eq!(whole.rows[0].1, expected);
     assert_eq!(whole.rows[0].2.wheels, [10.0, 9.5].map(|speed| Some(Speed::from_m_per_s(speed))));

@@ -40,6 +40,7 @@ fn everything(counters: [bool; 2]) -> WrittenColumns {
         effort: true,
         acceleration: true,
         balise: true,
+        balise_deviation: true,
         run_id: true,
         truth: true,
         true_wheels: true,
@@ -83,6 +84,7 @@ fn row() -> impl Strategy<Value = (usize, Period, Truth)> {
             effort,
             acceleration: acceleration.map(Acceleration::from_m_per_s2),
             balise: balise.map(Length::from_m),
+            balise_deviation: balise.map(|place| Length::from_m(1.0 + place.abs().min(1e6))),
         });
     let truth = (finite(), finite(), finite(), finite()).prop_map(|(speed, distance, first, second)| Truth {
         speed: speed.map(Speed::from_m_per_s),

@@ -18,6 +18,7 @@ mod odometer_on_scenarios;
 mod odometry;
 mod odometry_report;
 mod other_layouts;
+mod placed_rides;
 mod plot;
 mod position_series;
 mod predict;

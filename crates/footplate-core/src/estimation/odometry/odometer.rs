@@ -313,7 +313,9 @@ impl Odometer {
             rolls: lost.is_none() && wheel.is_read() && wheel.doubt == 0.0,
         };
         places.roll(period.time, [rolled(first, first_lost), rolled(second, second_lost)], effort);
-        let Some(balise) = period.balise.filter(|place| place.as_m().abs() <= FARTHEST_PLACE) else { return };
+        let bounds_nothing = period.balise_deviation.is_some();
+        let place = period.balise.filter(|place| place.as_m().abs() <= FARTHEST_PLACE && !bounds_nothing);
+        let Some(balise) = place else { return };
         let mut bounds = self.ways.distance();
         if self.way < 0.0 {
             bounds = bounds.reversed();

@@ -1,5 +1,6 @@
 //! What recordings come to, for machines.
 
+use footplate_core::estimation::odometry::PlacedValue;
 use footplate_store::odometry::{OdometryScore, Preset, RunScores};
 use serde_json::{Map, Value, json};
 
@@ -60,6 +61,16 @@ fn run(file: &str, run: &WalkedRun, walked: &Walked) -> Value {
         }
     }
     fields.insert("top_speed_m_s".into(), figure(summary.top_speed.as_m_per_s()));
+    let scales = run.odometry.wheel_scales();
+    if scales.iter().any(Option::is_some) {
+        let scale = |scale: Option<PlacedValue>| {
+            scale.map(|scale| json!({ "value": figure(scale.value), "deviation": figure(scale.deviation) }))
+        };
+        fields.insert("wheel_scales".into(), json!(scales.map(scale)));
+    }
+    if let Some([passed, wrong]) = run.odometry.places_passed_and_wrong() {
+        fields.insert("places".into(), json!({ "passed": passed, "wrong": wrong }));
+    }
     fields.insert("modes".into(), json!(summary.modes));
     fields.insert("wheels".into(), json!(summary.flags));
     if let Some(scores) = run.odometry.scores().filter(|_| walked.is_scored) {
