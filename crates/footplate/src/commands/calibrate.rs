@@ -16,7 +16,7 @@ use anyhow::bail;
 use clap::{Args, ValueEnum};
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
-use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
+use footplate_store::{Batch, Findings, Import, PositionSeries, Recording, Store, TapedMoves, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
@@ -113,12 +113,12 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        if let Some(series) = series::read(&self.from)? {
+        if let Some(series) = measured_by_hand(&self.from, "series of positions", PositionSeries::read)? {
             self.check_measured_by_hand("a series of positions", None)?;
             series::write(&series, self.json, output)?;
             return Ok(Outcome::Done);
         }
-        if let Some(files) = short_moves::read(&self.from)? {
+        if let Some(files) = measured_by_hand(&self.from, "short moves", TapedMoves::read)? {
             self.check_measured_by_hand("a file of short moves", Some(Method::ShortMoves))?;
             short_moves::write_measured(&files, self.json, output)?;
             return Ok(Outcome::Done);
@@ -227,4 +227,24 @@ impl Arguments {
         }
         Ok(())
     }
+}
+
+/// What was measured by hand in these files; `None` if they are sensor logs.
+fn measured_by_hand<M, E: std::error::Error + Send + Sync + 'static>(
+    paths: &[PathBuf],
+    what: &str,
+    read: impl Fn(&Path) -> Result<Option<M>, E>,
+) -> anyhow::Result<Option<Vec<M>>> {
+    let mut found = Vec::new();
+    for (number, path) in paths.iter().enumerate() {
+        let measured = read(path)?;
+        if number > 0 && measured.is_some() == found.is_empty() {
+            bail!(
+                "{}: {what} and sensor logs cannot be calibrated together: run the command for each kind",
+                path.display()
+            );
+        }
+        found.extend(measured);
+    }
+    Ok((!found.is_empty()).then_some(found))
 }

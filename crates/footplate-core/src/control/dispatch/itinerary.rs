@@ -202,9 +202,9 @@ impl<'a> Search<'a> {
             if looked_at > MOST_NECKS {
                 break;
             }
+            let seen = is_seen_before || is_seen(&path);
             for id in self.layout.ways(node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(needs, id)) else { continue };
-                let seen = is_seen_before || is_seen(&path);
                 // Where it only backs away it comes over turnouts only behind a contact, which says where it is.
                 if !is_sure && !seen && !self.is_plain(id) {
                     continue;

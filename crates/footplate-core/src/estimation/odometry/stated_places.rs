@@ -157,12 +157,6 @@ impl StatedPlaces {
         [self.passed, wrong]
     }
 
-    /// How many of the remembered places are right, each counted by its probability.
-    #[must_use]
-    pub fn right(&self) -> f64 {
-        self.remembered().iter().skip(1).map(|mark| mark.w).sum()
-    }
-
     /// What the places say of a reckoned distance ahead of the latest place: the distance.
     #[must_use]
     pub fn distance(&self, reckoned: Length) -> PlacedValue {

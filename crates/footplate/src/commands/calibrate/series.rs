@@ -1,29 +1,11 @@
 //! What series of positions say, as text and as JSON.
 
 use std::io::Write;
-use std::path::PathBuf;
 
-use anyhow::bail;
 use footplate_core::calibration::motion::{SeriesChange, SeriesFit};
 use footplate_core::{Acceleration, Estimate, TimeSpan};
 use footplate_store::PositionSeries;
 use serde_json::{Value, json};
-
-/// The series in these files; `None` if they are sensor logs.
-pub(super) fn read(paths: &[PathBuf]) -> anyhow::Result<Option<Vec<PositionSeries>>> {
-    let mut found = Vec::new();
-    for (number, path) in paths.iter().enumerate() {
-        let series = PositionSeries::read(path)?;
-        if number > 0 && series.is_some() == found.is_empty() {
-            bail!(
-                "{}: series of positions and sensor logs cannot be calibrated together: run the command for each kind",
-                path.display()
-            );
-        }
-        found.extend(series);
-    }
-    Ok((!found.is_empty()).then_some(found))
-}
 
 pub(super) fn write(series: &[PositionSeries], is_json: bool, output: &mut dyn Write) -> anyhow::Result<()> {
     let mut forms = Vec::new();

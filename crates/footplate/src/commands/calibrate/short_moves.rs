@@ -2,7 +2,6 @@
 //! text and as JSON.
 
 use std::io::Write;
-use std::path::PathBuf;
 
 use anyhow::bail;
 use footplate_core::calibration::ShortMoveFit;
@@ -19,22 +18,6 @@ struct Planned {
     step: SpeedStep,
     time: TimeSpan,
     forecast: ShortMoveForecast,
-}
-
-/// Measured moves of these files; `None` if they are something else.
-pub(super) fn read(paths: &[PathBuf]) -> anyhow::Result<Option<Vec<TapedMoves>>> {
-    let mut found = Vec::new();
-    for (number, path) in paths.iter().enumerate() {
-        let moves = TapedMoves::read(path)?;
-        if number > 0 && moves.is_some() == found.is_empty() {
-            bail!(
-                "{}: short moves and sensor logs cannot be calibrated together: run the command for each kind",
-                path.display()
-            );
-        }
-        found.extend(moves);
-    }
-    Ok((!found.is_empty()).then_some(found))
 }
 
 /// What measured moves say.
