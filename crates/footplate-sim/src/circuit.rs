@@ -41,8 +41,8 @@ pub enum CircuitError {
     },
     /// The turnouts given lead elsewhere.
     #[error(
-        "the way from {start} does not come back to it as the turnouts lie: it ends at {reached}; set the \
-         turnouts of a loop through {start}"
+        "the path from {start} does not come back to it with the turnouts in their present positions: \
+         it ends at {reached}; set the turnouts of a loop through {start}"
     )]
     DoesNotReturn {
         /// The node it began at.

@@ -99,8 +99,8 @@ pub struct LeftOut {
 pub enum BatchError {
     /// No run passes two contacts in a row.
     #[error(
-        "nothing to calibrate in {runs} runs with {passages} passages of contacts: at least one run should pass \
-         two contacts that the layout links, at a speed that no longer changes"
+        "nothing to calibrate in {runs} runs with {passages} sensor passages: at least one run should \
+         pass two sensors that the layout links, at a steady speed"
     )]
     NothingSettled {
         /// Runs looked at.
@@ -110,8 +110,8 @@ pub enum BatchError {
     },
     /// Hits of several trains cannot be told apart yet.
     #[error(
-        "{recording}, run {run}: {} trains move in one run; hits can only be told apart in runs of one train so \
-         far, so record each train in a run of its own",
+        "{recording}, run {run}: {} trains move in one run; reports cannot be assigned to trains in a \
+         recording yet, so record each train in a run of its own",
         trains.len()
     )]
     SeveralTrains {

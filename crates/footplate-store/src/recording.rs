@@ -183,7 +183,7 @@ impl fmt::Display for Oddity {
             Self::NoReports { run } => {
                 write!(f, "run {run} has no report; kept, it tells that the train stood")
             }
-            Self::LineNotEnded => f.write_str("the last line has no end of line; kept as it stands"),
+            Self::LineNotEnded => f.write_str("the last line has no end of line; kept unchanged"),
             Self::LineCutOff => f.write_str("the last line is cut off; left out"),
         }
     }

@@ -246,9 +246,13 @@ impl Display for CommandError {
             Self::Turnout { turnout, addresses: (first, last) } => {
                 write!(f, "turnout {turnout} has no address here; addresses are {first} to {last}")
             }
-            Self::Unknown => f.write_str("the station knows no such command"),
+            Self::Unknown => f.write_str("the station has no such command"),
             Self::TooManyWaiting(count) => {
-                write!(f, "{count} commands wait for the line already; wait until some of them have left")
+                write!(
+                    f,
+                    "{count} commands are already waiting for the line; wait until some have been \
+                           sent"
+                )
             }
             Self::Closed => f.write_str("the link is being closed; open it again to command trains"),
         }
@@ -263,11 +267,12 @@ impl Display for LinkNotice {
         match self {
             Self::Answers => f.write_str("the station answers"),
             Self::ReplyLost { expected, found } => {
-                write!(f, "a sensor reply of {found} bytes instead of {expected}; dropped, asked again")
+                write!(f, "a sensor reply had {found} bytes instead of {expected}; it was dropped and \
+                           the read repeated")
             }
             Self::UnexpectedBytes { count } => write!(
                 f,
-                "{count} bytes came that nobody asked for; dropped, and the line is brought back into step"
+                "{count} unexpected bytes were dropped; the line is being synchronised again"
             ),
             Self::Silent { since, bytes: 0, check } => {
                 write!(f, "the station has answered nothing for {:.1} s; {check}", since.as_s())
@@ -306,19 +311,20 @@ impl Display for LinkNotice {
                 since.as_s()
             ),
             Self::Repeated { command } => {
-                write!(f, "said again, because a reply was lost after it: {}", Said(*command))
+                write!(f, "repeated, because a reply was lost after it: {}", Said(*command))
             }
             Self::ReverseInDoubt { train } => write!(
                 f,
-                "train {train} was told to turn around just before a reply was lost; it may face either way"
+                "train {train} was commanded to reverse just before a reply was lost; it may face \
+                 either direction"
             ),
             Self::HeldClosed { sensor } => {
-                write!(f, "contact {sensor} is closed from the start: a train stands on it, or it is stuck")
+                write!(f, "sensor {sensor} is occupied from the start: a train is on it, or it is stuck")
             }
             Self::Reads(reads) => write!(f, "the interface {reads}"),
             Self::SolenoidLate { turnout, held } => write!(
                 f,
-                "turnout {turnout} was powered for {:.0} ms; feel whether its coil is hot",
+                "turnout {turnout} was powered for {:.0} ms; check that its coil is not hot",
                 ms(*held)
             ),
             Self::Closed(closing) => closing.fmt(f),
@@ -360,23 +366,25 @@ impl Display for Closing {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         let told = |said| if said { "" } else { "not " };
         if !self.told_to_stand.is_empty() {
-            write!(f, "told to stand: {}; ", Listed(&self.told_to_stand))?;
+            write!(f, "commanded to stop: {}; ", Listed(&self.told_to_stand))?;
         }
         if !self.not_told.is_empty() {
-            write!(f, "NOT told to stand and possibly running: {}; ", Listed(&self.not_told))?;
+            write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_told))?;
         }
         if let Some(released) = self.solenoids_released {
             write!(f, "solenoids {}released, ", told(released))?;
         }
         write!(f, "track power {}switched off; ", told(self.power_off))?;
         f.write_str(match self.confirmation {
-            Confirmation::HandShake => "the station took the bytes, and this line confirms no more than that",
-            Confirmation::Nothing => {
-                "nothing on this line confirms that the station heard it: see that the trains stand"
+            Confirmation::HandShake => {
+                "the station accepted the bytes; this line gives no further \
+                                        confirmation"
             }
+            Confirmation::Nothing => "this line gives no confirmation: check that the trains are at rest",
             Confirmation::Replies if self.is_complete() => "the station has confirmed it",
             Confirmation::Replies => {
-                "the station did not confirm the rest: see that the trains stand, and take the power from the track"
+                "the station did not confirm the rest: check that the trains are at rest, and switch \
+                 the track power off by hand"
             }
         })
     }

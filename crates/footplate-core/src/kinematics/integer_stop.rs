@@ -83,7 +83,10 @@ pub struct UnusableConstants;
 
 impl core::fmt::Display for UnusableConstants {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("these are no constants of a stop: take all nine, in order, as IntegerStop::constants returns them")
+        f.write_str(
+            "these are not the constants of a stop: pass all nine, in order, as \
+                     IntegerStop::constants returns them",
+        )
     }
 }
 

@@ -104,7 +104,8 @@ impl core::fmt::Display for ProfileError {
                 let found = found.as_m_per_s2();
                 write!(
                     f,
-                    "at {found} m/s² the train stands before it can ease off: start from standstill instead"
+                    "at {found} m/s² the train is at rest before the jerk limit lets it ease off: start \
+                     from standstill instead"
                 )
             }
             Self::TooNear { found, shortest } => {

@@ -1,4 +1,4 @@
-//! From one speed to another over a given way in a given time, with the least jerk.
+//! From one speed to another over a given way in a given time, with minimum jerk.
 //!
 //! Letters: `d` way, `T` time, `v₁` and `v₂` the speeds at the ends, where the acceleration is nothing; `τ = t/T`. Among all
 //! motions with these ends the integral of the squared jerk is least for (Flash and Hogan, 1985)
@@ -16,7 +16,7 @@ use super::motion::{Motion, MotionState, span_of};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// The motion with the least jerk between two states without acceleration.
+/// The motion with minimum jerk between two states without acceleration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MinimumJerk {
     time: f64,

@@ -348,7 +348,7 @@ mod tests {
         );
         assert_eq!(
             refusal(|plan| plan.stretches.push(stretch("MR1 curved", "A1", 1.0))),
-            (last, "`MR1 curved` names a leg where there is only one way: write `MR1`".into())
+            (last, "`MR1 curved` names a leg, but this node has only one exit: write `MR1`".into())
         );
         assert_eq!(
             refusal(|plan| plan.stretches.push(stretch("EX1", "A1", 1.0))),

@@ -299,8 +299,8 @@ impl fmt::Display for LayoutError {
             }
             Self::NoDistance { from, to, .. } => write!(
                 f,
-                "no single way leads from sensor `{from}` to `{to}` without another sensor between: give a distance \
-                 between neighbouring sensors"
+                "there is no single path from sensor `{from}` to `{to}` without another sensor between: \
+                 give a distance between neighbouring sensors"
             ),
             Self::UnequalDistance { found, edges, .. } => write!(
                 f,
@@ -329,7 +329,7 @@ impl fmt::Display for LayoutError {
                 write!(f, "`{node}` has two legs: write `{node} straight` or `{node} curved`")
             }
             Self::LegWithoutTurnout { node, leg, .. } => {
-                write!(f, "`{node} {leg}` names a leg where there is only one way: write `{node}`")
+                write!(f, "`{node} {leg}` names a leg, but this node has only one exit: write `{node}`")
             }
             Self::BeyondTrackEnd { node, .. } => {
                 write!(f, "the track ends at `{node}`: edges leave an entry and reach an exit")
@@ -362,7 +362,8 @@ impl fmt::Display for LayoutError {
             }
             Self::TooManyWays { node, .. } => write!(
                 f,
-                "there are too many ways from `{node}` to the next sensors: put sensors between the turnouts"
+                "there are too many paths from `{node}` to the next sensors: put sensors between the \
+                 turnouts"
             ),
             Self::IllegalZoneName { name, .. } => write!(
                 f,

@@ -359,7 +359,7 @@ mod tests {
         let error = Layout::build(&plan).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "there are too many ways from `BR1` to the next sensors: put sensors between the turnouts"
+            "there are too many paths from `BR1` to the next sensors: put sensors between the turnouts"
         );
     }
 }

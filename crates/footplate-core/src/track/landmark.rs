@@ -44,14 +44,15 @@ impl fmt::Display for LandmarkError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownNode { name, example, layout } => {
-                write!(f, "no place of {layout} is called `{}`", name.escape_debug())?;
+                write!(f, "{layout} has no place `{}`", name.escape_debug())?;
                 example.as_ref().map_or(Ok(()), |example| {
                     write!(f, ": write a name like `{example}` or `{example}+120mm`")
                 })
             }
             Self::IllegalOffset { found, name } => write!(
                 f,
-                "`{}` is no offset: write millimetres as in `{name}+120mm` or `{name}-30.5mm`",
+                "`{}` is not an offset: write millimetres, for example `{name}+120mm` or \
+                 `{name}-30.5mm`",
                 found.escape_debug()
             ),
         }
@@ -165,13 +166,19 @@ mod tests {
     fn a_text_that_names_no_place_is_told_what_would() {
         let layout = oval();
         for (text, message) in [
-            ("Z9", "no place of oval is called `Z9`: write a name like `A1` or `A1+120mm`"),
-            ("", "no place of oval is called ``: write a name like `A1` or `A1+120mm`"),
-            ("A1+120", "`+120` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
-            ("A1+-5mm", "`+-5mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
-            ("A1+infmm", "`+infmm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
-            ("A1-1e999mm", "`-1e999mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
-            ("A1+mm", "`+mm` is no offset: write millimetres as in `A1+120mm` or `A1-30.5mm`"),
+            ("Z9", "oval has no place `Z9`: write a name like `A1` or `A1+120mm`"),
+            ("", "oval has no place ``: write a name like `A1` or `A1+120mm`"),
+            ("A1+120", "`+120` is not an offset: write millimetres, for example `A1+120mm` or `A1-30.5mm`"),
+            ("A1+-5mm", "`+-5mm` is not an offset: write millimetres, for example `A1+120mm` or `A1-30.5mm`"),
+            (
+                "A1+infmm",
+                "`+infmm` is not an offset: write millimetres, for example `A1+120mm` or `A1-30.5mm`",
+            ),
+            (
+                "A1-1e999mm",
+                "`-1e999mm` is not an offset: write millimetres, for example `A1+120mm` or `A1-30.5mm`",
+            ),
+            ("A1+mm", "`+mm` is not an offset: write millimetres, for example `A1+120mm` or `A1-30.5mm`"),
         ] {
             assert_eq!(layout.landmark(text).unwrap_err().to_string(), message);
         }
@@ -200,11 +207,11 @@ mod tests {
         let layout = oval();
         let unknown = TurnoutStates::unknown();
         let refused = |text| layout.locate(layout.landmark(text).unwrap(), &unknown).unwrap_err().to_string();
-        assert_eq!(refused("EX2+1mm"), "the track ends at `EX2`, 1 mm before the way does");
-        assert_eq!(refused("EN1-7mm"), "the track ends at `EX1`, 7 mm before the way does");
+        assert_eq!(refused("EX2+1mm"), "the track ends at `EX2`, 1 mm before the end of the path");
+        assert_eq!(refused("EN1-7mm"), "the track ends at `EX1`, 7 mm before the end of the path");
         assert_eq!(
             refused("BR1+5mm"),
-            "it is not known how turnout 1 lies, 5 mm before the way ends: set it first"
+            "the position of turnout 1, 5 mm before the end of the path, is unknown: throw it first"
         );
         let toe = layout.locate(layout.landmark("BR1").unwrap(), &unknown).unwrap();
         assert_eq!(

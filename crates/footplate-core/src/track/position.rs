@@ -52,11 +52,12 @@ impl fmt::Display for WayError {
             Self::NotFinite => f.write_str("a distance should be a finite number"),
             Self::TurnoutUnknown { turnout, left } => write!(
                 f,
-                "it is not known how turnout {turnout} lies, {:.0} mm before the way ends: set it first",
+                "the position of turnout {turnout}, {:.0} mm before the end of the path, is unknown: \
+                 throw it first",
                 left.as_mm()
             ),
             Self::TrackEnds { node, left } => {
-                write!(f, "the track ends at `{node}`, {:.0} mm before the way does", left.as_mm())
+                write!(f, "the track ends at `{node}`, {:.0} mm before the end of the path", left.as_mm())
             }
         }
     }
@@ -249,12 +250,12 @@ mod tests {
         let end = layout.advance(start, Length::from_mm(60.0), &unknown).unwrap();
         assert_eq!(text(&layout, end), "40.000 from E1 to EX2");
         let beyond = layout.advance(start, Length::from_mm(75.0), &unknown).unwrap_err();
-        assert_eq!(beyond.to_string(), "the track ends at `EX2`, 15 mm before the way does");
+        assert_eq!(beyond.to_string(), "the track ends at `EX2`, 15 mm before the end of the path");
         let start = at(&layout, "A1", "BR1", 0.0);
         let undecided = layout.advance(start, Length::from_mm(130.0), &unknown).unwrap_err();
         assert_eq!(
             undecided.to_string(),
-            "it is not known how turnout 1 lies, 30 mm before the way ends: set it first"
+            "the position of turnout 1, 30 mm before the end of the path, is unknown: throw it first"
         );
         assert!(layout.advance(start, Length::from_mm(100.0), &unknown).is_ok(), "up to it is known");
         assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(WayError::NotFinite));

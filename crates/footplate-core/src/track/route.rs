@@ -50,15 +50,16 @@ pub enum RouteError {
 impl fmt::Display for RouteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::UnknownNode { node } => write!(f, "node {node} is none of this layout's"),
+            Self::UnknownNode { node } => write!(f, "node {node} is not part of this layout"),
             Self::NoWay { from, to, reverse: Some(reverse) } => write!(
                 f,
-                "no way leads from `{from}` to `{to}` with the turnouts as they lie, but one leads to \
-                 `{reverse}`, the same place in the other direction"
+                "no path from `{from}` to `{to}` with the turnouts in their present positions, but \
+                 there is one to `{reverse}`, the same place in the other direction"
             ),
             Self::NoWay { from, to, reverse: None } => write!(
                 f,
-                "no way leads from `{from}` to `{to}` with the turnouts as they lie and without turning around"
+                "no path from `{from}` to `{to}` with the turnouts in their present positions and \
+                 without reversing"
             ),
         }
     }
@@ -226,14 +227,14 @@ mod tests {
         let unknown = TurnoutStates::unknown();
         assert_eq!(
             route(&layout, "EN1", "E2", &unknown).unwrap_err().to_string(),
-            "no way leads from `EN1` to `E2` with the turnouts as they lie, but one leads to `E1`, the same \
+            "no path from `EN1` to `E2` with the turnouts in their present positions, but there is one to `E1`, the same \
              place in the other direction"
         );
         assert_eq!(
             route(&layout, "EN1", "A1", &unknown).unwrap_err().to_string(),
-            "no way leads from `EN1` to `A1` with the turnouts as they lie and without turning around"
+            "no path from `EN1` to `A1` with the turnouts in their present positions and without reversing"
         );
         let error = layout.route(NodeId(0), NodeId(999), &unknown).unwrap_err();
-        assert_eq!(error.to_string(), "node 999 is none of this layout's");
+        assert_eq!(error.to_string(), "node 999 is not part of this layout");
     }
 }

@@ -202,7 +202,8 @@ mod tests {
             "a distance of 380 mm is not the sum of the edges between, 300 mm: correct one or the other"
         );
         assert!(
-            refusal(distance("A1", "D1", 600.0)).starts_with("no single way leads from sensor `A1` to `D1`")
+            refusal(distance("A1", "D1", 600.0))
+                .starts_with("there is no single path from sensor `A1` to `D1`")
         );
         let mut survey = layout.survey().clone();
         survey.scale = 1.5;

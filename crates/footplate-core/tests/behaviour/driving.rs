@@ -261,17 +261,26 @@ fn orders_that_make_no_sense_are_refused_and_change_nothing() {
     let stop = stop_at(&driver, "B1");
     let other = StopOrder { train: TrainId(58), ..stop };
     for (order, says) in [
-        (Order::Speed { train: TRAIN, step: step(15) }, "step 15 is beyond 14, the highest of this train"),
-        (Order::Stop(other), "train 58 is not driven here"),
+        (
+            Order::Speed { train: TRAIN, step: step(15) },
+            "step 15 is too high: the highest step of this train is 14",
+        ),
+        (Order::Stop(other), "train 58 is not part of this session"),
         (Order::Stop(StopOrder { step: Some(step(0)), ..stop }), "step 0 does not move this train reliably"),
         (
             Order::Stop(StopOrder { aim: Aim::NotBeyond(Ratio::from_percent(80.0)), ..stop }),
-            "80 % is no probability between 0.0001 % and 50 %",
+            "probability 80 % is out of range: use 0.0001 % to 50 %",
         ),
-        (Order::Stop(stop_at(&driver, "E1")), "no way leads from `D1` to `E1` as the turnouts lie"),
-        (Order::Stop(stop_at(&driver, "F1+2000mm")), "the track ends at `EX2`, 1100 mm before the way does"),
-        (Order::Stop(stop_at(&driver, "B2")), "no way leads from `D1` to `B2`"),
-        (Order::Move { train: TRAIN, distance: Length::from_mm(-5.0) }, "-5 mm is no way ahead"),
+        (
+            Order::Stop(stop_at(&driver, "E1")),
+            "no path from `D1` to `E1` with the turnouts in their present positions",
+        ),
+        (
+            Order::Stop(stop_at(&driver, "F1+2000mm")),
+            "the track ends at `EX2`, 1100 mm before the end of the path",
+        ),
+        (Order::Stop(stop_at(&driver, "B2")), "no path from `D1` to `B2`"),
+        (Order::Move { train: TRAIN, distance: Length::from_mm(-5.0) }, "distance -5 mm is out of range"),
     ] {
         let refused = driver.order(now, order).expect_err(says).to_string();
         assert!(refused.contains(says), "{refused}");

@@ -189,7 +189,11 @@ impl fmt::Display for LineError {
             LineProblem::TooFewStops => {
                 write!(f, "stops: there are {index}; a journey needs two, where it begins and where it ends")
             }
-            LineProblem::Place { at_m } => write!(f, "{what} {number} begins at {at_m} m; that is no place"),
+            LineProblem::Place { at_m } => write!(
+                f,
+                "{what} {number} begins at {at_m} m, which is not \
+                                                      a position"
+            ),
             LineProblem::Order { at_m, after_m } => write!(
                 f,
                 "{what} {number} begins at {at_m} m, and the one before it at {after_m} m; places should rise"

@@ -165,7 +165,7 @@ mod tests {
             "gradient 3 begins at 5 m, and the one before it at 5 m; places should rise"
         );
         assert_eq!(new(&[(0.0, 60.0)]), "gradient 1 is 60; it should lie between -50 and 50");
-        assert_eq!(new(&[(f64::NAN, 0.0)]), "gradient 1 begins at NaN m; that is no place");
+        assert_eq!(new(&[(f64::NAN, 0.0)]), "gradient 1 begins at NaN m, which is not a position");
         assert_eq!(new(&[(0.0, f64::NAN)]), "gradient 1 is NaN; it should lie between -50 and 50");
     }
 

@@ -19,7 +19,7 @@ pub enum HandError {
     #[error("the track ends under the train there; put it further from the end")]
     NoTrack,
     /// Another train stands there.
-    #[error("train {0} stands there; put it elsewhere or lift that one first")]
+    #[error("train {0} is there already; put this one elsewhere or lift the other first")]
     Occupied(TrainId),
 }
 

@@ -80,13 +80,13 @@ pub enum DocumentProblem {
         limit: usize,
     },
     /// A key said twice.
-    #[error("`{key}` stands here a second time; which one holds?")]
+    #[error("`{key}` is given twice; remove one")]
     KeyTwice {
         /// The key.
         key: String,
     },
     /// A key that means nothing here.
-    #[error("`{key}` is no key of {of}; its keys are {known}")]
+    #[error("`{key}` is not a key of {of}; its keys are {known}")]
     UnknownKey {
         /// The key.
         key: String,

@@ -159,10 +159,7 @@ mod tests {
     #[test]
     fn what_is_not_read_is_said_with_its_place() {
         assert_eq!(problem("a: &x 5\nb: *x\n").2, "anchors are not read; write the value itself");
-        assert_eq!(
-            problem("a: 1\na: 2\n"),
-            (2, 1, "`a` stands here a second time; which one holds?".to_owned())
-        );
+        assert_eq!(problem("a: 1\na: 2\n"), (2, 1, "`a` is given twice; remove one".to_owned()));
         assert_eq!(problem("a: 1\n---\nb: 1\n").0, 2);
         assert_eq!(problem(&"[".repeat(40)).1, 33);
         assert_eq!(problem("a: [1, 2\nb: 3\n").0, 2);

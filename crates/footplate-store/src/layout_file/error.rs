@@ -26,7 +26,7 @@ pub enum LayoutFileError {
         limit: usize,
     },
     /// Bytes that are no UTF-8.
-    #[error("{file}, line {line}: byte {byte} of the line is no UTF-8 text; save the file as UTF-8")]
+    #[error("{file}, line {line}: byte {byte} of the line is not UTF-8; save the file as UTF-8")]
     NotText {
         /// The file.
         file: String,
@@ -99,7 +99,10 @@ pub enum LayoutProblem {
         known: i64,
     },
     /// More than a name and a leg at the end of an edge.
-    #[error("`{found}` is no end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 curved`")]
+    #[error(
+        "`{found}` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 \
+             curved`"
+    )]
     RailEnd {
         /// What the file says.
         found: String,
@@ -120,7 +123,7 @@ pub enum LayoutProblem {
         found: String,
     },
     /// A point that cannot be drawn.
-    #[error("[{x}, {y}] is no point to draw at: coordinates are between -{limit} and {limit}")]
+    #[error("[{x}, {y}] is out of range: coordinates are between -{limit} and {limit}")]
     Point {
         /// Its first coordinate.
         x: f64,

@@ -123,7 +123,7 @@ pub enum RowProblem {
         name: String,
     },
     /// Two edges that leave a node by the same way.
-    #[error("an edge leaves `{from}` by the same way in line {first} already")]
+    #[error("line {first} already has an edge that leaves `{from}` by the same exit")]
     DuplicateEdge {
         /// The node.
         from: String,

@@ -39,7 +39,7 @@ pub enum MotionFileError {
         file: String,
     },
     /// It is no motion model.
-    #[error("{file}: {problem} (docs/formats/motion-model.md says what stands where)")]
+    #[error("{file}: {problem} (docs/formats/motion-model.md describes the format)")]
     Form {
         /// The file, or the place in the store.
         file: String,
@@ -48,8 +48,8 @@ pub enum MotionFileError {
     },
     /// It is a calibration of the form that Footplate wrote before there was one model of a train.
     #[error(
-        "{file}: a calibration of the old form, whose numbers come from other formulas; make it anew: footplate calibrate \
-         --from LOGS --layout LAYOUT --out FILE, or from a store with --store"
+        "{file}: a calibration in an old format, computed with other formulas; calibrate again: \
+         footplate calibrate --from LOGS --layout LAYOUT --out FILE, or from a store with --store"
     )]
     OldForm {
         /// The file.

@@ -169,7 +169,7 @@ impl FormReader for OwnLog<'_> {
                 if !run.events.is_empty() || run.knows(at_start.train) {
                     return Err(row.wrong(
                         self.kind,
-                        "an event: what a train was doing stands once, before the first event of its run",
+                        "an event: `running` is given once, before the first event of its run",
                     ));
                 }
                 run.trains.push(at_start);

@@ -82,7 +82,7 @@ impl<'a> SinceCommandLog<'a> {
                 let landmark = runs.open(id).and_then(|run| run.last_sensor()).ok_or_else(|| {
                     row.wrong(
                         self.event,
-                        "after a `sensor` row: the tape is laid from the contact reported last",
+                        "after a `sensor` row: the tape is laid from the sensor reported last",
                     )
                 })?;
                 Ok(EventKind::Stopped { train: self.train, landmark, offset })

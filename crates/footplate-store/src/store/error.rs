@@ -144,10 +144,10 @@ pub enum StoreError {
         event: EventKey,
     },
     /// A mark without a reason.
-    #[error("a mark needs a reason, for whoever asks later why the numbers changed")]
+    #[error("a mark needs a reason, so that later readers know why the numbers changed")]
     NoReason,
     /// The body of a calibration is no JSON.
-    #[error("the calibration of train {train} is no JSON")]
+    #[error("the calibration of train {train} is not JSON")]
     NotJson {
         /// The train.
         train: footplate_core::TrainId,

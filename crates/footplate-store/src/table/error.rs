@@ -36,7 +36,7 @@ pub enum TableError {
         line: u64,
     },
     /// Bytes that are no UTF-8.
-    #[error("{file}, line {line}: byte {byte} of the line is no UTF-8 text; save the file as UTF-8")]
+    #[error("{file}, line {line}: byte {byte} of the line is not UTF-8; save the file as UTF-8")]
     NotText {
         /// The file.
         file: String,

@@ -144,7 +144,7 @@ fn check_places(about: &ParquetMetaData) -> Result<(), ParquetError> {
         ]
     });
     match places.into_iter().find(|place| *place < 0) {
-        Some(place) => Err(ParquetError::General(format!("a column stands at byte {place}"))),
+        Some(place) => Err(ParquetError::General(format!("a column begins at byte {place}"))),
         None => Ok(()),
     }
 }

@@ -50,7 +50,7 @@ pub enum VehicleProblem {
     #[error("{0}")]
     Toml(String),
     /// A key that says nothing about a vehicle.
-    #[error("`{key}` is no key of {table}; {}", match near {
+    #[error("`{key}` is not a key of {table}; {}", match near {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("its keys are {known}"),
     })]

@@ -100,7 +100,7 @@ fn what_is_no_toml_is_named() {
     );
     assert_eq!(
         parse_layout("oval.toml", b"name = \"a\"\nformat = 1\nb\xFFd = 2").unwrap_err().to_string(),
-        "oval.toml, line 3: byte 2 of the line is no UTF-8 text; save the file as UTF-8"
+        "oval.toml, line 3: byte 2 of the line is not UTF-8; save the file as UTF-8"
     );
 }
 
@@ -168,7 +168,7 @@ fn places_are_named_with_what_is_wrong() {
     );
     assert_eq!(
         complaint("at = [10, 20.5]", "at = [10, nan]"),
-        "oval.toml, line 11, column 46: [10, NaN] is no point to draw at: coordinates are between -1000000 and 1000000"
+        "oval.toml, line 11, column 46: [10, NaN] is out of range: coordinates are between -1000000 and 1000000"
     );
     assert_eq!(
         complaint("[[1, 2]]", "[[1, 3]]"),
@@ -185,7 +185,7 @@ fn edges_are_named_with_what_is_wrong() {
     );
     assert_eq!(
         complaint("to = \"A1\"", "to = \"A1 straight\""),
-        format!("{to}`A1 straight` names a leg where there is only one way: write `A1`")
+        format!("{to}`A1 straight` names a leg, but this node has only one exit: write `A1`")
     );
     assert_eq!(
         complaint("to = \"A1\"", "to = \"EN2\""),
@@ -194,12 +194,14 @@ fn edges_are_named_with_what_is_wrong() {
     assert_eq!(
         complaint("to = \"A1\"", "to = \"A1 left\""),
         format!(
-            "{to}`A1 left` is no end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 curved`"
+            "{to}`A1 left` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 curved`"
         )
     );
     assert_eq!(
         complaint("to = \"A1\"", "to = \"\""),
-        format!("{to}`` is no end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 curved`")
+        format!(
+            "{to}`` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 curved`"
+        )
     );
     assert_eq!(
         complaint("to = \"MR2 straight\"", "to = \"MR2\""),
@@ -273,7 +275,7 @@ fn too_many_turnouts_without_a_sensor_are_named() {
     text += "]\n";
     assert_eq!(
         parse_layout("diamonds.toml", text.as_bytes()).unwrap_err().to_string(),
-        "diamonds.toml, line 6, column 3: there are too many ways from `BR1` to the next sensors: put sensors \
+        "diamonds.toml, line 6, column 3: there are too many paths from `BR1` to the next sensors: put sensors \
          between the turnouts"
     );
 }

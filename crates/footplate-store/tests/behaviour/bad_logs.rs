@@ -110,7 +110,7 @@ fn a_wrong_field_is_named_with_its_place_and_what_is_right() {
         ),
         (
             format!("{SINCE}1,speed,14,,,,0.0\n1,stop,14,,,,1.0\n1,stopped,14,,500,,2.0\n"),
-            "column 2 (event): `stopped` should be after a `sensor` row: the tape is laid from the contact reported \
+            "column 2 (event): `stopped` should be after a `sensor` row: the tape is laid from the sensor reported \
              last",
         ),
         (
@@ -213,7 +213,7 @@ fn bytes_that_are_no_text_are_named() {
     log.extend_from_slice(b"\xff\xfe\n");
     assert_eq!(
         parse(&log).unwrap_err().to_string(),
-        "log_train24.csv, line 2: byte 10 of the line is no UTF-8 text; save the file as UTF-8"
+        "log_train24.csv, line 2: byte 10 of the line is not UTF-8; save the file as UTF-8"
     );
 }
 

@@ -43,7 +43,7 @@ fn a_wrong_value_of_a_train_is_pointed_at() {
     assert_eq!(fault("force_n = 1e5\n", ""), "unit.toml, line 13, column 1: `traction` lacks `force_n`");
     assert_eq!(
         fault("service_m_s2", "servise_m_s2"),
-        "unit.toml, line 12, column 16: `servise_m_s2` is no key of `brake`; its keys are service_m_s2, full_n"
+        "unit.toml, line 12, column 16: `servise_m_s2` is not a key of `brake`; its keys are service_m_s2, full_n"
     );
     assert_eq!(
         fault("format = 1", "format = 9"),
@@ -73,7 +73,7 @@ fn a_wrong_value_of_a_line_is_pointed_at() {
     );
     assert_eq!(
         fault("speed_limits_km_h", "speed_limits"),
-        "line.toml, line 3, column 16: `speed_limits` is no key of a line; its keys are format, name, about, \
+        "line.toml, line 3, column 16: `speed_limits` is not a key of a line; its keys are format, name, about, \
          speed_limits_km_h, gradients_per_mille, curve_resistances_per_mille, stops"
     );
 }

@@ -175,7 +175,7 @@ fn an_edge_that_does_not_agree_with_its_twin_is_named() {
     );
     assert_eq!(
         complaint("BR1,MR2,curved,420", "BR1,MR2,straight,420"),
-        "edges.csv, line 8: an edge leaves `BR1` by the same way in line 7 already"
+        "edges.csv, line 8: line 7 already has an edge that leaves `BR1` by the same exit"
     );
     assert_eq!(
         complaint("A1,BR1,ahead,100", "A1,A2,ahead,100"),
@@ -187,7 +187,7 @@ fn an_edge_that_does_not_agree_with_its_twin_is_named() {
 fn what_is_no_layout_is_named_with_its_row() {
     assert_eq!(
         complaint("A1,BR1,ahead,100", "A1,BR1,straight,100"),
-        "edges.csv, line 3: `A1 straight` names a leg where there is only one way: write `A1`"
+        "edges.csv, line 3: `A1 straight` names a leg, but this node has only one exit: write `A1`"
     );
     let long = EDGES.replace(",100\n", ",185000\n");
     assert_eq!(

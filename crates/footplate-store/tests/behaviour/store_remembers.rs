@@ -132,7 +132,7 @@ fn the_calibration_in_force_at_a_date_is_the_last_one_made_until_then() {
     assert_eq!(store.calibrations(TrainId(24)).unwrap().len(), 2);
     assert_eq!(store.calibrated_trains().unwrap(), [TrainId(24), TrainId(58)]);
     let broken = store.keep_calibration(calibration(24, "{speed:"), minute(30)).unwrap_err();
-    assert_eq!(broken.to_string(), "the calibration of train 24 is no JSON");
+    assert_eq!(broken.to_string(), "the calibration of train 24 is not JSON");
 }
 
 #[test]

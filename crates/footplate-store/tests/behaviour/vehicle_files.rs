@@ -26,7 +26,7 @@ fn what_is_wrong_is_named_with_its_place_and_what_would_be_right() {
         (
             "max_speed_m_s",
             "max_sped_m_s",
-            "train.toml, line 3, column 1: `max_sped_m_s` is no key of a vehicle; did you mean `max_speed_m_s`?",
+            "train.toml, line 3, column 1: `max_sped_m_s` is not a key of a vehicle; did you mean `max_speed_m_s`?",
         ),
         (
             "period_s = 0.05",
@@ -47,8 +47,8 @@ fn what_is_wrong_is_named_with_its_place_and_what_would_be_right() {
         ("\"powered\"", "1", "axle is 1; it should be \"powered\""),
         ("[[wheelset]]", "[[wheelsets]]", "line 13, column 1: 1 tables `[[wheelset]]`; there should be two"),
         ("name = ", "name = 7 #", "name is 7; it should be a text in quotes"),
-        ("name", "nam", "line 1, column 1: `nam` is no key of a vehicle; did you mean `name`?"),
-        ("name", "wind", "`wind` is no key of a vehicle; its keys are name, period_s,"),
+        ("name", "nam", "line 1, column 1: `nam` is not a key of a vehicle; did you mean `name`?"),
+        ("name", "wind", "`wind` is not a key of a vehicle; its keys are name, period_s,"),
         ("name = ", "= ", "line 1, column 1"),
     ] {
         let message = replaced(from, to);
@@ -93,7 +93,7 @@ fn tables_replace_only_what_they_name() {
     assert!(refusal(&wrong).contains("resistance_m_s2 is -0.2; it should lie between 0 and 5"));
 
     let wrong = format!("{DEFAULT_VEHICLE}\n[thresholds]\ncreepge = 0.1\n");
-    assert!(refusal(&wrong).contains("`creepge` is no key of `[thresholds]`; did you mean `creepage`?"));
+    assert!(refusal(&wrong).contains("`creepge` is not a key of `[thresholds]`; did you mean `creepage`?"));
     let wrong = format!("{DEFAULT_VEHICLE}\n[thresholds]\ncreepage = 8\n");
     assert!(refusal(&wrong).contains("creepage is 8; it should lie between 0 and 1"));
     let wrong = DEFAULT_VEHICLE.replacen("name", "thresholds = 3\nname", 1);

@@ -295,7 +295,7 @@ impl Display for EncodeError {
             Self::Module(module) => {
                 write!(f, "{module} sensor modules; the bus has {} to {}", MODULES.start(), MODULES.end())
             }
-            Self::Unknown => f.write_str("bytes without a known meaning are not said to a command station"),
+            Self::Unknown => f.write_str("bytes of unknown meaning are not sent to a command station"),
         }
     }
 }

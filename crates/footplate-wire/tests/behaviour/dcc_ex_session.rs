@@ -341,7 +341,7 @@ fn the_end_is_confirmed_by_the_board() {
     assert!(closing.is_complete(), "{closing}");
     assert_eq!(
         closing.to_string(),
-        "told to stand: 24, 58; track power switched off; the station has confirmed it"
+        "commanded to stop: 24, 58; track power switched off; the station has confirmed it"
     );
     assert_eq!(desk.client.handle_command(desk.now, speed(T24, 3)), Err(CommandError::Closed));
 }

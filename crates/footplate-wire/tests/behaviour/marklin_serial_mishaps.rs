@@ -182,7 +182,7 @@ fn what_could_not_be_said_at_the_end_is_named() {
     bench.run_for(10);
     let closing = bench.session.closing();
     assert_eq!((closing.told_to_stand, closing.not_told), (vec![], vec![TrainId(24)]));
-    assert!(bench.session.closing().to_string().contains("NOT told to stand and possibly running: 24"));
+    assert!(bench.session.closing().to_string().contains("NOT commanded to stop and possibly running: 24"));
 }
 
 /// What a program and a line can do to a session.

@@ -129,9 +129,12 @@ impl Arguments {
     fn greet(&self, stage: &mut Stage<'_, '_, '_>) -> std::io::Result<()> {
         let [first, second] = TRAINS;
         stage.screen.announce(&format!(
-            "Footplate calibrates and drives trains {first} and {second}, of which it knows nothing, on track A"
+            "Footplate calibrates and drives trains {first} and {second}, which it has never seen, on \
+             track A"
         ))?;
-        stage.screen.mention(&format!("over the bytes of a Märklin 6051, simulated; seed {}", self.seed))?;
+        stage
+            .screen
+            .mention(&format!("through a simulated Märklin 6051, byte by byte; seed {}", self.seed))?;
         stage.screen.say("")
     }
 
@@ -156,10 +159,14 @@ impl Arguments {
             stage.screen.announce(&summary)?;
         }
         stage.screen.mention(&format!(
-            "Errors are the simulator's truth, which nothing else has seen. {} of track time took {wall:.0} s.",
+            "Errors are measured against the simulator's truth, hidden from everything else. {} of \
+             track time took {wall:.0} s.",
             outcome::minutes(stage.now() - Timestamp::ZERO)
         ))?;
-        stage.screen.mention("Another railway: footplate demo --seed 2. All commands: footplate --help.")?;
+        stage.screen.mention(
+            "For another railway: footplate demo --seed 2. For all commands: footplate \
+                              --help.",
+        )?;
         let done = made == STOPS * TRAINS.len() && !stage.is_broken();
         Ok(if done { Outcome::Done } else { Outcome::FallsShort })
     }

@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         if !(self.seconds >= 1.0 && self.seconds <= 1e5) {
-            bail!("{} s are not worth listening; write --seconds 10", self.seconds);
+            bail!("{} s are too short: use --seconds 10", self.seconds);
         }
         let layout = self.link.simulated().map_or(&self.layout, |simulated| &simulated.layout);
         let layout = layout_named(layout)?.layout;

@@ -164,7 +164,7 @@ impl Arguments {
             (Some(named), _) => named,
             (None, Some(simulated)) => &simulated.layout,
             (None, None) => {
-                bail!("which layout is it? Name it with `--layout track-a` or `--layout my-layout.toml`")
+                bail!("layout missing: add `--layout track-a` or `--layout my-layout.toml`")
             }
         };
         WrittenLayout::named(named)
@@ -181,8 +181,8 @@ impl Arguments {
         }
         for train in &known.unknown {
             eprintln!(
-                "nothing is known of train {train}: stops will be as uncertain as their promises say; `footplate \
-                 calibrate` learns how it moves"
+                "train {train} is not calibrated, so its stops are uncertain: run `footplate calibrate` \
+                 first"
             );
         }
         let highest: BTreeMap<_, _> =
@@ -304,7 +304,7 @@ impl Arguments {
             }
         };
         if terminal.take().is_some() {
-            eprintln!("stopping all trains and taking the power from the track");
+            eprintln!("stopping all trains and switching the track power off");
         }
         let at = runtime.link().now();
         let closing = runtime.close();
@@ -336,5 +336,5 @@ impl Arguments {
 /// Seconds for which something may be waited: more than none, and no more than a day.
 fn wait_limit(text: &str) -> Result<f64, String> {
     let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 86_400.0);
-    seconds.ok_or_else(|| format!("`{text}` is no number of seconds above 0 and up to 86400"))
+    seconds.ok_or_else(|| format!("`{text}` is not a number of seconds above 0 and up to 86400"))
 }

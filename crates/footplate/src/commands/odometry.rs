@@ -116,7 +116,7 @@ impl From<PresetName> for Preset {
 
 /// Reads a probability.
 fn confidence(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     if (0.5..1.0).contains(&value) {
         Ok(value)
     } else {

@@ -79,8 +79,8 @@ impl Arguments {
         if let Some(plot) = &self.plot {
             let picture = picture::of(&layout, &scored).with_context(|| {
                 format!(
-                    "{}: nothing could be forecast, so there is nothing to draw; a train has to pass three contacts at \
-                     a step",
+                    "{}: nothing could be predicted, so there is nothing to draw; a train has to pass \
+                     three sensors at one step",
                     plot.path().display()
                 )
             })?;

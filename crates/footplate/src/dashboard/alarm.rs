@@ -51,12 +51,16 @@ impl Alarm {
     /// A train drifts.
     pub(super) fn drifts(train: TrainId, drift: Drift) -> Self {
         let (what, text) = match drift {
-            Drift::Slower => {
-                ("drifts-slower", "contacts close later and later: it has become slower than it was")
-            }
-            Drift::Faster => {
-                ("drifts-faster", "contacts close earlier and earlier: it has become faster than it was")
-            }
+            Drift::Slower => (
+                "drifts-slower",
+                "sensor reports come later and later: the train runs slower than \
+                                   calibrated",
+            ),
+            Drift::Faster => (
+                "drifts-faster",
+                "sensor reports come earlier and earlier: the train runs faster than \
+                                   calibrated",
+            ),
         };
         Self { text: text.to_owned(), ..Self::new(Grade::Warning, what, train, Vec::new()) }
     }

@@ -80,7 +80,8 @@ impl FromStr for ServedAt {
                 Ok(port) => loopback(port),
                 Err(_) => text.parse().with_context(|| {
                     format!(
-                        "`{text}` is no address to serve at: write a port such as 8417, or 127.0.0.1:8417"
+                        "`{text}` is not an address to serve at: use a port such as 8417, or \
+                         127.0.0.1:8417"
                     )
                 })?,
             },
@@ -246,7 +247,7 @@ fn of_train<T: Serialize>(train: &str, found: impl FnOnce(TrainId) -> Option<T>)
     match train.parse().ok().and_then(|number| found(TrainId(number))) {
         Some(found) => ([(header::CACHE_CONTROL, "no-store")], Json(found)).into_response(),
         None => {
-            let says = format!("`{train}` is no train that is driven here; /api/picture lists them");
+            let says = format!("`{train}` is not a train of this session; /api/picture lists them");
             (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response()
         }
     }

@@ -143,7 +143,7 @@ impl FromStr for Address {
             Ok(Self::Board(address))
         } else {
             Err(format!(
-                "`{text}` is no link; write sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
+                "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
                  dcc-ex:/dev/ttyACM0, or tcp://host:port in place of a port"
             ))
         }
@@ -205,7 +205,7 @@ impl SimulatedAddress {
                     "none" => false,
                     _ => {
                         return Err(format!(
-                            "`{value}` is no kind of faults; write faults=some or faults=none"
+                            "`{value}` is not a kind of faults: use faults=some or faults=none"
                         ));
                     }
                 }
@@ -225,13 +225,13 @@ pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
     let mut trains = Vec::new();
     for one in value.split(',') {
         let train = TrainId(number("train", one.trim(), "24,58").map_err(|_| {
-            format!("`{one}` is no train; write their addresses with commas between, as 24,58")
+            format!("`{one}` is not a train address: separate addresses with commas, for example 24,58")
         })?);
         if !(1..=80).contains(&train.0) {
             return Err(format!("train {train} has no address on a 6051; addresses are 1 to 80"));
         }
         if trains.contains(&train) {
-            return Err(format!("train {train} stands there twice; each train has an address of its own"));
+            return Err(format!("train {train} is listed twice: each train needs its own address"));
         }
         trains.push(train);
     }
@@ -293,10 +293,10 @@ impl SerialAddress {
         match (key, value) {
             ("pace", "careful") => self.pace = Some(PaceChoice::Careful),
             ("pace", "fast") => self.pace = Some(PaceChoice::Fast),
-            ("pace", _) => return Err(format!("`{value}` is no pace; write pace=careful or pace=fast")),
+            ("pace", _) => return Err(format!("`{value}` is not a pace: use pace=careful or pace=fast")),
             ("cts", "yes") => self.cts = Some(true),
             ("cts", "no") => self.cts = Some(false),
-            ("cts", _) => return Err(format!("`{value}` says nothing of CTS; write cts=yes or cts=no")),
+            ("cts", _) => return Err(format!("`{value}` is not a value of cts: use cts=yes or cts=no")),
             ("modules", _) => {
                 let modules: u8 = number(key, value, "5")?;
                 if !(1..=31).contains(&modules) {
@@ -371,7 +371,7 @@ mod tests {
             ("sim:track-a?speed=NaN", "speed=20"),
             ("sim:track-a?trains=24,,58", "24,58"),
             ("sim:track-a?trains=81", "1 to 80"),
-            ("sim:track-a?trains=24,24", "an address of its own"),
+            ("sim:track-a?trains=24,24", "its own address"),
             ("sim:track-a?law=newton", "there are"),
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),

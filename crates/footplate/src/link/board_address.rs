@@ -37,15 +37,15 @@ impl BoardAddress {
             ("turnouts", "accessory") => self.settings.turnouts = TurnoutRequests::Accessory,
             ("turnouts", _) => {
                 return Err(format!(
-                    "`{value}` is no kind of turnouts; write turnouts=accessory for addresses of decoders or \
-                     turnouts=defined for turnouts that are defined on the board"
+                    "`{value}` is not a kind of turnouts: use turnouts=accessory for decoder addresses \
+                     or turnouts=defined for turnouts that are defined on the board"
                 ));
             }
             ("first-sensor", _) => self.settings.first_sensor = number(key, value, "100")?,
             ("reset", "yes") => self.settings.resets_on_open = true,
             ("reset", "no") => self.settings.resets_on_open = false,
             ("reset", _) => {
-                return Err(format!("`{value}` says nothing of a reset; write reset=yes or reset=no"));
+                return Err(format!("`{value}` is not a value of reset: use reset=yes or reset=no"));
             }
             ("speed", _) => self.speed = times(value)?,
             _ => {

@@ -33,8 +33,12 @@ impl Port {
             }
             return Ok(Self::Device(text.to_owned()));
         };
-        let wanted =
-            || format!("`{server}` is no server; write tcp://host:port, such as tcp://127.0.0.1:{usual}");
+        let wanted = || {
+            format!(
+                "`{server}` is not a server: use tcp://host:port, such as \
+                        tcp://127.0.0.1:{usual}"
+            )
+        };
         let (host, port) = server.rsplit_once(':').ok_or_else(wanted)?;
         let host = host.trim_start_matches('[').trim_end_matches(']');
         if host.is_empty() {

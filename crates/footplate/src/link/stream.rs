@@ -187,7 +187,7 @@ impl Link for StreamLink {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         let written = self.line.writer.write_all(bytes).and_then(|()| self.line.writer.flush());
-        written.map_err(|error| Lost(format!("`{}` can not be written to: {error}", self.cable.port)))
+        written.map_err(|error| Lost(format!("cannot write to `{}`: {error}", self.cable.port)))
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {

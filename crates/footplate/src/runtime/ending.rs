@@ -34,10 +34,9 @@ impl Display for Ended {
         match self {
             Self::Finished => f.write_str("finished"),
             Self::Interrupted => f.write_str("interrupted"),
-            Self::LineLost(lost) => write!(
-                f,
-                "{lost}; trains that were running may still run: take the power from the track by hand"
-            ),
+            Self::LineLost(lost) => {
+                write!(f, "{lost}; trains may still be running: switch the track power off by hand")
+            }
             Self::NoAnswer(why) => f.write_str(why),
         }
     }

@@ -153,7 +153,7 @@ fn a_station_that_vanishes_is_said_to_be_gone() {
     let ended = runtime.run(&mut Runs::two(), &mut until).expect("nothing is written down");
     // then it is tried again for a few seconds, and a person is told what to do.
     let Ended::LineLost(_) = &ended else { panic!("{ended}") };
-    assert!(ended.to_string().contains("take the power from the track by hand"), "{ended}");
+    assert!(ended.to_string().contains("switch the track power off by hand"), "{ended}");
     assert!(stopwatch.elapsed().as_secs_f64() < 10.0);
     assert!(!runtime.close().is_complete());
 }
@@ -171,7 +171,7 @@ fn a_station_that_says_nothing_is_given_up_within_seconds() {
     assert!(stopwatch.elapsed().as_secs_f64() < 5.0);
     // The bytes leave, and nothing confirms them.
     let closing = runtime.close();
-    assert!(closing.to_string().contains("see that the trains stand"), "{closing}");
+    assert!(closing.to_string().contains("check that the trains are at rest"), "{closing}");
 }
 
 /// Passes everything on, and adds a byte to what the station says every so often.

@@ -17,7 +17,7 @@ pub(crate) struct StopFlag(());
 impl StopFlag {
     /// From now on a signal does not end the program but raises the flag; a third one ends it at once.
     pub(crate) fn install() -> Self {
-        Self::install_saying("\nstopping all trains; a third signal leaves them as they are")
+        Self::install_saying("\nstopping all trains; a third signal leaves them running")
     }
 
     /// The same for a program that has no trains to stop.

@@ -49,9 +49,9 @@ fn without_a_command_it_is_the_demo_and_it_ends_with_the_table() {
     let run = footplate(&[]);
     assert_eq!(run.status, 0, "{run:?}");
     assert!(
-        run.output.starts_with("Footplate calibrates and drives trains 24 and 58, of which it knows nothing")
+        run.output.starts_with("Footplate calibrates and drives trains 24 and 58, which it has never seen")
     );
-    let table = run.output.lines().skip_while(|line| !line.contains("promised mm")).skip(1);
+    let table = run.output.lines().skip_while(|line| !line.contains("predicted mm")).skip(1);
     let rows = table.take_while(|line| line.ends_with("inside") || line.ends_with("outside"));
     assert_eq!(rows.count(), 10, "{}", run.output);
     // No terminal is there to be written over.

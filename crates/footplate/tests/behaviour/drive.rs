@@ -72,7 +72,9 @@ fn every_order_ends_with_a_line_that_says_what_was_promised_and_what_came_of_it(
     };
     assert!(width(&lines[8]) < width(&lines[3]), "{} {}", lines[8], lines[3]);
     // People see each contact with what had been predicted, and where the train is.
-    for says in [" late (", "predicted ", "; next ", "will be told to stop", "(95 %), at rest", "promised"] {
+    for says in
+        [" late (", "predicted ", "; next ", "will be commanded to stop", "(95 %), at rest", "(predicted "]
+    {
         assert!(run.errors.contains(says), "{says}: {}", run.errors);
     }
 }
@@ -88,7 +90,7 @@ fn what_was_learnt_is_kept_in_the_store_and_known_the_next_time() {
     let store = folder("store").join("railway.db").display().to_string();
     let first = drive("first", LINK, EVENING, &["--json", "--store", &store]);
     assert_eq!(first.status, 0, "{}", first.errors);
-    assert!(first.errors.contains("nothing is known of train 24"));
+    assert!(first.errors.contains("train 24 is not calibrated"));
     let again = drive("second", LINK, EVENING, &["--json", "--store", &store]);
     assert_eq!(again.status, 0, "{}", again.errors);
     assert!(!again.errors.contains("nothing is known"), "{}", again.errors);
@@ -106,10 +108,10 @@ fn a_script_is_checked_whole_before_anything_moves() {
     let run = drive("mistakes", LINK, script, &[]);
     assert_eq!((run.status, run.output.as_str()), (2, ""));
     for says in [
-        "line 2, column 1: `sped` is nothing to do: did you mean `speed`?",
-        "line 3, column 12: no place of track-a is called `C133`",
+        "line 2, column 1: `sped` is not a command: did you mean `speed`?",
+        "line 3, column 12: track-a has no place `C133`",
         "did you mean `C13`?",
-        "line 4, column 6: `25` is no train that is driven here: 24",
+        "line 4, column 6: `25` is not a train of this session: 24",
         "line 5, column 12: `EX1+50mm` is off the track: the track ends at `EX1`",
         "line 6, column 10: `99` should be a step from 0 to 14",
     ] {
@@ -124,7 +126,7 @@ fn what_cannot_be_done_is_said_with_what_could_be_and_ends_with_status_1() {
     assert_eq!(run.status, 1, "{}{}", run.output, run.errors);
     let refused = lines(&run).into_iter().find(|line| line["refused"].is_string()).expect("one is refused");
     let why = refused["refused"].as_str().expect("a reason");
-    assert!(why.starts_with("`E7+60mm` is nearer than the train can stop: the nearest place is `"), "{why}");
+    assert!(why.starts_with("`E7+60mm` is too close to stop at: the nearest possible place is `"), "{why}");
     assert!(why.contains("mm beyond it"), "{why}");
     let unknown = drive("unknown-turnout", LINK, "speed 24 8\nwait 24 located\nstop 24 at A1\n", &[]);
     assert_eq!(unknown.status, 1);
@@ -142,7 +144,7 @@ fn wrong_usage_is_named_and_ends_with_status_2() {
     wrong(&["--link", "sim:nowhere"], "nowhere");
     wrong(&["--link", LINK, "--script", "no-such.txt"], "no-such.txt");
     wrong(&["--link", LINK, "--turnout", "99=curved"], "--turnout: track-a has no turnout 99");
-    wrong(&["--link", "marklin-serial:/dev/ttyUSB0"], "which layout is it?");
+    wrong(&["--link", "marklin-serial:/dev/ttyUSB0"], "layout missing");
     let nobody = ["--link", "marklin-serial:/dev/ttyUSB0", "--layout", "track-a"];
     wrong(&nobody, "there is no train to drive: name one with `--train 24`");
 }
@@ -181,10 +183,10 @@ fn a_train_goes_where_it_is_sent_by_turnouts_and_reversals_and_is_told_by_hand_a
         let width = number("promised_high_mm") - number("promised_low_mm");
         assert!(number("true_error_mm").abs() < width && width < 400.0, "{line}");
     }
-    assert!(run.errors.contains("train 24 has its way: about "), "{}", run.errors);
+    assert!(run.errors.contains("route set for train 24: about "), "{}", run.errors);
     // With its front at the very end of the track there is no room to stop.
     assert!(
-        went[2]["refused"].as_str().is_some_and(|why| why.starts_with("no way leads train 24 to `EX1`"))
+        went[2]["refused"].as_str().is_some_and(|why| why.starts_with("no path takes train 24 to `EX1`"))
             && run.status == 1,
         "{}",
         went[2]
@@ -228,8 +230,8 @@ fn two_trains_whose_ways_cross_are_sent_at_once_and_both_arrive() {
         // Calibrated for two and a half minutes; a train that was stopped for its limit near its place has arrived, too.
         assert!(truth.abs() < 120.0, "{line}");
     }
-    assert!(run.errors.contains("waits for track that is held by train"), "{}", run.errors);
-    assert!(run.errors.contains("train 24 reaches 110 mm ahead"), "{}", run.errors);
+    assert!(run.errors.contains("waits for track that is reserved for train"), "{}", run.errors);
+    assert!(run.errors.contains("train 24 extends 110 mm ahead"), "{}", run.errors);
 }
 
 #[test]
@@ -239,9 +241,9 @@ fn whoever_is_stopped_before_track_of_another_is_told_whose_it_is() {
     let script = "turnout all straight\nspeed 24 8\nwait 24 located\nwait 5s\nstop 24\nwait 24 at rest\n\
                   speed 58 8\nwait 58 located\nwait 20s\nstop 58\n";
     let run = drive("holder", link, script, &["--store", &store]);
-    let told = run.output.lines().find(|line| line.contains("does not hold the track further ahead"));
+    let told = run.output.lines().find(|line| line.contains("the track ahead is not reserved for it"));
     let told = told.unwrap_or_else(|| panic!("{}{}", run.output, run.errors));
-    assert!(told.ends_with("told to stop; it is held by train 24"), "{told}");
+    assert!(told.ends_with("; it is reserved for train 24"), "{told}");
 }
 
 /// The stops of a script, each of which says how far off it truly was and what had been promised.
@@ -267,7 +269,7 @@ fn a_script_waits_for_a_train_that_is_lost_and_found_again() {
     let run = drive("lost", "sim:track-a?seed=39&trains=24", &script, &["--json"]);
     // then that stop and those after it are made once it has been found, where they were promised.
     assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
-    assert!(run.errors.contains("train 24 is lost"), "{}", run.errors);
+    assert!(run.errors.contains("position of train 24 lost"), "{}", run.errors);
     assert!(run.errors.contains("`stop 24 at C13+47mm at step 4 next round` waits"), "{}", run.errors);
     let stops = stops(&run, "stop");
     assert_eq!(stops.len(), places.len(), "{}", run.output);
@@ -290,7 +292,7 @@ fn every_journey_of_a_script_is_carried_out_and_ends_where_it_was_promised_to() 
     let run = drive("twelve", link, &script, &["--json", "--store", &store]);
     // then it is looked for first, and comes everywhere, turning around and backing away from turnouts as needed.
     assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
-    assert!(run.errors.contains("train 24 is looked for first"), "{}", run.errors);
+    assert!(run.errors.contains("train 24 is located first"), "{}", run.errors);
     let stops = stops(&run, "go");
     assert_eq!(stops.len(), places.len(), "{}", run.output);
     let kept = stops.iter().filter(|[error, low, high]| (low..=high).contains(&error)).count();
@@ -301,5 +303,5 @@ fn every_journey_of_a_script_is_carried_out_and_ends_where_it_was_promised_to() 
 fn a_limit_of_waiting_is_a_number_of_seconds() {
     let run = drive("limit", LINK, "where\n", &["--wait-limit", "0"]);
     assert_eq!(run.status, 2);
-    assert!(run.errors.contains("no number of seconds above 0 and up to 86400"), "{}", run.errors);
+    assert!(run.errors.contains("not a number of seconds above 0 and up to 86400"), "{}", run.errors);
 }

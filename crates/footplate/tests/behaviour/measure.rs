@@ -102,16 +102,19 @@ fn what_cannot_be_is_refused_and_nothing_is_kept() {
     let events = || footplate(&["store", "show", "--store", path]).output;
     let before = events();
     for (arguments, complaint) in [
-        (&["--train", "24", "--at", "C13+120mm"][..], "lay the tape from E12, the contact it passed last"),
-        (&["--train", "24", "--at", "E12+9000mm"], "lies beyond C6, the next contact 1008 mm on"),
+        (&["--train", "24", "--at", "C13+120mm"][..], "lay the tape from E12, the sensor it passed last"),
+        (&["--train", "24", "--at", "E12+9000mm"], "lies beyond C6, the next sensor 1008 mm on"),
         (&["--train", "24", "--at", "E12-200mm"], "cannot stand 200 mm short of it"),
-        (&["--train", "24", "--at", "Z9+1mm"], "no place of track-a is called `Z9`"),
-        (&["--train", "24", "--at", "BR6+1mm"], "BR6 is no contact"),
-        (&["--train", "24", "--at", "E12+26cm"], "is no offset: write millimetres"),
-        (&["--train", "25", "--at", "E12+260mm"], "train 25 was told nothing in any run"),
+        (&["--train", "24", "--at", "Z9+1mm"], "track-a has no place `Z9`"),
+        (&["--train", "24", "--at", "BR6+1mm"], "BR6 is not a sensor"),
+        (&["--train", "24", "--at", "E12+26cm"], "is not an offset: write millimetres"),
+        (&["--train", "25", "--at", "E12+260mm"], "train 25 was not commanded in any run"),
         (&["--train", "24", "--at", "E12+260mm", "--took", "4h"], "from 0.1s to 15s, such as 3.4s"),
         (&["--train", "24", "--at", "E12+260mm", "--recording", "9"], "there is no recording 9"),
-        (&["--train", "24", "--at", "E12+260mm", "--recording", "1"], "measure a stop when it stands"),
+        (
+            &["--train", "24", "--at", "E12+260mm", "--recording", "1"],
+            "measure a stop while the train is at rest",
+        ),
         (
             &["--train", "24", "--at", "E12+260mm", "--layout", "track-b"],
             "is of the layout track-a, not of track-b",

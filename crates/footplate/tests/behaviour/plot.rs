@@ -98,7 +98,7 @@ fn speeds_and_stops_are_drawn_by_step() {
     ];
     let done = drawn(&session, &svg);
     assert_eq!(done.status, 0, "{}", done.errors);
-    says(&svg, &["Train 24 on track-a", "in which 95 of 100 stops end", "from above"]);
+    says(&svg, &["Train 24 on track-a", "and of single stops", "from above"]);
 }
 
 #[test]

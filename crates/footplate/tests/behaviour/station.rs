@@ -65,7 +65,7 @@ fn a_link_that_leads_nowhere_is_said_so_with_status_2() {
     let cases = [
         ("marklin-serial:/dev/no-such-port", "check the cable"),
         ("marklin-serial:tcp://127.0.0.1:1", "check that the station's server runs there"),
-        ("track-a", "write sim:track-a"),
+        ("track-a", "use sim:track-a"),
         ("sim:no-such-layout", "no-such-layout"),
     ];
     for (link, told) in cases {

@@ -55,7 +55,7 @@ impl fmt::Display for Experiment {
             Self::Speed { step, approach } => write!(f, "speed at step {step} {}", from(approach)),
             Self::Stop { step, approach, is_past } => {
                 let side = if *is_past { "past" } else { "short of" };
-                write!(f, "stop from step {step} {}, {side} a contact", from(approach))
+                write!(f, "stop from step {step} {}, {side} a sensor", from(approach))
             }
             Self::Move { step, run } => write!(f, "short move of {:.1} s at step {step}", run.as_s()),
         }

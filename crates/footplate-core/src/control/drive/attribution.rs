@@ -77,7 +77,7 @@ impl Attribution {
         otherwise.into_iter().any(|branch| branch.train == train)
     }
 
-    /// A turnout was told to lie somehow: what it may have been before does not matter any more.
+    /// A turnout was set somehow: what it may have been before does not matter any more.
     pub(super) fn turnout_thrown(&mut self, turnout: TurnoutId) {
         let branches = self.doubt.iter_mut().flat_map(|doubt| &mut doubt.otherwise);
         branches.for_each(|branch| branch.turnout_thrown(turnout));

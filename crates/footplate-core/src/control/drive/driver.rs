@@ -128,13 +128,13 @@ impl Driver {
         self.trains.get(&train).is_some_and(|train| train.stands(self.track.context(), now))
     }
 
-    /// The step that a train was told last, whether or not that has left yet; 0 for one that is not driven here.
+    /// The step that a train was told last, whether or not that has left yet; 0 for one that is not part of this session.
     #[must_use]
     pub fn told(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.told)
     }
 
-    /// The step at which a train that nobody has seen is let run over a contact; 0 for one that is not driven here.
+    /// The step at which a train that nobody has seen is let run over a contact; 0 for one that is not part of this session.
     #[must_use]
     pub fn finding_step(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, DrivenTrain::finding_step)

@@ -206,120 +206,137 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::InDanger { train } => {
-                write!(f, "train {train} is held until the danger is over")
+                write!(f, "train {train} is stopped for safety until the incident is resolved")
             }
             Self::NoAnswer => f.write_str("the station does not answer"),
-            Self::NoPower => f.write_str("the power is off the track: `power on` gives it back"),
-            Self::UnknownTrain { train } => write!(f, "train {train} is not driven here"),
+            Self::NoPower => f.write_str("track power is off: enter `power on`"),
+            Self::UnknownTrain { train } => write!(f, "train {train} is not part of this session"),
             Self::UnknownTurnout { turnout } => write!(f, "the layout has no turnout {turnout}"),
             Self::StepTooHigh { step, highest } => {
-                write!(f, "step {step} is beyond {highest}, the highest of this train")
+                write!(f, "step {step} is too high: the highest step of this train is {highest}")
             }
             Self::StepDoesNotMove { step } => {
-                write!(f, "step {step} does not move this train reliably: name a higher one")
+                write!(f, "step {step} does not move this train reliably: use a higher step")
             }
             Self::IllegalProbability { found } => {
-                write!(f, "{} % is no probability between 0.0001 % and 50 %", found.as_percent())
+                write!(f, "probability {} % is out of range: use 0.0001 % to 50 %", found.as_percent())
             }
             Self::IllegalDistance { found } => {
-                write!(f, "{} mm is no way ahead: name 1 mm to 100000 mm", found.as_mm())
+                write!(f, "distance {} mm is out of range: use 1 mm to 100000 mm", found.as_mm())
             }
             Self::Place(error) => error.fmt(f),
             Self::NoWay { target, from, unknown: Some(turnout) } => write!(
                 f,
-                "no way is known from `{from}` to `{target}`: nobody knows how turnout {turnout} lies, so set \
-                 it first"
+                "no known path from `{from}` to `{target}`: the position of turnout {turnout} is \
+                 unknown; throw it first"
             ),
             Self::NoWay { target, from, unknown: None } => {
-                write!(f, "no way leads from `{from}` to `{target}` as the turnouts lie")
+                write!(
+                    f,
+                    "no path from `{from}` to `{target}` with the turnouts in their present \
+                           positions"
+                )
             }
             Self::Unreachable { train, target } => write!(
                 f,
-                "no way leads train {train} to `{target}`, however turnouts are thrown and wherever it turns around: \
-                 there may be no room to stop or to turn, or none to come to face that way"
+                "no path takes train {train} to `{target}` with any turnout positions and reversals: \
+                 there may be no room to stop or reverse there, or the train cannot arrive facing that \
+                 direction"
             ),
             Self::TooNear { target, nearest, beyond, round } => {
                 write!(
                     f,
-                    "`{target}` is nearer than the train can stop: the nearest place is `{nearest}`, {:.0} mm \
-                     beyond it",
+                    "`{target}` is too close to stop at: the nearest possible place is `{nearest}`, \
+                     {:.0} mm beyond it",
                     beyond.as_mm()
                 )?;
                 round.map_or(Ok(()), |round| {
-                    write!(f, "; the next time round comes after {:.1} m", round.as_m())
+                    write!(f, "; the train passes it again after {:.1} m", round.as_m())
                 })
             }
             Self::MoveTooShort { shortest } => {
-                write!(f, "the shortest move this train can make is {:.0} mm", shortest.as_mm())
+                write!(f, "the move is too short: this train can move {:.0} mm at least", shortest.as_mm())
             }
             Self::OutOfReach { target } => {
-                write!(f, "the train does not come as far as `{target}` at this step")
+                write!(f, "the train does not get as far as `{target}` at this step")
             }
             Self::Lost { train } => write!(
                 f,
-                "nobody knows where train {train} is: let it run over a contact, as with `speed {train} 6`"
+                "the position of train {train} is unknown: run it over a sensor, for example with \
+                 `speed {train} 6`"
             ),
             Self::OtherNowhere { train, other } => write!(
                 f,
-                "train {train} can be kept clear of train {other} only once that has been found: let it run over a \
-                 contact, as with `speed {other} 6`, or say where it stands, as with `place {other} at C13`"
+                "train {train} cannot be kept clear of train {other}, whose position is unknown: run \
+                 that train over a sensor, for example with `speed {other} 6`, or enter its position, \
+                 for example `place {other} at C13`"
             ),
             Self::NotArrived { train, within } => write!(
                 f,
-                "train {train} has not come there within {:.0} s: move what stands in its way, or let trains pass a \
-                 contact whose places are uncertain",
+                "train {train} did not arrive within {:.0} s: move whatever blocks its path, and run \
+                 trains with an uncertain position over a sensor",
                 within.as_s()
             ),
             Self::TrackEnds { train, end } => {
-                write!(f, "the track ends at `{end}` ahead of train {train}, which was stopped for that")
+                write!(f, "train {train} was stopped: the track ends at `{end}`")
             }
             Self::AtLimit { train } => {
-                write!(f, "train {train} was stopped: it does not hold the track further ahead")
+                write!(f, "train {train} was stopped: the track ahead is not reserved for it")
             }
             Self::StillMoves { train } => {
-                write!(f, "train {train} still moves: wait until it is at rest")
+                write!(f, "train {train} is still moving: wait until it is at rest")
             }
             Self::TurnoutOccupied { turnout, train } => {
-                write!(f, "train {train} is on turnout {turnout} or about to be: wait, or stop it first")
+                write!(
+                    f,
+                    "train {train} is on turnout {turnout} or about to reach it: wait, or stop \
+                           the train first"
+                )
             }
             Self::PartnerOccupied { turnout, partner, train } => write!(
                 f,
-                "turnout {turnout} may lie curved only while turnout {partner} lies straight, and train {train} \
-                 is on that: wait, or stop it first"
+                "turnout {turnout} can be curved only while turnout {partner} is straight, and train \
+                 {train} is on that one: wait, or stop the train first"
             ),
             Self::TooSoon { target, earliest } => write!(
                 f,
-                "`{target}` cannot be reached so soon: allow {:.1} s at least",
+                "`{target}` cannot be reached that soon: allow at least {:.1} s",
                 libm::ceil(10.0 * earliest.as_s()) / 10.0
             ),
             Self::TooSlow { target, latest } => write!(
                 f,
-                "a train that runs cannot take so long to `{target}`: allow {:.1} s at most, or stop it first",
+                "a moving train cannot take that long to `{target}`: allow at most {:.1} s, or stop it \
+                 first",
                 libm::floor(10.0 * latest.as_s()) / 10.0
             ),
             Self::FollowsInCircle { train, leader } => {
-                write!(f, "train {leader} follows train {train}: give that one something else to do first")
+                write!(
+                    f,
+                    "train {leader} already follows train {train}: give train {leader} another \
+                           command first"
+                )
             }
             Self::GapTooShort { leader, shortest: Gap::Time(shortest) } => write!(
                 f,
-                "so near behind train {leader} no stop would be in time: allow {:.1} s at least",
+                "gap to train {leader} too short to stop safely: use at least {:.1} s",
                 libm::ceil(10.0 * shortest.as_s()) / 10.0
             ),
             Self::GapTooShort { leader, shortest: Gap::Way(shortest) } => write!(
                 f,
-                "so near behind train {leader} no stop would be in time: allow {:.0} mm at least",
+                "gap to train {leader} too short to stop safely: use at least {:.0} mm",
                 libm::ceil(shortest.as_mm())
             ),
             Self::SpeedOutOfRange { found, lowest, highest } => write!(
                 f,
-                "{:.0} mm/s cannot be held: name {:.0} to {:.0} mm/s",
+                "{:.0} mm/s cannot be held: use {:.0} to {:.0} mm/s",
                 found.as_mm_per_s(),
                 libm::ceil(lowest.as_mm_per_s()),
                 libm::floor(highest.as_mm_per_s())
             ),
             Self::NotFound { train, within } => write!(
                 f,
-                "no contact reported train {train} within {:.0} s: does it run, and is it on this layout?",
+                "no sensor reported train {train} within {:.0} s: check that it runs and is on this \
+                 layout",
                 within.as_s()
             ),
         }

@@ -70,7 +70,7 @@ impl DrivenTrain {
         self.head_for(context, now, order, &located, destination, stands, out)
     }
 
-    /// A train that was looked for has been found: goes on to where it should. What is too near is passed once more.
+    /// A train that was looked for is located again: goes on to where it should. What is too near is passed once more.
     pub(super) fn set_out(
         &mut self,
         context: TrackContext<'_>,

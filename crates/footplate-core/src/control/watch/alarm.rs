@@ -32,16 +32,16 @@ pub enum Alarm {
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Drift(Drift::Slower) => "it has become slower than it was",
-            Self::Drift(Drift::Faster) => "it has become faster than it was",
-            Self::Lost => "it is lost",
-            Self::Elsewhere(_) => "it has turned up where it cannot have run to",
-            Self::Untimely(_) => "it has come to a contact when it cannot have run there by itself",
-            Self::Misses => "one contact after the other has not reported it",
+            Self::Drift(Drift::Slower) => "it runs slower than calibrated",
+            Self::Drift(Drift::Faster) => "it runs faster than calibrated",
+            Self::Lost => "its position is lost",
+            Self::Elsewhere(_) => "a sensor reported it where it cannot have run to",
+            Self::Untimely(_) => "a sensor reported it at a time when it cannot have been there",
+            Self::Misses => "several sensors in a row did not report it",
             Self::LinkSilent => "the station does not answer",
-            Self::StopUnconfirmed => "it could not be told to stop",
-            Self::DoesNotStop(_) => "it was told to stop and still closes contacts",
-            Self::Distrusted => "it is not trusted any more",
+            Self::StopUnconfirmed => "the stop command could not be sent",
+            Self::DoesNotStop(_) => "it was commanded to stop and sensors still report it",
+            Self::Distrusted => "its model no longer fits",
         })
     }
 }

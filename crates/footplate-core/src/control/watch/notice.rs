@@ -124,50 +124,56 @@ impl fmt::Display for WatchdogNotice {
         match self {
             Self::Drive(notice) => write!(f, "{notice:?}"),
             Self::Danger { train, why, stopped, .. } => {
-                write!(f, "train {train} is told to stand: {why}")?;
+                write!(f, "train {train} stopped: {why}")?;
                 if let Some((first, more)) = stopped.split_first() {
-                    write!(f, "; so is what could meet it: train {first}")?;
+                    write!(f, "; also stopped, because they could meet it: train {first}")?;
                     more.iter().try_for_each(|train| write!(f, ", {train}"))?;
                 }
                 Ok(())
             }
             Self::PowerOff { train } => {
-                write!(f, "power off: nothing says that train {train} has stopped")
+                write!(f, "track power off: train {train} may not have stopped")
             }
-            Self::PowerOn => f.write_str("power on again; every train has been told to stand"),
-            Self::AsksToCrawl { train } => write!(f, "train {train} waits to be permitted to crawl"),
+            Self::PowerOn => f.write_str("track power on; all trains are commanded to stop"),
+            Self::AsksToCrawl { train } => write!(f, "train {train} is waiting for clearance to creep"),
             Self::Crawls { train, step } => {
-                write!(f, "train {train} crawls at step {step} until two contacts say where it is")
+                write!(f, "train {train} creeps at step {step} until two sensors confirm its position")
             }
-            Self::Found { train } => write!(f, "train {train} has been found"),
+            Self::Found { train } => write!(f, "train {train} is located again"),
             Self::Measured { train, step, ratio, deviation } => write!(
                 f,
-                "train {train} runs {:.1} % (within {:.1} %) of its speed at step {step}",
+                "train {train} runs at {:.1} % (± {:.1} %) of its calibrated speed at step {step}",
                 100.0 * ratio,
                 200.0 * deviation
             ),
             Self::StopChecked { train, beyond, deviation } => write!(
                 f,
-                "train {train} came to rest {:.0} mm beyond its forecast, which was good for {:.0} mm",
+                "train {train} came to rest {:.0} mm beyond the prediction (standard deviation {:.0} \
+                 mm)",
                 beyond.as_mm(),
                 2.0 * deviation.as_mm()
             ),
             Self::Recovered { train, outcome, took } => {
-                write!(f, "after {:.0} s train {train} is known again: ", took.as_s())?;
+                write!(f, "recovery took {:.0} s; train {train} is back in service: ", took.as_s())?;
                 match outcome {
-                    Outcome::AsBefore => f.write_str("it is as it was"),
-                    Outcome::Rescaled { ratio } => write!(f, "it runs {:.0} % of its speeds", 100.0 * ratio),
-                    Outcome::LearntAnew => f.write_str("it is another one, and was learnt anew"),
+                    Outcome::AsBefore => f.write_str("its model is unchanged"),
+                    Outcome::Rescaled { ratio } => write!(
+                        f,
+                        "it runs at {:.0} % of its calibrated \
+                                                              speeds",
+                        100.0 * ratio
+                    ),
+                    Outcome::LearntAnew => f.write_str("it is another engine, and was calibrated anew"),
                 }
             }
-            Self::Resumed { train, .. } => write!(f, "train {train} goes on with what it was doing"),
+            Self::Resumed { train, .. } => write!(f, "train {train} resumes its command"),
             Self::Dropped { train, .. } => {
-                write!(f, "what train {train} was doing cannot be gone on with: order it again")
+                write!(f, "the command of train {train} was cancelled; send it again")
             }
             Self::NeedsPerson { train, while_it } => write!(
                 f,
-                "train {train} could not be brought back {while_it}: see to it, put it on the track and say where; \
-                 if no other train is there, let it run over a contact"
+                "position of train {train} lost: recovery failed {while_it}; check the train, then \
+                 enter `place {train} at ...`, or run it over a sensor if no other train is near"
             ),
         }
     }

@@ -405,10 +405,13 @@ impl Watchdog {
     pub(super) fn need_person(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => "to a stand",
-            Phase::Crawling { .. } | Phase::Turning { .. } => "by crawling to a contact",
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => {
+                "while it was being \
+                                                                               stopped"
+            }
+            Phase::Crawling { .. } | Phase::Turning { .. } => "while it crept to a sensor",
             Phase::GivenUp => return,
-            _ => "by measuring it again",
+            _ => "while it was measured again",
         };
         recovery.phase = Phase::GivenUp;
         let order = recovery.interrupted.take();

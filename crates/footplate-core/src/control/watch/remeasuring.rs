@@ -1,4 +1,4 @@
-//! Measuring a train again that has been found: speeds first, then a stop, and everything if it is another one.
+//! Measuring a train again that is located again: speeds first, then a stop, and everything if it is another one.
 
 use alloc::vec::Vec;
 

@@ -1,4 +1,4 @@
-//! What is measured with a train that has been found: its speed at a few steps, and a stop.
+//! What is measured with a train that is located again: its speed at a few steps, and a stop.
 
 use alloc::vec::Vec;
 

@@ -116,7 +116,7 @@ fn unknown(name: &str) -> String {
         || "docs/formats/column-mapping.md lists the names".to_owned(),
         |near| format!("did you mean `{near}`?"),
     );
-    format!("`{}` is no name of ours; {near}", shown(name))
+    format!("`{}` is not a column of Footplate; {near}", shown(name))
 }
 
 fn separator(text: &str) -> Result<u8, String> {
@@ -155,7 +155,7 @@ mod tests {
         assert!(said("v1").contains("a `=` between our name and theirs"));
         assert_eq!(
             said("speed_1_kmh=v1"),
-            "--map speed_1_kmh=v1: `speed_1_kmh` is no name of ours; did you mean `speed_1_km_h`?"
+            "--map speed_1_kmh=v1: `speed_1_kmh` is not a column of Footplate; did you mean `speed_1_km_h`?"
         );
         assert!(said("wind=w").contains("docs/formats/column-mapping.md"));
         assert!(said("t_s=").contains("the name of a column"));
@@ -175,7 +175,7 @@ mod tests {
         let wrong = mapping.take_bytes("columns.toml", b"t_s = \"a\"\nsped_1_m_s = \"v\"\n").unwrap_err();
         assert_eq!(
             wrong.to_string(),
-            "columns.toml, line 2, column 1: `sped_1_m_s` is no name of ours; did you mean `speed_1_m_s`?"
+            "columns.toml, line 2, column 1: `sped_1_m_s` is not a column of Footplate; did you mean `speed_1_m_s`?"
         );
         assert!(
             mapping.take_bytes("c.toml", b"t_s = [1]").unwrap_err().to_string().contains("text in quotes")

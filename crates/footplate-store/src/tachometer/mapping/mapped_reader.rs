@@ -212,8 +212,8 @@ impl RowReader {
         if let (0, Some((step, name))) = (run, self.units.other_unit(form, time)) {
             let mapped = self.name(time_at);
             return Err(RowFault::Unit(format!(
-                "the times rise by {step} s from row to row, which is no odometry period; map the column as {name} instead of \
-                 {mapped}"
+                "the times rise by {step} s from row to row, which cannot be an odometry period; map \
+                 the column as {name} instead of {mapped}"
             )));
         }
         while self.paths.len() <= run {

@@ -25,11 +25,8 @@ impl FromStr for Question {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!(
-                "`{text}` names no number; right would be SPEED:14, STOP:8, LAW:up, LAW:down or LENGTH:C14-A4"
-            )
-        };
+        let wrong =
+            || format!("`{text}` names no figure: use SPEED:14, STOP:8, LAW:up, LAW:down or LENGTH:C14-A4");
         let (kind, name) = text.split_once(':').ok_or_else(wrong)?;
         let step = || name.parse().ok().and_then(SpeedStep::new).ok_or_else(wrong);
         match (kind.to_ascii_uppercase().as_str(), name) {
@@ -72,7 +69,7 @@ impl Question {
             Self::Length(from, to) => lengths(layout, batch, from, to)?,
         };
         if listings.is_empty() {
-            bail!("nothing was measured of that: the table without --explain says what there is");
+            bail!("there are no measurements of that: run without --explain to list the figures");
         }
         if as_json {
             let all: Vec<Value> = listings
@@ -281,7 +278,7 @@ fn lengths(layout: &Layout, batch: &Batch, from: &str, to: &str) -> anyhow::Resu
         .zip(layout.node_named(to))
         .and_then(|(from, to)| layout.hops_from(from).find(|hop| hop.to == to));
     let Some(hop) = hop else {
-        bail!("no path leads from {from} to {to} without another contact between them on {}", layout.name());
+        bail!("no path leads from {from} to {to} without another sensor between them on {}", layout.name());
     };
     let title = |train: &BatchTrain, hop: &Hop<'_>| {
         let model = train.replay.fit.model();

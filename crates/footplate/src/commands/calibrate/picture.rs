@@ -66,12 +66,7 @@ pub(super) fn of_session(train: TrainId, layout: &str, accuracy: &[StepAccuracy]
         panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>()),
         panel("stopping distance (mm)", &ways.collect::<Vec<_>>()),
     ];
-    picture(
-        train,
-        layout,
-        "bars: 95 % of what is not known of speeds, and in which 95 of 100 stops end",
-        panels,
-    )
+    picture(train, layout, "bars: 95 % intervals of speeds, and of single stops", panels)
 }
 
 fn picture(train: TrainId, layout: &str, subtitle: &str, mut panels: Vec<Panel>) -> Picture {

@@ -23,7 +23,7 @@ pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()>
             )?,
             None => writeln!(
                 output,
-                "{}: the reports show no rhythm of polls; taken as every {:.0} ms",
+                "{}: the reports show no poll period; {:.0} ms is assumed",
                 polling.recording, polling.after_report_ms
             )?,
         }
@@ -34,24 +34,26 @@ pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()>
     }
     writeln!(
         output,
-        "\nvalue ± one standard deviation of what is not known; scatter is what no measuring would narrow. Lengths count in\n\
-         speeds, so all speeds share the uncertainty of the survey. The measurements behind a number: --explain SPEED:14"
+        "\nvalue ± one standard deviation of the estimate; std dev is the repeatability of a single \
+         stop. Speeds are computed from\nlengths, so all of them share the uncertainty of the survey. \
+         For the measurements behind a number: --explain SPEED:14"
     )
 }
 
 fn write_train(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
-    write!(output, "Train {}: {} runs, {} contacts passed", train.train, train.runs, train.contacts)?;
+    write!(output, "Train {}: {} runs, {} sensor reports", train.train, train.runs, train.contacts)?;
     if train.silent_runs > 0 {
         write!(output, ", {} runs without a timed one (stalled, or too slow)", train.silent_runs)?;
     }
     writeln!(
         output,
-        "\n  contacts scatter by {:.1} mm, a run deviates from the speed of its step by {:.1} %",
+        "\n  sensors repeat to {:.1} mm, runs to {:.1} % of the speed of their step (one standard \
+         deviation)",
         train.contact_scatter_mm, train.run_deviation_percent
     )?;
     writeln!(
         output,
-        "\n  step  reached from       speed mm/s   contacts         stop mm   scatter   time s   stops"
+        "\n  step  reached from       speed mm/s    reports         stop mm   std dev   time s   stops"
     )?;
     for step in train.steps.iter().filter(|step| step.is_measured()) {
         let MotionStepForm { speed, stop, .. } = step;
@@ -108,16 +110,20 @@ fn write_laws(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
         if !law.fits {
             writeln!(
                 output,
-                "    no law explains it within poll and scatter (χ² {:.1} a degree of freedom): the best of those \
-                 there are",
+                "    no law explains it within polling and repeatability (χ² {:.1} a degree of \
+                 freedom): this is the best available",
                 law.best.chi_square_by_freedom
             )?;
         } else if !law.agreed {
-            writeln!(output, "    another law forecasts held-out changes better by more than a tenth")?;
+            writeln!(output, "    another law predicts held-out changes better by more than a tenth")?;
         }
     }
     if train.laws.is_empty() {
-        writeln!(output, "\n  no law of speed change: fewer than three changes with three contacts each")?;
+        writeln!(
+            output,
+            "\n  no law of speed change: fewer than three changes with three sensor \
+                          reports each"
+        )?;
     }
     Ok(())
 }

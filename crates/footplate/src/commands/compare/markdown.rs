@@ -30,16 +30,17 @@ pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()
         writeln!(output, "## {title}\n")?;
         writeln!(
             output,
-            "{agree} of {} figures agree. One team scatters by {spread:.1} % about what all found (one standard \
-             deviation, from the\nteams themselves), so that two differ by {:.1} %.\n",
+            "{agree} of {} figures agree. Single teams differ from the mean of all by {spread:.1} % \
+             (one standard deviation, from the\nteams themselves), so two teams differ by {:.1} %.\n",
             figures.len(),
             spread * std::f64::consts::SQRT_2
         )?;
         if unit == "mm" {
             writeln!(
                 output,
-                "Ours are counted from the command. Where a team does not say whether it counts from the command or \
-                 from the contact\nwhose report released it, σ holds another 70 ms of running.\n"
+                "Ours are counted from the command. Where a team does not say whether it counts from \
+                 the command or from the sensor\nreport that triggered it, σ includes another 70 ms of \
+                 running.\n"
             )?;
         }
         write_teams(figures, output)?;

@@ -18,15 +18,16 @@ pub(super) fn of(check: &CrossCheck) -> Option<Picture> {
     if trains.any(|other| other != train) {
         return None;
     }
-    let parts = [("steady speed (mm/s)", &check.speeds), ("way to rest (mm)", &check.stops)];
+    let parts = [("steady speed (mm/s)", &check.speeds), ("stopping distance (mm)", &check.stops)];
     let shown = parts.into_iter().filter(|(_, figures)| !figures.is_empty());
     let mut panels: Vec<Panel> = shown.map(|(y, figures)| panel(y, figures)).collect();
     "throttle step".clone_into(&mut panels.last_mut()?.x);
     Some(Picture {
         title: format!("Train {train} beside what others published"),
         subtitle:
-            "bars are 95 % of what is not known of ours; teams agree within what teams differ by anyway"
-                .to_owned(),
+            "bars are 95 % intervals of ours; teams agree if they differ by no more than teams usually \
+             do"
+            .to_owned(),
         panels,
     })
 }

@@ -12,7 +12,7 @@ pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()
         ("Stopping distances, ours counted from the command", "mm", &check.stops, check.stop_spread_percent),
     ] {
         let Some(spread) = spread.filter(|_| !figures.is_empty()) else { continue };
-        writeln!(output, "{title} ({unit}); one team's scatter about all is {spread:.1} %\n")?;
+        writeln!(output, "{title} ({unit}); standard deviation of one team about all: {spread:.1} %\n")?;
         writeln!(
             output,
             "  train  step  reached from             ours    theirs   n  difference       σ  verdict       team"

@@ -64,7 +64,11 @@ pub(super) fn calibrate(
     }
     let calibrator = calibrator.end(stage.now());
     if matches!(calibrator.ending(), Some(Ending::NotFound | Ending::WrongLayout { .. })) {
-        stage.screen.mishap(train, "could not be calibrated: its contacts tell nothing that makes sense")?;
+        stage.screen.mishap(
+            train,
+            "could not be calibrated: its sensor reports fit no path of this \
+                                    layout",
+        )?;
         return Ok(None);
     }
     let steps = known(&calibrator.accuracy());
@@ -113,13 +117,13 @@ fn tell(
             stage.screen.mention(&format!("  train {train}: found, it runs over {node} at step {step}"))
         }
         CalibrationNotice::Circuit(circuit) => stage.screen.mention(&format!(
-            "  train {train}: takes a circuit of {} contacts and {:.1} m",
+            "  train {train}: uses a circuit of {} sensors and {:.1} m",
             circuit.lap.len(),
             circuit.length.as_m()
         )),
         CalibrationNotice::TurnsAround { node } => {
             let node = layout.node_name(*node);
-            stage.screen.mention(&format!("  train {train}: turns around behind {node}"))
+            stage.screen.mention(&format!("  train {train}: reverses beyond {node}"))
         }
         CalibrationNotice::Progress(progress) => {
             let detail = detail(progress, budget);
@@ -138,7 +142,7 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
     let full = (part * BAR as f64).round() as usize;
     let bar: String = (0..BAR).map(|at| if at < full { '━' } else { '─' }).collect();
     let about = match progress.phase {
-        Phase::Finding => "looks for its first contact".to_owned(),
+        Phase::Finding => "waits for its first sensor".to_owned(),
         Phase::Joining => "goes to its circuit".to_owned(),
         Phase::Experiment(experiment) => experiment.to_string(),
         Phase::Paused => "waits".to_owned(),
@@ -150,24 +154,24 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
 fn what_happened(layout: &Layout, mishap: &Mishap) -> String {
     let sensor = |sensor| layout.sensor_name(sensor);
     match mishap {
-        Mishap::Stalled { step } => format!("does not move at step {step} for sure"),
+        Mishap::Stalled { step } => format!("does not move reliably at step {step}"),
         Mishap::Missed { count, before } => {
             format!(
-                "{count} contact{} before {} did not report",
+                "{count} sensor{} before {} did not report",
                 if *count == 1 { "" } else { "s" },
                 sensor(*before)
             )
         }
         Mishap::Unexplained { sensor: of } => {
-            format!("{} reported, which it cannot have passed", sensor(*of))
+            format!("{} reported, but it cannot have passed there", sensor(*of))
         }
         Mishap::WrongLeg { turnout, .. } => {
-            format!("turnout {turnout} lay otherwise than it was told; told again")
+            format!("turnout {turnout} was not in the commanded position; commanded again")
         }
-        Mishap::Moved { to, .. } => format!("is at {} and cannot have run there", layout.node_name(*to)),
-        Mishap::Lost { .. } => "is lost; it stops and is looked for".to_owned(),
+        Mishap::Moved { to, .. } => format!("is at {}, where it cannot have run to", layout.node_name(*to)),
+        Mishap::Lost { .. } => "lost its position; it stops and is located again".to_owned(),
         Mishap::LengthsDiffer { hops } => {
-            format!("takes other times over {} hops than their lengths explain", hops.len())
+            format!("takes times over {} hops that their lengths do not explain", hops.len())
         }
     }
 }

@@ -175,9 +175,13 @@ impl<'l> Tour<'l> {
                     }
                     DriveNotice::Unexplained { sensor, .. } => {
                         let sensor = self.layout.sensor_name(sensor);
-                        stage
-                            .screen
-                            .mishap(self.train, &format!("{sensor} reported, which it cannot have passed"))?;
+                        stage.screen.mishap(
+                            self.train,
+                            &format!(
+                                "{sensor} reported, but it cannot have passed \
+                                                          there"
+                            ),
+                        )?;
                     }
                     _ => {}
                 }

@@ -85,7 +85,7 @@ impl MadeStop {
         let side = if mm < 0.0 { "short of" } else { "beyond" };
         let [low, high] = self.promised;
         format!(
-            "train {} stands {:.0} mm {side} {}, from step {} (promised {} … {} mm)",
+            "train {} stopped {:.0} mm {side} {}, from step {} (predicted {} … {} mm)",
             self.train,
             mm.abs(),
             self.target,
@@ -104,7 +104,7 @@ impl MadeStop {
 pub(super) fn head() -> String {
     format!(
         "  {:>5}  {:<12} {:>9}   {:<12} {:>9}   {:>16}   {}",
-        "train", "target", "from step", "stood at", "error mm", "promised mm", "95 %"
+        "train", "target", "from step", "rest at", "error mm", "predicted mm", "95 %"
     )
 }
 
@@ -115,7 +115,8 @@ pub(super) fn summary(stops: &[MadeStop]) -> Option<String> {
     let (median, largest) = (errors.get(errors.len() / 2)?, errors.last()?);
     let inside = stops.iter().filter(|stop| stop.is_inside()).count();
     Some(format!(
-        "{inside} of {} stops ended where promised; half within {median:.0} mm of the target, all within {largest:.0} mm.",
+        "{inside} of {} stops ended inside the predicted interval; half within {median:.0} mm of the \
+         target, all within {largest:.0} mm.",
         stops.len()
     ))
 }
@@ -147,12 +148,12 @@ impl Learnt {
         let within = |known: &LearntStep| known.stops_within.as_mm();
         let best = self.steps.iter().min_by(|one, other| within(one).total_cmp(&within(other)));
         let (Some(first), Some(last), Some(best)) = (self.steps.first(), self.steps.last(), best) else {
-            return format!("train {} was not calibrated: no step moves it for sure", self.train);
+            return format!("train {} was not calibrated: no step moves it reliably", self.train);
         };
         let worst =
             self.steps.iter().max_by(|one, other| within(one).total_cmp(&within(other))).unwrap_or(last);
         format!(
-            "train {} learnt in {} ({} contacts, {} stops): steps {} to {}, {:.0} to {:.0} mm/s, \
+            "train {} calibrated in {} ({} reports, {} stops): steps {} to {}, {:.0} to {:.0} mm/s, \
              stops to ±{:.0} … ±{:.0} mm",
             self.train,
             minutes(self.took),

@@ -37,7 +37,7 @@ pub(super) struct Stage<'r, 'l, 'o> {
 }
 
 /// What a browser is told that wants to drive.
-const DRIVES_ITSELF: &str = "the demonstration drives by itself: `footplate serve` takes orders";
+const DRIVES_ITSELF: &str = "the demonstration runs by itself: use `footplate serve` to command trains";
 
 impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
     pub(super) fn new(
@@ -84,9 +84,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
     pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
         let notices = self.railway.go_on(machine)?;
         if self.showing.as_ref().is_some_and(|showing| showing.is_halted(DRIVES_ITSELF)) {
-            anyhow::bail!(
-                "emergency stop from the dashboard: all trains are told to stand, the power goes off"
-            );
+            anyhow::bail!("emergency stop from the dashboard: all trains stopped, track power off");
         }
         self.look_for_mishaps()?;
         let acknowledged = self.record.0.borrow().journal.as_ref().map(SessionJournal::acknowledged);
@@ -180,7 +178,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
             let (kept, journal) = journal.finish();
             self.screen.acknowledged(kept.acknowledged)?;
             if let Some(trouble) = kept.trouble {
-                anyhow::bail!("not all of the session was written down: {trouble}");
+                anyhow::bail!("the session was not recorded completely: {trouble}");
             }
             if let Some(mut store) = journal.map(Journal::end) {
                 for model in &self.models {

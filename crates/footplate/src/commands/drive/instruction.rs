@@ -46,30 +46,30 @@ pub(super) enum Until {
 
 /// What can be said, for `help`.
 pub(super) const HELP: &str = "\
-speed 24 8                        run train 24 at step 8; step 0 brings it to rest
-reverse 24 [at step 8]            come to rest, turn around [and run at step 8]
+speed 24 8                        run train 24 at step 8; step 0 stops it
+reverse 24 [at step 8]            stop, then reverse [and run at step 8]
 turnout 11 curved                 throw turnout 11 (curved or straight)
-turnout all straight              so that it is known how all of them lie
-stop 24 at C13+120mm              come to rest with the pickup 120 mm past contact C13
+turnout all straight              throw all turnouts straight, so that their positions are known
+stop 24 at C13+120mm              stop with the pickup 120 mm past sensor C13
      [at step 8]                  ... from step 8
-     [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most
+     [not-beyond 0.1%]            ... with at most 1 stop in 1000 beyond it
      [next round]                 ... after passing it once
-go 24 to D5+40mm                  by the soonest way that is free, turnouts and reversals included
-     [not-beyond 0.1%]            ... beyond it in one stop of a thousand at most
-     [facing]                     ... and facing as that contact does
-move 24 37mm                      from rest, move on by 37 mm
-hold 24 250mm/s                   run at a mean speed, whatever steps that takes
-follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, contact by contact (or by 150mm)
-arrive 24 at D5+40mm in 12s       come to rest there, 12 s from now
-place 24 at C13+120mm             train 24 was put there by hand, or stands there as you see
-length 24 pickup 45mm overhang 110mm   how long train 24 is: its pickup, and from there to its further end
-halt                              all trains stand and the power goes off, at once
-power on                          give power to the track again
-where [24]                        where the train is, how sure, and how fast
+go 24 to D5+40mm                  take the fastest free route; turnouts and reversals are included
+     [not-beyond 0.1%]            ... with at most 1 stop in 1000 beyond it
+     [facing]                     ... and arrive in the direction of that sensor
+move 24 37mm                      from standstill, move on by 37 mm
+hold 24 250mm/s                   run at a mean speed, also between throttle steps
+follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, sensor by sensor (or by 150mm)
+arrive 24 at D5+40mm in 12s       come to rest there in 12 s
+place 24 at C13+120mm             train 24 is there: you put it there, or you see it there
+length 24 pickup 45mm overhang 110mm   length of train 24: its pickup, and from there to its further end
+halt                              emergency stop: stop all trains, switch the track power off
+power on                          switch the track power on
+where [24]                        position and speed of the train, with intervals
 wait 2s                           go on after 2 seconds (also 500ms)
-wait 24 at rest                   go on when train 24 has done what it was told and stands
-wait 24 at C13                    go on when train 24 passes contact C13
-wait 24 located                   go on when a contact has said where train 24 is
-help                              this
+wait 24 at rest                   go on when train 24 has finished its command and is at rest
+wait 24 at C13                    go on when train 24 passes sensor C13
+wait 24 located                   go on when the position of train 24 is known
+help                              show this list
 quit                              stop all trains and end
-# what follows is a remark";
+# comment";

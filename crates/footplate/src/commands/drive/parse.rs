@@ -87,12 +87,12 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
         other => {
             let all = format!(": write one of {}, quit", VERBS.join(", "));
             let verbs = VERBS.into_iter().chain(["quit"]);
-            return Err(verb.mistake(format!("is nothing to do{}", meant(other, verbs, &all))));
+            return Err(verb.mistake(format!("is not a command{}", meant(other, verbs, &all))));
         }
     };
     match words.rest.first() {
         None => Ok(Some(instruction)),
-        Some(word) => Err(word.mistake("is one word too many")),
+        Some(word) => Err(word.mistake("is one word too many: remove it: remove it")),
     }
 }
 
@@ -119,7 +119,9 @@ impl Words<'_, '_, '_> {
                 other => {
                     let known = ["at", "not-beyond", "next"].into_iter();
                     let otherwise = ": write `at step 8`, `not-beyond 0.1%` or `next round`";
-                    return Err(word.mistake(format!("says nothing here{}", meant(other, known, otherwise))));
+                    return Err(
+                        word.mistake(format!("is not allowed here{}", meant(other, known, otherwise)))
+                    );
                 }
             }
         }
@@ -138,7 +140,9 @@ impl Words<'_, '_, '_> {
                 other => {
                     let known = ["facing", "not-beyond"].into_iter();
                     let otherwise = ": write `facing` or `not-beyond 0.1%`";
-                    return Err(word.mistake(format!("says nothing here{}", meant(other, known, otherwise))));
+                    return Err(
+                        word.mistake(format!("is not allowed here{}", meant(other, known, otherwise)))
+                    );
                 }
             }
         }
@@ -151,7 +155,7 @@ impl Words<'_, '_, '_> {
         let behind = self.rest.first().copied();
         let leader = self.train()?;
         if let Some(word) = behind.filter(|_| leader == train) {
-            return Err(word.mistake("is the same train: name the one ahead of it"));
+            return Err(word.mistake("is the same train: name the train ahead of it"));
         }
         self.expect("by")?;
         let gap = if self.is_at_span() { Gap::Time(self.span()?) } else { Gap::Way(self.distance()?) };
@@ -254,10 +258,10 @@ mod tests {
     #[test]
     fn a_mistake_is_named_with_its_column_and_what_would_be_right() {
         for (line, says) in [
-            ("stopp 24 at C13", "column 1: `stopp` is nothing to do: did you mean `stop`?"),
-            ("stop 25 at C13", "column 6: `25` is no train that is driven here: 24, 58"),
+            ("stopp 24 at C13", "column 1: `stopp` unknown command: did you mean `stop`?"),
+            ("stop 25 at C13", "column 6: `25` is not a train of this session: 24, 58"),
             ("stop 24 at C1 3", "column 15: `3` says nothing here"),
-            ("stop 24 at C133", "column 12: no place of track-a is called `C133`"),
+            ("stop 24 at C133", "column 12: track-a has no place `C133`"),
             ("stop 24 at C133", "did you mean `C13`?"),
             ("stop 24 at C13+120", "column 12: `+120` is no offset: write millimetres"),
             (
@@ -268,8 +272,8 @@ mod tests {
             ("stop 24 C13", "column 9: `C13` should be `at`"),
             ("stop 24 at", "column 12: a place, such as `C13` or `C13+120mm` is missing after `at`"),
             ("speed 24", "column 10: a step from 0 to 14 is missing after `24`"),
-            ("speed 24 8 9", "column 12: `9` is one word too many"),
-            ("turnout 99 curved", "column 9: `99` is no turnout of track-a: it has 1, 2"),
+            ("speed 24 8 9", "column 12: `9` is one word too many: remove it"),
+            ("turnout 99 curved", "column 9: `99` is not a turnout of track-a: it has 1, 2"),
             (
                 "turnout 11 curve",
                 "column 12: `curve` should be `straight` or `curved`: did you mean `curved`?",
@@ -278,15 +282,15 @@ mod tests {
             ("move 24 -5mm", "column 9: `-5mm` should be 1mm to 100m"),
             ("hold 24 250", "column 9: `250` should be a speed, such as 250mm/s"),
             ("hold 24 9m/s", "column 9: `9m/s` should be 1mm/s to 5m/s"),
-            ("follow 58 behind 58 by 1s", "column 18: `58` is the same train: name the one ahead of it"),
+            ("follow 58 behind 58 by 1s", "column 18: `58` is the same train: name the train ahead of it"),
             ("follow 58 behind 24 by 1", "column 24: `1` should be a distance ahead, such as 37mm or 1.2m"),
             ("arrive 24 at D5 by 12s", "column 17: `by` should be `in`"),
             ("go 24 at D5", "column 7: `at` should be `to`"),
-            ("go 24 to D5 facin", "column 13: `facin` says nothing here: did you mean `facing`?"),
+            ("go 24 to D5 facin", "column 13: `facin` is not allowed here: did you mean `facing`?"),
             ("length 24 110mm", "column 11: `110mm` should be `pickup`"),
             ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
-            ("wait 24 at C99", "column 12: `C99` is no contact of track-a"),
+            ("wait 24 at C99", "column 12: `C99` is not a sensor of track-a"),
         ] {
             let mistake = read(line).expect_err(line);
             assert!(mistake.contains(says), "{line}: {mistake}");

@@ -63,7 +63,7 @@ impl<'t> Words<'_, 't, '_> {
         }
         let trains: Vec<String> = self.known.trains.keys().map(ToString::to_string).collect();
         let known = if trains.is_empty() { "none is".to_owned() } else { trains.join(", ") };
-        Err(word.mistake(format!("is no train that is driven here: {known}")))
+        Err(word.mistake(format!("is not a train of this session: {known}")))
     }
 
     pub(super) fn step(&mut self, train: TrainId) -> Result<SpeedStep, Mistake> {
@@ -81,7 +81,11 @@ impl<'t> Words<'_, 't, '_> {
             return Ok(turnout);
         }
         let all: Vec<String> = self.known.layout.turnouts().map(|(turnout, _)| turnout.to_string()).collect();
-        Err(word.mistake(format!("is no turnout of {}: it has {}", self.known.layout.name(), all.join(", "))))
+        Err(word.mistake(format!(
+            "is not a turnout of {}: it has {}",
+            self.known.layout.name(),
+            all.join(", ")
+        )))
     }
 
     pub(super) fn leg(&mut self) -> Result<bool, Mistake> {
@@ -127,12 +131,12 @@ impl<'t> Words<'_, 't, '_> {
     }
 
     pub(super) fn sensor(&mut self) -> Result<SensorId, Mistake> {
-        let word = self.next("a contact, such as `C13`")?;
+        let word = self.next("a sensor, such as `C13`")?;
         let layout = self.known.layout;
         layout.sensor_named(word.text).ok_or_else(|| {
             let all = layout.sensors().map(|(sensor, _)| layout.sensor_name(sensor));
             let near = meant(word.text, all, ": write a name such as `C13`");
-            word.mistake(format!("is no contact of {}{near}", layout.name()))
+            word.mistake(format!("is not a sensor of {}{near}", layout.name()))
         })
     }
 

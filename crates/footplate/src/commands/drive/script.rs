@@ -31,7 +31,7 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
     let named = || format!("reading script `{}`", path.display());
     let size = std::fs::metadata(path).with_context(named)?.len();
     if size > LONGEST {
-        bail!("{}: {size} bytes are too many for a script, which may have {LONGEST}", path.display());
+        bail!("{}: {size} bytes are too many for a script: the limit is {LONGEST}", path.display());
     }
     let text = std::fs::read_to_string(path).with_context(named)?;
     let mut steps = Vec::new();

@@ -243,8 +243,8 @@ impl ScriptRunner {
                 self.dispatcher.set_lengths(now, train, lengths);
                 let [ahead, behind] = [lengths.ahead(), lengths.behind()].map(Length::as_mm);
                 self.say(format!(
-                    "train {train} reaches {ahead:.0} mm ahead of the end of its pickup that leads, and {behind:.0} mm \
-                     behind"
+                    "train {train} extends {ahead:.0} mm ahead of the leading end of its pickup, and \
+                     {behind:.0} mm behind it"
                 ));
             }
             Instruction::Halt => self.halt(now),
@@ -308,9 +308,7 @@ impl ScriptRunner {
         }
         self.dispatcher.switch_power(now, false);
         self.hand_on(now);
-        self.say(
-            "halt: all trains are told to stand, and the power goes off; `power on` gives it back".to_owned(),
-        );
+        self.say("halt: all trains stopped, track power off; enter `power on` to switch it on".to_owned());
         self.go_on(now);
     }
 

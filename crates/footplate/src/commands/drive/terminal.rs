@@ -34,7 +34,7 @@ impl Terminal {
     /// # Errors
     /// What the terminal said against it.
     pub(super) fn open(board: &Arc<Board>, layout: &LayoutPicture) -> anyhow::Result<Self> {
-        let terminal = ratatui::try_init().context("the terminal cannot be drawn on: try --plain")?;
+        let terminal = ratatui::try_init().context("the terminal cannot show the screen: try --plain")?;
         let is_over = Arc::new(AtomicBool::new(false));
         let sitting = Sitting {
             board: Arc::clone(board),
@@ -107,7 +107,7 @@ impl Sitting {
         self.seen.say(format!("> {line}"));
         match self.board.ask(line, is_urgent) {
             Ok(answer) => self.asked.push(answer),
-            Err(_) => self.seen.say("! too many orders wait: say it again in a moment".to_owned()),
+            Err(_) => self.seen.say("! too many commands are waiting: enter it again in a moment".to_owned()),
         }
     }
 

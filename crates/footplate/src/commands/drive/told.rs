@@ -57,7 +57,7 @@ impl Tongue<'_> {
     /// One line on where a train is.
     pub(super) fn whereabouts(&self, train: TrainId, now: Timestamp) -> String {
         let Some(located) = self.driver.locate(train, now) else {
-            return format!("train {train}: nobody knows where; it has to pass a contact first");
+            return format!("train {train}: position unknown; run it over a sensor first");
         };
         let place = self.driver.landmark(train, located.at).map_or_else(|| "?".into(), |at| self.place(at));
         let half = HALF_95 * located.uncertainty.as_mm();
@@ -90,7 +90,8 @@ impl Tongue<'_> {
             DriveNotice::Planned(plan) => self.planned(plan),
             DriveNotice::Overshoots { train, by, .. } => {
                 format!(
-                    "train {train} comes to rest about {:.0} mm beyond the target: it was nearer than believed",
+                    "train {train} comes to rest about {:.0} mm beyond the target: it was closer than \
+                     estimated",
                     by.as_mm()
                 )
             }
@@ -103,7 +104,8 @@ impl Tongue<'_> {
             DriveNotice::Arrives(plan) => self.arrives(plan),
             DriveNotice::HeldBack { train, leader, .. } => {
                 format!(
-                    "train {train} is held back: it would come too near to train {leader}, or nobody knows where that is"
+                    "train {train} is held back: it would come too close to train {leader}, or the \
+                     position of that train is unknown"
                 )
             }
             DriveNotice::Restrained { train, step, zone, limit } => format!(
@@ -112,47 +114,51 @@ impl Tongue<'_> {
             ),
             DriveNotice::Done(finished) => self.done(finished)?,
             DriveNotice::Thrown { turnout, curved, .. } => {
-                format!("turnout {turnout} told to lie {}", leg(*curved))
+                format!("turnout {turnout} set {}", leg(*curved))
             }
             DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
-                format!("turnout {turnout} lies {}: train {train} went there", leg(*curved))
+                format!("turnout {turnout} is {}: train {train} took that leg", leg(*curved))
             }
             DriveNotice::Overdue { train, sensor, by } => format!(
-                "train {train} should have passed {} {:.1} s ago: a missed contact, or it stands",
+                "train {train} should have passed {} {:.1} s ago: a missed detection, or the train has \
+                 stopped",
                 self.sensor(*sensor),
                 by.as_s()
             ),
             DriveNotice::TrackEnds { train, end } => {
                 let end = self.driver.layout().node_name(*end);
-                format!("the track ends at {end} ahead of train {train}: told to stop")
+                format!("train {train} stopped: the track ends at {end}")
             }
             DriveNotice::AtLimit { train } => {
-                format!("train {train} does not hold the track further ahead: told to stop")
+                format!("train {train} stopped: the track ahead is not reserved for it")
             }
             DriveNotice::Lost { train } => {
-                format!("train {train} is lost: told to stop; put it right, then let it pass a contact")
+                format!(
+                    "position of train {train} lost, train stopped: check the train, then run it \
+                         over a sensor"
+                )
             }
             DriveNotice::Ambiguous { sensor, time, likeliest, or } => {
                 let or = or.map_or_else(|| "by no train at all".into(), |other| format!("by train {other}"));
                 format!(
-                    "{}  {} was closed by train {likeliest} or {or}: the next contacts will tell",
+                    "{}  {} was reported by train {likeliest} or {or}: the next reports decide",
                     self.at(*time),
                     self.sensor(*sensor)
                 )
             }
             DriveNotice::ContactStuck { sensor } => format!(
-                "{} closes again and again where no train can be: it is not believed until it behaves",
+                "{} reports repeatedly where no train can be: it is ignored until it behaves",
                 self.sensor(*sensor)
             ),
             DriveNotice::ContactBehaves { sensor } => {
-                format!("{} has behaved for a while and is believed again", self.sensor(*sensor))
+                format!("{} has behaved for a while and is used again", self.sensor(*sensor))
             }
             DriveNotice::Unexplained { sensor, time } => format!(
-                "{}  {} was closed, and no train can have been there",
+                "{}  {} reported, but no train can have been there",
                 self.at(*time),
                 self.sensor(*sensor)
             ),
-            DriveNotice::Unconfirmed { command } => format!("no sign that this has left: {command}"),
+            DriveNotice::Unconfirmed { command } => format!("not confirmed as sent: {command}"),
             // Whoever replaced it knows; what was given up is said with the order it was.
             DriveNotice::Replaced { .. } | DriveNotice::GivenUp { .. } => return None,
         })
@@ -166,42 +172,44 @@ impl Tongue<'_> {
             DispatchNotice::RouteSet { train, takes, turns } => {
                 let turns = match turns {
                     0 => String::new(),
-                    1 => ", turning around once".to_owned(),
-                    more => format!(", turning around {more} times"),
+                    1 => ", reversing once".to_owned(),
+                    more => format!(", reversing {more} times"),
                 };
-                format!("train {train} has its way: about {:.0} s{turns}", takes.as_s())
+                format!("route set for train {train}: about {:.0} s{turns}", takes.as_s())
             }
             DispatchNotice::Waits { train, on } => {
-                format!("train {train} waits for track that is held by {}", trains(on))
+                format!("train {train} waits for track that is reserved for {}", trains(on))
             }
             DispatchNotice::Deadlock { train, moves } if moves.is_empty() => {
-                format!("train {train} cannot get through, nor can anybody else: one will go somewhere else")
+                format!(
+                    "train {train} is in a deadlock that no train can resolve from its place: one \
+                         is sent elsewhere"
+                )
             }
             DispatchNotice::Deadlock { train, moves } => {
-                format!("train {train} cannot get through: {} will step aside", trains(moves))
+                format!("train {train} is in a deadlock: {} makes room", trains(moves))
             }
             DispatchNotice::StepsAside { train, makes_room_for, to } => {
-                format!("train {train} steps aside to {} for train {makes_room_for}", self.place(*to))
+                format!("train {train} moves to {} to make room for train {makes_room_for}", self.place(*to))
             }
             // That has been said with the refusal.
             DispatchNotice::Withdrawn { why: Some(Refusal::Unreachable { .. }), .. } => return None,
             DispatchNotice::Withdrawn { train, why } => {
                 let why = why.as_ref().map_or_else(String::new, |why| format!(": {why}"));
-                format!("train {train} does not set out yet{why}; it is tried again")
+                format!("train {train} does not start yet{why}; Footplate tries again")
             }
             DispatchNotice::Arrived { train, took, .. } => {
                 format!("train {train} has arrived after {:.1} s", took.as_s())
             }
             DispatchNotice::Diverged { train, stopped } if stopped.is_empty() => {
-                format!("train {train} is not on the way that it was granted: told to stop")
+                format!("train {train} left its reserved route: stopped")
             }
             DispatchNotice::Diverged { train, stopped } => format!(
-                "train {train} is not on the way that it was granted: told to stop, and so is what it could meet, \
-                 {}",
+                "train {train} left its reserved route: stopped, with the trains it could meet: {}",
                 trains(stopped)
             ),
             DispatchNotice::HeldAsUnknown { train } => {
-                format!("nobody is sent onto the track where train {train} may be")
+                format!("no train is sent onto track where train {train} may be")
             }
         })
     }
@@ -231,7 +239,7 @@ impl Tongue<'_> {
     }
 
     fn planned(&self, plan: &PlannedStop) -> String {
-        let mut line = format!("{}  train {} will be told to stop", self.at(plan.leaves), plan.train);
+        let mut line = format!("{}  train {} will be commanded to stop", self.at(plan.leaves), plan.train);
         if let (Some(sensor), Some(after)) = (plan.trigger, plan.after_trigger) {
             line += &format!(", {:.3} s after {}", after.as_s(), self.sensor(sensor));
         }
@@ -240,13 +248,12 @@ impl Tongue<'_> {
     }
 
     fn arrives(&self, plan: &PlannedArrival) -> String {
-        let mut line = format!("{}  train {} will stand there", self.at(plan.by), plan.train);
+        let mut line = format!("{}  train {} will be at rest there", self.at(plan.by), plan.train);
         if let Some((at, step)) = plan.starts {
             line += &format!("; starts at step {step} at {:.1} s", (at - self.began).as_s());
         }
         if let Some(profile) = plan.profile {
-            let how =
-                if profile.has_least_jerk() { "with the least jerk" } else { "by way of a steady speed" };
+            let how = if profile.has_least_jerk() { "with minimum jerk" } else { "through a steady speed" };
             let (from, to) = (profile.at(profile.begins()).1, profile.at(profile.ends()).1);
             line += &format!(
                 ", {how} from {:.0} to {:.0} mm/s, and stops from step {}",
@@ -271,7 +278,8 @@ impl Tongue<'_> {
             line += &format!(", {:+.1} mm from the target", error.as_mm());
         }
         if let Some(promise) = finished.promise {
-            line += &format!(" (promised {:+.0} mm to {:+.0} mm)", promise.low.as_mm(), promise.high.as_mm());
+            line +=
+                &format!(" (predicted {:+.0} mm to {:+.0} mm)", promise.low.as_mm(), promise.high.as_mm());
         }
         Some(line)
     }
@@ -280,8 +288,9 @@ impl Tongue<'_> {
 /// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
 pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
     format!(
-        "train {train} comes to rest elsewhere than promised: promises are wider by ±{:.0} mm from now on; if its load, the train or \
-         the track has changed, measure it again with `footplate calibrate --link ... --train {train} --afresh`",
+        "stops of train {train} miss their intervals: the intervals are ±{:.0} mm wider from now on; if \
+         its load, the train or the track has changed, calibrate it again with `footplate calibrate \
+         --link ... --train {train} --afresh`",
         HALF_95 * by.as_mm()
     )
 }
@@ -289,7 +298,7 @@ pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
 /// Trains one after the other, as in a sentence.
 pub(super) fn trains(trains: &[TrainId]) -> String {
     let trains: Vec<String> = trains.iter().map(|train| format!("train {train}")).collect();
-    if trains.is_empty() { "nobody that can move".to_owned() } else { trains.join(", ") }
+    if trains.is_empty() { "no train that can move".to_owned() } else { trains.join(", ") }
 }
 
 const fn leg(curved: bool) -> &'static str {

@@ -63,8 +63,8 @@ impl KnownTrains {
         }
         if known.models.is_empty() {
             bail!(
-                "there is no train to drive: name one with `--train 24`, or what is known of one with `--store` or \
-                 `--model`"
+                "there is no train to drive: name one with `--train 24`, or give calibrated trains with \
+                 `--store` or `--model`"
             );
         }
         Ok(known)
@@ -96,7 +96,8 @@ impl KnownTrains {
         match KeptModel::of_store(layout, store, train, at)? {
             KeptModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
             KeptModel::OfOtherFormulas => eprintln!(
-                "what the store says of train {train} was learnt by other formulas; it is learnt anew from its events"
+                "the stored model of train {train} is from another version of the formulas; it is \
+                 fitted again from the stored events"
             ),
             KeptModel::Nothing if is_named => {}
             KeptModel::Nothing => return Ok(()),

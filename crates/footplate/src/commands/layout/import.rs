@@ -15,8 +15,7 @@ use crate::commands::Outcome;
 /// What is assumed of lengths that come without a figure: two surveys of one course track by hand differ from
 /// a third by 9 and 11 mm (standard deviation).
 const ASSUMED_UNCERTAINTY_MM: &str = "10";
-const ASSUMED_ORIGIN: &str =
-    "assumed: surveys of one track were seen to differ by 9 to 11 mm (standard deviation)";
+const ASSUMED_ORIGIN: &str = "assumed: surveys of one track differ by 9 to 11 mm (standard deviation)";
 
 /// Import a layout from CSV tables of nodes and directed edges.
 ///

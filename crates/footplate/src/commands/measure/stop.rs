@@ -69,8 +69,8 @@ impl FromStr for Seconds {
     fn from_str(text: &str) -> Result<Self, String> {
         let seconds = text.trim().trim_end_matches('s').trim_end().parse::<f64>();
         let seconds = seconds.ok().filter(|seconds| (0.1..=15.0).contains(seconds));
-        let right =
-            "write the seconds from the command until the train stood, from 0.1s to 15s, such as 3.4s";
+        let right = "write the seconds from the command until the train was at rest, from 0.1s to 15s, such as \
+             3.4s";
         seconds.map(|seconds| Self(TimeSpan::from_s(seconds))).ok_or_else(|| right.to_owned())
     }
 }
@@ -158,13 +158,14 @@ impl Told<'_> {
         let (run, recording, from) = (stopped.run.id, stopped.recording.key, stopped.from());
         writeln!(
             output,
-            "event {key}: train {train} stands at {at}, stopped from step {from} (recording {recording}, run {run})"
+            "event {key}: train {train} at rest at {at}, stopped from step {from} (recording \
+             {recording}, run {run})"
         )?;
         let Some(after) = &self.after else {
             return writeln!(
                 output,
-                "kept; what it says of stops from step {from} is known when the speed at step {from} is: let the train \
-                 pass two contacts at it"
+                "stored; it is used for stops from step {from} once the speed at step {from} is known: \
+                 run the train past two sensors at that step"
             );
         };
         let shown = |known: &Known| {

@@ -43,8 +43,8 @@ impl StoppedRun {
             }
         }
         bail!(
-            "train {train} was told nothing in any run of {}, so no stop of it can be measured; drive it first with \
-             --store, or import a recording of it",
+            "train {train} was not commanded in any run of {}, so none of its stops can be measured; \
+             drive it first with --store, or import a recording of it",
             of.map_or_else(|| store.path().display().to_string(), |key| format!("recording {key}"))
         )
     }
@@ -92,8 +92,8 @@ impl StoppedRun {
         let before = read.passages.iter().rposition(|passage| passage.window.until <= stop.commanded);
         let Some(before) = before else {
             bail!(
-                "train {train} had passed no contact in this run when it was told to stop, so nobody knows how far it \
-                 ran on"
+                "train {train} had passed no sensor in this run before its stop command, so its \
+                 stopping distance is unknown"
             );
         };
         let passed = read.passages.get(before..).unwrap_or_default();
@@ -102,8 +102,8 @@ impl StoppedRun {
         if passed.iter().all(|passage| passage.node != at.node) {
             let last = passed.last().map(name).unwrap_or_default();
             bail!(
-                "train {train} was not reported at {here} on its way to rest; lay the tape from {last}, the contact it \
-                 passed last"
+                "train {train} was not reported at {here} while it stopped; lay the tape from {last}, \
+                 the sensor it passed last"
             );
         }
         check_offset(layout, at)
@@ -131,8 +131,8 @@ fn last_told(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, Spe
     }
     if told && stopped.is_none() {
         bail!(
-            "train {train} was told step {step} last, in run {}: measure a stop when it stands, before it is told to go \
-             on",
+            "train {train} was last commanded to step {step}, in run {}: measure a stop while the train \
+             is at rest, before the next command",
             run.id
         );
     }
@@ -143,7 +143,7 @@ fn contact_of(layout: &Layout, at: Landmark) -> anyhow::Result<SensorId> {
     let name = layout.node_name(at.node);
     let sensor = layout.sensors().find(|(_, node)| *node == at.node);
     let Some((sensor, _)) = sensor else {
-        bail!("{name} is no contact; lay the tape from the contact that the train passed last");
+        bail!("{name} is not a sensor; lay the tape from the sensor that the train passed last");
     };
     Ok(sensor)
 }
@@ -156,8 +156,8 @@ fn check_offset(layout: &Layout, at: Landmark) -> anyhow::Result<()> {
         .max_by(|one, other| one.0.as_m().total_cmp(&other.0.as_m()));
     match next {
         Some((length, next)) if at.offset > length + SURVEY => bail!(
-            "{:.0} mm past {name} lies beyond {next}, the next contact {:.0} mm on; measure from the contact that the \
-             train passed last",
+            "{:.0} mm past {name} lies beyond {next}, the next sensor {:.0} mm on; measure from the \
+             sensor that the train passed last",
             at.offset.as_mm(),
             length.as_mm()
         ),

@@ -23,7 +23,8 @@ pub(super) fn measured_stops(
     match batch.trains.as_slice() {
         [one] if !one.review.stops.is_empty() => Ok(picture(one, layout.name(), newest)),
         _ => bail!(
-            "no stop of train {train} can be counted from its command yet: let it pass two contacts at a step"
+            "no stop of train {train} can be counted from its command yet: run it past two sensors at \
+             one step"
         ),
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn of(layout: &Layout, recordings: &[ScoredRecording]) -> Option<Pict
         several => format!("{} logs", several.len()),
     };
     Some(Picture {
-        title: format!("Forecasts of the next contact, {logs} on {}", layout.name()),
+        title: format!("Predictions of the next sensor report, {logs} on {}", layout.name()),
         subtitle: format!("{scored} reports that were forecast; every curve ends at {SHOWN:.0} % of its own"),
         panels,
     })

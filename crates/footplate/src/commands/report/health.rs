@@ -162,7 +162,7 @@ fn misses(points: &[ForecastPoint], language: Language) -> Check {
         found: format!("{missed} {} {}", language.pick("of", "von"), missed + points.len()),
         state: graded(missed as f64 / (missed + points.len()).max(1) as f64, MISSES),
         says: language
-            .pick("contacts on the way that never reported", "Kontakte auf dem Weg, die sich nie meldeten"),
+            .pick("sensors on the path that never reported", "Kontakte auf dem Weg, die sich nie meldeten"),
     }
 }
 

@@ -98,14 +98,15 @@ fn section(train: &TrainReport, language: Language) -> String {
     if !train.changes.is_empty() {
         html.push_str(&chart(
             "change",
-            "A change of speed: the fitted law, and the contacts measured",
+            "A change of speed: the fitted law and the sensor reports",
             "Ein Tempowechsel: das Gesetz dazu, und die gemessenen Kontakte",
         ));
     }
     html.push_str(&heading("Forecasts", "Vorhersagen"));
     html.push_str(&chart(
         "forecasts",
-        "How much later than forecast each contact reported; shaded: the 90 % interval stated beforehand",
+        "Lateness of each sensor report against its prediction; shaded: the 90 % interval stated \
+         beforehand",
         "Wie viel später als vorhergesagt jeder Kontakt sich meldete; getönt: das vorher genannte 90-%-Intervall",
     ));
     html.push_str(&heading("Stops", "Halte"));

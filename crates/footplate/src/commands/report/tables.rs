@@ -52,7 +52,7 @@ pub(super) fn speeds(train: &TrainFindings, language: Language) -> String {
 pub(super) fn laws(train: &TrainFindings, language: Language) -> String {
     if train.laws.is_empty() {
         let none = language.pick(
-            "No law of speed change yet: it takes three changes with three contacts each.",
+            "No law of speed change yet: it needs three changes with three sensor reports each.",
             "Noch kein Gesetz für Tempowechsel: es braucht drei Wechsel mit je drei Kontakten.",
         );
         return format!("<p>{none}</p>\n");
@@ -80,13 +80,13 @@ pub(super) fn laws(train: &TrainFindings, language: Language) -> String {
             Direction::Down => language.pick("slower", "langsamer"),
         };
         let verdict = match (law.fits, law.agreed) {
-            (true, true) => language.pick("explains the contacts", "erklärt die Kontakte"),
+            (true, true) => language.pick("explains the sensor reports", "erklärt die Kontakte"),
             (true, false) => language.pick(
                 "explains them; another law forecasts better by a tenth",
                 "erklärt sie; ein anderes sagt um ein Zehntel besser vorher",
             ),
             (false, _) => language.pick(
-                "no law explains the contacts: the best of those there are",
+                "no law explains the sensor reports: the best available",
                 "keines erklärt die Kontakte: das beste von allen",
             ),
         };
@@ -137,7 +137,7 @@ pub(super) fn lengths(train: &TrainFindings, language: Language) -> String {
         Language::German => ["von", "bis", "vermessen", "dazu"],
     };
     let caption = language.pick(
-        "Between contacts: the survey, and what to add",
+        "Between sensors: surveyed lengths and corrections",
         "Zwischen Kontakten: die Vermessung, und was dazukommt",
     );
     let mut table = Table::new(caption, &columns, &[false, false, true, true]);

@@ -73,7 +73,7 @@ impl Archive {
 }
 
 fn train_of(text: &str) -> anyhow::Result<TrainId> {
-    Ok(TrainId(text.parse().with_context(|| format!("`{text}` is no number of a train, such as 24"))?))
+    Ok(TrainId(text.parse().with_context(|| format!("`{text}` is not the number of a train, such as 24"))?))
 }
 
 async fn recordings(State(archive): State<Archive>) -> Response {
@@ -105,8 +105,12 @@ async fn recordings(State(archive): State<Archive>) -> Response {
 async fn recorded_pictures(State(archive): State<Archive>, Path(recording): Path<String>) -> Response {
     archive
         .answer(move |_, store| {
-            let number =
-                recording.parse().with_context(|| format!("`{recording}` is no recording's number"))?;
+            let number = recording.parse().with_context(|| {
+                format!(
+                    "`{recording}` is not the number of a \
+                                                           recording"
+                )
+            })?;
             pictures(&store, RecordingKey(number))
         })
         .await

@@ -102,7 +102,7 @@ impl Arguments {
     fn train_count(&self) -> anyhow::Result<u16> {
         let Some(written) = &self.trains else { return Ok(1) };
         let count = written.parse().ok().filter(|count| (1..=MOST_TRAINS).contains(count));
-        count.ok_or_else(|| anyhow!("`{written}` is no number of trains; write 1 to {MOST_TRAINS}"))
+        count.ok_or_else(|| anyhow!("`{written}` is not a number of trains; write 1 to {MOST_TRAINS}"))
     }
 
     fn serve(&self, layout: &Layout, output: &mut dyn Write) -> anyhow::Result<()> {

@@ -67,7 +67,7 @@ impl Seeds {
             None => (text, current_commit()?),
         };
         let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MOST_SEEDS).contains(count)) else {
-            bail!("`{count}` is no number of fresh seeds; write fresh:64, at most fresh:{MOST_SEEDS}");
+            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MOST_SEEDS}");
         };
         let digits = commit.trim_end_matches(CHANGED);
         let Some(hash) = digits.get(..HASH_DIGITS).and_then(|hash| u64::from_str_radix(hash, 16).ok()) else {

@@ -3,7 +3,7 @@
 //! Letters: `D` the way to the target, `T` the time until it shall stand there, `k` the step from which it stops, whose
 //! stopping way `d` and time `t` are known well, `s` the time for which it runs steadily at that step before. From its state
 //! now the train is brought to `D − d − v s` in `T − t − s`, so that it is there at the speed `v` of the step: by the motion
-//! with the least jerk if that asks for no speed that it cannot hold, else by two changes of speed and a steady run between
+//! with minimum jerk if that asks for no speed that it cannot hold, else by two changes of speed and a steady run between
 //! them. Where zones on the way allow less than either asks for, it runs at one speed wherever they do not.
 
 use alloc::vec::Vec;
@@ -116,7 +116,7 @@ impl ArrivalProfile {
         self.plan.last.step
     }
 
-    /// Whether it is the motion with the least jerk; otherwise a speed is kept between two changes.
+    /// Whether it is the motion with minimum jerk; otherwise a speed is kept between two changes.
     #[must_use]
     pub const fn has_least_jerk(&self) -> bool {
         matches!(self.plan.profile, Profile::LeastJerk(_))

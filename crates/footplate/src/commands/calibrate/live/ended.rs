@@ -49,22 +49,29 @@ impl Why {
 impl Display for Why {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         match self {
-            Self::Ended(Ending::Budget) => f.write_str("the budget is used"),
-            Self::Ended(Ending::NothingToGain) => f.write_str("nothing is left that would be worth its time"),
-            Self::Ended(Ending::Told) | Self::Interrupted => f.write_str("interrupted; what was learnt is kept"),
+            Self::Ended(Ending::Budget) => f.write_str("the time budget is used up"),
+            Self::Ended(Ending::NothingToGain) => f.write_str(
+                "no remaining experiment is worth its \
+                                                               time",
+            ),
+            Self::Ended(Ending::Told) | Self::Interrupted => f.write_str(
+                "interrupted; the measurements \
+                                                                          so far are kept",
+            ),
             Self::Ended(Ending::NotFound) => f.write_str(
-                "the train was not found: no contact reported at any step. Does it stand on the track, is it under \
-                 power, and is it the right number?",
+                "the train was not found: no sensor reported it at any step. Check that it is on the \
+                 track, that the track has power and that the address is right",
             ),
-            Self::Ended(Ending::NoCircuit) => f.write_str(
-                "no circuit can be reached from where the train is: put it on a track that leads round",
-            ),
-            Self::Ended(Ending::WrongLayout { .. }) => {
-                f.write_str("the contacts report in an order that this layout does not allow: it is another one")
+            Self::Ended(Ending::NoCircuit) => {
+                f.write_str("no circuit can be reached from the train's position: put it on a closed loop")
             }
+            Self::Ended(Ending::WrongLayout { .. }) => f.write_str(
+                "the sensors report in an order that is impossible on this layout: check \
+                             `--layout`",
+            ),
             Self::OtherLayout { other } => write!(
                 f,
-                "the times between contacts are those of {other}: give `--layout {other}` if that is the layout"
+                "the times between sensors fit {other}: use `--layout {other}` if that is the layout"
             ),
             Self::Lost(lost) => f.write_str(lost),
             Self::NotRecorded(error) => write!(f, "{error:#}"),

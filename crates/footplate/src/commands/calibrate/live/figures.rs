@@ -34,7 +34,8 @@ impl Figures<'_> {
         }
         writeln!(
             output,
-            "\n  step  reached from   speed mm/s         stop mm     scatter   95 % of stops within   stops"
+            "\n  step  reached from   speed mm/s         stop mm     std dev   95 % of stops within   \
+             stops"
         )?;
         for line in self.accuracy {
             writeln!(
@@ -53,7 +54,8 @@ impl Figures<'_> {
         }
         writeln!(
             output,
-            "\nvalue ± one standard deviation of what is not known; scatter is what no measuring would narrow"
+            "\nvalue ± one standard deviation of the estimate; std dev is the repeatability of a single \
+             stop"
         )
     }
 

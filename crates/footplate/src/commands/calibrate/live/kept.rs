@@ -40,6 +40,6 @@ pub(super) fn begin(
 pub(super) fn end(journal: SessionJournal) {
     let (kept, _) = journal.finish();
     if let Some(trouble) = kept.trouble {
-        eprintln!("the session was not written down to its end: {trouble}");
+        eprintln!("the end of the session was not recorded: {trouble}");
     }
 }

@@ -7,25 +7,24 @@ use footplate_core::track::Layout;
 pub(in crate::commands) fn line(layout: &Layout, notice: &CalibrationNotice) -> Option<String> {
     Some(match notice {
         CalibrationNotice::Found { node, step } => {
-            format!("found: it passed {} at step {step}", layout.node_name(*node))
+            format!("found at {} at step {step}", layout.node_name(*node))
         }
         CalibrationNotice::Circuit(circuit) => {
             let legs: Vec<String> =
                 circuit.legs.iter().map(|(turnout, leg)| format!("{turnout} {leg}")).collect();
             format!(
-                "circuit: {} contacts in {:.2} m, turnouts {}",
+                "circuit: {} sensors in {:.2} m, turnouts {}",
                 circuit.lap.len(),
                 circuit.length.as_m(),
                 legs.join(", ")
             )
         }
         CalibrationNotice::TurnsAround { node } => {
-            format!("behind {} no circuit can be reached: it turns around", layout.node_name(*node))
+            format!("no circuit can be reached beyond {}: it reverses", layout.node_name(*node))
         }
-        CalibrationNotice::Begins { experiment, why: Why::MostPerSecond { gain, takes } } => format!(
-            "{experiment}: should take {:.0} s and lower the doubts by {gain:.1} scatters squared",
-            takes.as_s()
-        ),
+        CalibrationNotice::Begins { experiment, why: Why::MostPerSecond { gain, takes } } => {
+            format!("{experiment}: takes {:.0} s; expected information {gain:.1}", takes.as_s())
+        }
         CalibrationNotice::Begins { .. } => return None,
         CalibrationNotice::Done(done) => measured(done),
         CalibrationNotice::Mishap(mishap) => format!("! {}", happened(layout, mishap)),
@@ -55,23 +54,23 @@ fn measured(done: &Done) -> String {
 
 fn happened(layout: &Layout, mishap: &Mishap) -> String {
     match mishap {
-        Mishap::Stalled { step } => format!("it stalled at step {step}, which is not relied upon from here"),
+        Mishap::Stalled { step } => format!("it stalled at step {step}; this step is not used any more"),
         Mishap::Missed { count, before } => {
-            format!("{count} contact(s) before {} did not report", layout.sensor_name(*before))
+            format!("{count} sensor(s) before {} did not report", layout.sensor_name(*before))
         }
         Mishap::Unexplained { sensor } => {
             format!("{} reported, where the train cannot be", layout.sensor_name(*sensor))
         }
         Mishap::WrongLeg { turnout, wanted } => {
-            format!("turnout {turnout} does not lie {wanted} as it was told; told again")
+            format!("turnout {turnout} is not {wanted} as commanded; commanded again")
         }
         Mishap::Moved { from, to } => format!(
-            "it is at {} and cannot have run there from {}: was it lifted?",
+            "it is at {}, where it cannot have run to from {}: was it lifted?",
             layout.node_name(*to),
             from.map_or("?", |from| layout.node_name(from))
         ),
         Mishap::Lost { last } => format!(
-            "no contact for too long after {}: it stands, and is looked for again",
+            "no sensor report for too long after {}: it is stopped and located again",
             last.map_or("?", |last| layout.node_name(last))
         ),
         Mishap::LengthsDiffer { hops } => {
@@ -80,7 +79,7 @@ fn happened(layout: &Layout, mishap: &Mishap) -> String {
                 let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
                 Some(format!("{from} to {to} {:.0} instead of {:.0} mm", felt.as_mm(), surveyed.as_mm()))
             });
-            format!("lengths are not those of the layout: {}", each.collect::<Vec<_>>().join(", "))
+            format!("lengths differ from the layout: {}", each.collect::<Vec<_>>().join(", "))
         }
     }
 }
@@ -89,7 +88,7 @@ fn happened(layout: &Layout, mishap: &Mishap) -> String {
 pub(super) fn state(progress: &Progress) -> String {
     let about = match &progress.phase {
         Phase::Finding => "looking for the train".to_owned(),
-        Phase::Joining => "on the way to a circuit".to_owned(),
+        Phase::Joining => "running to a circuit".to_owned(),
         Phase::Experiment(experiment) => experiment.to_string(),
         Phase::Paused => "paused".to_owned(),
         Phase::Ending => "coming to rest".to_owned(),

@@ -14,7 +14,7 @@ use crate::runtime::{Attendant, Wish};
 use crate::witness::Witnessed;
 
 /// What a browser is told that wants to drive.
-const DRIVES_ITSELF: &str = "a calibration drives by itself: `footplate serve` takes orders";
+const DRIVES_ITSELF: &str = "a calibration runs by itself: use `footplate serve` to command trains";
 
 /// Tells people how it goes, on standard error.
 pub(super) struct Watcher<'l> {
@@ -103,7 +103,7 @@ impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
         if let Some(showing) = &mut self.showing {
             showing.alarm(now, &Alarm::not_sent(&format!("{command}: {error}")));
         }
-        self.say(now, &format!("{command} was not taken: {error}"));
+        self.say(now, &format!("{command} was not sent: {error}"));
     }
 
     fn attend(&mut self, now: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {

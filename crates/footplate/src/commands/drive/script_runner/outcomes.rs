@@ -64,7 +64,7 @@ impl ScriptRunner {
             if let DispatchNotice::Drive(DriveNotice::AtLimit { train }) = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
-                    line += &format!("; it is held by {}", trains(&holders));
+                    line += &format!("; it is reserved for {}", trains(&holders));
                 }
             }
             if let Some(alarm) = Alarm::of_dispatch(self.driver().layout(), notice) {

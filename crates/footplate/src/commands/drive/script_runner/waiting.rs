@@ -96,7 +96,7 @@ impl ScriptRunner {
 
     /// Lets a train that nobody has seen run over a contact and come to rest, before what was asked for.
     pub(super) fn find_first(&mut self, train: TrainId, step: Step) {
-        self.say(format!("train {train} is looked for first"));
+        self.say(format!("train {train} is located first"));
         let speed = |step| Instruction::Order(Order::Speed { train, step });
         let parts = [
             speed(self.driver().finding_step(train)),
@@ -140,12 +140,15 @@ impl ScriptRunner {
         {
             self.wait = None;
             self.fell_short = true;
-            self.say(format!("train {train} has been told nothing that would bring it to rest; going on"));
+            self.say(format!(
+                "train {train} has no command that would bring it to rest; the script goes \
+                              on"
+            ));
             return true;
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= self.wait_limit {
             self.wait = None;
             self.fell_short = true;
-            self.say(format!("waited {:.0} s in vain; going on", self.wait_limit.as_s()));
+            self.say(format!("nothing happened within {:.0} s; the script goes on", self.wait_limit.as_s()));
             return true;
         }
         met

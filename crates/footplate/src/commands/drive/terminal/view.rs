@@ -107,7 +107,7 @@ fn card(train: &Train, seen: &Seen, color: Color) -> Vec<Line<'static>> {
     let plain = Style::new().not_dim();
     let place = match (&train.at, train.half_mm) {
         (Some(at), Some(half)) => format!("{at} ± {half:.0} mm"),
-        _ => "nobody knows where".to_owned(),
+        _ => "position unknown".to_owned(),
     };
     let moves = match train.at {
         Some(_) if train.at_rest => "at rest".to_owned(),
@@ -166,7 +166,7 @@ fn draw_said(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
             Line::styled(line.as_str(), style)
         })
         .collect();
-    let title = if seen.back > 0 { "said (page down for the newest)" } else { "said" };
+    let title = if seen.back > 0 { "messages (page down for the newest)" } else { "said" };
     let said = Paragraph::new(lines).wrap(Wrap { trim: false }).block(Block::bordered().title(title).dim());
     frame.render_widget(said, area);
 }
@@ -174,7 +174,7 @@ fn draw_said(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
 fn draw_prompt(frame: &mut Frame<'_>, area: Rect, prompt: &Prompt) {
     let text = prompt.text();
     let written = if text.is_empty() {
-        Span::from("an order, such as `speed 24 8`; `help` lists them, `quit` ends").dim()
+        Span::from("a command, such as `speed 24 8`; `help` lists them, `quit` ends").dim()
     } else {
         Span::from(text)
     };

@@ -319,7 +319,7 @@ fn score_table(walked: &Walked) -> String {
         "at worst m/s",
         "speed inside %",
         "distance error m",
-        "of the way %",
+        "of distance %",
         "distance inside %",
         "noticed after s",
     ];

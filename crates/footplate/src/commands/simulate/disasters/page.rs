@@ -21,7 +21,7 @@ nothing. The simulator's truth is used for these figures alone.
 
 const LEGEND: &str = "\
 *Noticed* is from what happened until the train is told to stand for it, and how far it ran in between; *known again* until
-the train stands, has been found and measured, and may be ordered again: as it was before, its model rescaled, or learnt
+the train stands, is located again and measured, and may be ordered again: as it was before, its model rescaled, or learnt
 anew. *Stops* are at random places, from the step with about 280 mm/s, as far from there as the truth says (mm, median /
 95th percentile), before and afterwards. *Grief* counts collisions, derailments and trains that ran past the end of
 their track.
