@@ -32,7 +32,8 @@ const STEPS: usize = 6;
 const STEPS_KEPT: usize = 6;
 pub(crate) const N: usize = STEPS + STEPS_KEPT;
 
-/// Commands that can wait for their effect: more than a line carries within a start's delay.
+/// Commands that can wait for their effect one by one. A start takes up to half a second to take effect, in which a quick
+/// line carries more: see [`Course::tell`].
 const MOST_PENDING: usize = 6;
 
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
@@ -98,8 +99,11 @@ impl Course {
             return;
         }
         let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
-        if let Some(slot) = self.pending.iter_mut().find(|slot| slot.is_none()) {
-            *slot = Some(Told { sent, from, to: step, at_rest });
+        if let Some(free) = self.pending.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some(Told { sent, from, to: step, at_rest });
+        } else if let Some(last) = self.pending.last_mut() {
+            // The decoder obeys the newest command; the one before it, sent moments ago, has no effect of its own.
+            *last = last.filter(|last| last.from != step).map(|last| Told { sent, to: step, ..last });
         }
     }
 
@@ -274,5 +278,29 @@ impl Course {
     /// How fast it is (m/s) then.
     pub(crate) fn speed(&self, time: f64) -> f64 {
         self.grown() * self.segment.speed(time - self.x[H])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Gaussian, MotionFilter};
+    use super::*;
+    use crate::ids::{SpeedStep, TrainId};
+
+    #[test]
+    fn commands_in_quick_succession_all_count() {
+        // Given a slider that is pushed from 1 to 9 within the delay of the start, and back to 8,
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let begins: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
+        let (mut pushed, mut at_once) = (begins, begins);
+        for (nth, step) in [1, 2, 3, 4, 5, 6, 7, 8, 9, 8].into_iter().enumerate() {
+            pushed.tell(&model, 0.02 * nth as f64, step);
+        }
+        at_once.tell(&model, 0.0, 8);
+        // the train runs at the last step, as fast as one that was commanded to it at once.
+        assert_eq!(pushed.step(), 8);
+        let [speed, wanted] =
+            [&pushed, &at_once].map(|filter| filter.at(&model, 30.0).speed(&model, 30.0).mean);
+        assert!((speed / wanted - 1.0).abs() < 0.01, "{speed} m/s instead of {wanted} m/s");
     }
 }
