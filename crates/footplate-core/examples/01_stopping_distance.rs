@@ -1,4 +1,4 @@
-//! How far a train still runs when it is told to stop: counted from the brakes, from the command, and from the
+//! How far a train still runs when it is commanded to stop: counted from the brakes, from the command, and from the
 //! report that prompts it.
 
 use footplate_core::kinematics::{Braking, FromBraking, StoppingError, StoppingLaw};

@@ -29,7 +29,7 @@ pub enum EventKind {
         /// The step it was told.
         step: SpeedStep,
     },
-    /// The train was told to turn around.
+    /// The train was commanded to reverse.
     Reverse {
         /// The train that was told.
         train: TrainId,

@@ -38,7 +38,7 @@ const WITH_HYSTERESIS: f64 = 7.0 / 8.0;
 const HYSTERESIS_MM_PER_S: core::ops::Range<f64> = 13.0..31.0;
 /// Below this speed the difference shrinks in proportion (measured on trains 1 and 78: 7 mm/s at 16 mm/s, 15 at 70).
 const FULL_HYSTERESIS_FROM_MM_PER_S: f64 = 120.0;
-/// A step stays at least this much below the next one (chosen: what a person could still tell apart).
+/// A step stays at least this much below the next one (chosen: what a person could still distinguish).
 const LEAST_RISE_MM_PER_S: f64 = 2.0;
 /// The largest part of the way to the next step that hysteresis may take (chosen below 1: steps keep their order).
 const LARGEST_PART_OF_A_STEP: f64 = 0.9;

@@ -78,7 +78,7 @@ pub struct Batch {
     pub sections: SectionIndex,
     /// The trains, by number.
     pub trains: Vec<BatchTrain>,
-    /// Runs of live sessions in which several trains moved, whose contacts nobody has told apart.
+    /// Runs of live sessions in which several trains moved, whose contacts nobody has distinguished.
     pub left_out: Vec<LeftOut>,
 }
 
@@ -108,7 +108,7 @@ pub enum BatchError {
         /// Passages found in them.
         passages: usize,
     },
-    /// Hits of several trains cannot be told apart yet.
+    /// Hits of several trains cannot be distinguished yet.
     #[error(
         "{recording}, run {run}: {} trains move in one run; reports cannot be assigned to trains in a \
          recording yet, so record each train in a run of its own",

@@ -141,7 +141,7 @@ pub enum LinkNotice {
         /// The command.
         command: Command,
     },
-    /// A train was told to turn around shortly before a reply was lost. It is not said again, because a second time
+    /// A train was commanded to reverse shortly before a reply was lost. It is not said again, because a second time
     /// would turn it back, and cannot be read back: see which way it faces.
     ReverseInDoubt {
         /// The train.
@@ -181,10 +181,10 @@ pub enum Confirmation {
 /// What the station was told at the end, and whether anything says that it heard.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Closing {
-    /// Trains that were told to stand.
-    pub told_to_stand: Vec<TrainId>,
-    /// Trains that run or may run and were not told to stand.
-    pub not_told: Vec<TrainId>,
+    /// Trains that were commanded to stop.
+    pub commanded_to_stop: Vec<TrainId>,
+    /// Trains that run or may run and were not commanded to stop.
+    pub not_commanded: Vec<TrainId>,
     /// Whether the solenoids were released; `None` where the station does that by itself.
     pub solenoids_released: Option<bool>,
     /// Whether the power was taken from the track.
@@ -197,7 +197,7 @@ impl Closing {
     /// Whether everything was said that had to be.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.not_told.is_empty() && self.solenoids_released != Some(false) && self.power_off
+        self.not_commanded.is_empty() && self.solenoids_released != Some(false) && self.power_off
     }
 }
 
@@ -365,11 +365,11 @@ impl Display for Listed<'_> {
 impl Display for Closing {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         let told = |said| if said { "" } else { "not " };
-        if !self.told_to_stand.is_empty() {
-            write!(f, "commanded to stop: {}; ", Listed(&self.told_to_stand))?;
+        if !self.commanded_to_stop.is_empty() {
+            write!(f, "commanded to stop: {}; ", Listed(&self.commanded_to_stop))?;
         }
-        if !self.not_told.is_empty() {
-            write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_told))?;
+        if !self.not_commanded.is_empty() {
+            write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_commanded))?;
         }
         if let Some(released) = self.solenoids_released {
             write!(f, "solenoids {}released, ", told(released))?;

@@ -181,7 +181,7 @@ impl SessionJournal {
     /// Another machine begins to decide, and the one before has ended; what writes down of it.
     pub(crate) fn begin_machine(&mut self, kind: &'static str, body: String) -> Option<Scribe> {
         if !self.offer(Entry::Machine(kind, body)) {
-            // Nothing of it can be told apart from the one before.
+            // Nothing of it can be distinguished from the one before.
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
             return None;
         }

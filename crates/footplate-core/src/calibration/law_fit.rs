@@ -10,7 +10,7 @@
 //! a law that describes but does not forecast is not reported as best.
 //!
 //! How well that works on simulated trains (40 seeds, 12 to 14 changes up and as many down, `changes` on track A): a lag is named as
-//! one 80 times in 80, a constant rate as a law of a constant rate 74 times in 80. The shape within a change is told apart
+//! one 80 times in 80, a constant rate as a law of a constant rate 74 times in 80. The shape within a change is distinguished
 //! less well: of the laws that end within some tenths of a second of each other, an even rate is named for most of the
 //! rounded and eased ones (138 in 160).
 #![expect(clippy::indexing_slicing, reason = "two unknowns, indexed below two")]
@@ -35,7 +35,7 @@ const HUBER: f64 = 2.5;
 const STEP: [f64; 2] = [1e-3, 1e-3];
 /// A law whose residuals are this many times what poll and scatter explain does not fit.
 const FITS: f64 = 3.0;
-/// Fewest changes from which laws are told apart: one to fit and two to hold out.
+/// Fewest changes from which laws are distinguished: one to fit and two to hold out.
 const FEWEST_CHANGES: usize = 3;
 
 /// What may describe a change of speed.

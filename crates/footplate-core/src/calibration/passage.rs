@@ -21,7 +21,7 @@ const BELIEVED_MISSED: usize = 2;
 /// on, and the next one behind it.
 const SAME_BURST: TimeSpan = TimeSpan::from_ms(250);
 
-/// What a train was told last.
+/// What a train was commanded last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drive {
     /// The step it is to run at.
@@ -228,7 +228,7 @@ impl PassageTracker {
         self.train
     }
 
-    /// What it was told last.
+    /// What it was commanded last.
     #[must_use]
     pub const fn drive(&self) -> Drive {
         self.drive

@@ -212,7 +212,7 @@ fn terms_of(hop: &Hop<'_>) -> Vec<(usize, f64)> {
     terms
 }
 
-/// What one train says, less what it was told beforehand.
+/// What one train says, less what it was commanded beforehand.
 fn rows_of(sections: &SectionIndex, train: usize, model: &MotionModel) -> Vec<Row> {
     let known: Vec<(usize, f64, f64)> =
         model.sections().filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();

@@ -14,7 +14,7 @@ mod machine;
 mod watch;
 
 pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
-pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Footprint, Journey, Span, TrainLengths};
+pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Journey, Reservation, Span, TrainLengths};
 pub use drive::{
     Achieved, Aim, ArrivalProfile, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine,
     PlannedArrival, PlannedStop, Promise, Refusal, StopOrder,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with `L` the surveyed lengths since the sensor before. A fast train and a short hop look alike at one sensor; their
-//! covariance is kept, so that the next sensors tell them apart. See `docs/theory/forecasting.md`.
+//! covariance is kept, so that the next sensors distinguishes them. See `docs/theory/forecasting.md`.
 
 use crate::calibration::SectionIndex;
 use crate::calibration::motion::{Arrival, Gaussian, MOTION_LETTERS, MotionFilter, MotionModel};
@@ -22,7 +22,7 @@ const LETTERS: usize = MOTION_LETTERS + SECTIONS;
 const ANYWHERE_M: f64 = 10.0;
 /// Hops to the next sensor: one, and one more for each sensor that may stay silent.
 const MOST_HOPS: usize = crate::track::MAX_MISSED + 1;
-/// The shortest distance between two sensors that is believed (m); closer ones cannot be told apart.
+/// The shortest distance between two sensors that is believed (m); closer ones cannot be distinguished.
 const SHORTEST_M: f64 = 0.01;
 
 /// The run under way.
@@ -78,7 +78,7 @@ impl ArrivalFilter {
 
     /// A command has left the line.
     pub(super) fn command(&mut self, sent: f64, step: SpeedStep) {
-        self.following.tell(&self.model, sent, step.get());
+        self.following.command(&self.model, sent, step.get());
     }
 
     /// The model was fitted anew. Where the train is and how fast it runs stays as the run has shown it.
@@ -97,7 +97,7 @@ impl ArrivalFilter {
         self.following.settled_speed()
     }
 
-    /// Whether it ran steadily when it passed the last contact, and was told nothing since.
+    /// Whether it ran steadily when it passed the last contact, and was commanded nothing since.
     pub(super) fn is_settled(&self) -> bool {
         self.following.is_settled(&self.model, self.passed)
     }

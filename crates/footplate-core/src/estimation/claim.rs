@@ -5,8 +5,8 @@
 //! that has changed and is a good part of its way since the last contact off. Without the second a train with dirty
 //! wheels would not be followed for long enough to notice that it has.
 
-use super::felt_way::{LOG_CHANCE_OF_SILENCE, felt_reaches};
 use super::locator::{CONTACT_SCATTER_M, LEAST_SPEED_M_PER_S, Locator, log_density};
+use super::path_length::{LOG_CHANCE_OF_SILENCE, path_reaches};
 use super::track_context::TrackContext;
 use crate::calibration::motion::{Gaussian, MotionModel};
 use crate::ids::SensorId;
@@ -34,7 +34,7 @@ impl Locator {
         let speed = speed.max(LEAST_SPEED_M_PER_S);
         let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
         let off = CHANGED_PART * place.mean;
-        let density = felt_reaches(context, model, node, sensor).map(|reach| {
+        let density = path_reaches(context, model, node, sensor).map(|reach| {
             let variance = place.variance + reach.length.variance + noise;
             let short = Gaussian { mean: reach.length.mean - place.mean, variance };
             let changed = Gaussian { variance: variance + off * off, ..short };

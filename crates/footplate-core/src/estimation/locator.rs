@@ -4,7 +4,7 @@
 //! [`MotionModel::length`] says. What people call a place, so many millimetres past a contact, is counted in lengths of a
 //! tape, which a train feels a little longer or shorter.
 
-use super::felt_way::{FeltReach, felt_reach, felt_reaches, taping_doubt};
+use super::path_length::{PathReach, hop_length, path_reaches, taping_doubt};
 use super::reachable_set::ReachableSet;
 use super::rollout::Rollout;
 use super::track_context::TrackContext;
@@ -49,7 +49,7 @@ pub struct Located {
     pub speed: Speed,
     /// One standard deviation of that.
     pub speed_uncertainty: Speed,
-    /// The step it was told last.
+    /// The step it was commanded last.
     pub step: SpeedStep,
     /// Whether it stands, as far as is known.
     pub at_rest: bool,
@@ -167,7 +167,7 @@ impl Locator {
     pub fn handle_command(&mut self, context: TrackContext<'_>, model: &MotionModel, event: &Event) {
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
-                self.following.tell(model, self.seconds(event.time), step.get());
+                self.following.command(model, self.seconds(event.time), step.get());
                 self.following.stop_on(self.stops_on(context, model, &self.following));
             }
             // It faces the other way now; how far its pickup reaches on that side is not known here.
@@ -190,16 +190,16 @@ impl Locator {
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
-    ) -> Option<(FeltReach, Gaussian, f64)> {
+    ) -> Option<(PathReach, Gaussian, f64)> {
         let time = self.seconds(window.middle());
         let place = self.following.place(model, time);
         let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
-        let short = |reach: &FeltReach| Gaussian {
+        let short = |reach: &PathReach| Gaussian {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
         };
-        felt_reaches(context, model, self.node?, sensor)
+        path_reaches(context, model, self.node?, sensor)
             .map(|reach| {
                 let short = short(&reach);
                 (reach, short, log_density(short) + libm::log(speed) + reach.log_chance())
@@ -281,7 +281,7 @@ impl Locator {
     /// Takes in a report that agrees with the forecast, by which the train was due at a time (s): it came to the sensor
     /// within the window, and no time in it is more likely than the forecast makes it. Places are counted from there
     /// from now on. Returns when the train was there most likely.
-    fn fuse(&mut self, model: &MotionModel, reach: &FeltReach, window: ContactWindow, due: f64) -> Timestamp {
+    fn fuse(&mut self, model: &MotionModel, reach: &PathReach, window: ContactWindow, due: f64) -> Timestamp {
         let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
         let time = due.clamp(after, until.max(after));
         let place = self.following.place(model, time);
@@ -333,7 +333,7 @@ impl Locator {
         let here = self.following.place(model, time);
         let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
-            let reach = felt_reach(context, model, &hop);
+            let reach = hop_length(context, model, &hop);
             way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
             let beyond = here.mean - way.mean;
             if beyond > MISSED_BEYOND * libm::sqrt(here.variance + way.variance) {
@@ -363,7 +363,7 @@ impl Locator {
     }
 
     /// Where it would come to rest if step 0 left the line at a time (not before the last entry), after any commands
-    /// that were sent. For a train that was told to stop already, where it comes to rest anyway.
+    /// that were sent. For a train that was commanded to stop already, where it comes to rest anyway.
     #[must_use]
     pub fn rest_if_stopped(
         &self,
@@ -372,7 +372,7 @@ impl Locator {
         at: Timestamp,
     ) -> Option<Rest> {
         let mut stopped = self.following;
-        stopped.tell(model, self.seconds(at), 0);
+        stopped.command(model, self.seconds(at), 0);
         self.rest_of(context, stopped, model)
     }
 
@@ -387,12 +387,12 @@ impl Locator {
         stop: Timestamp,
     ) -> Option<Rest> {
         let mut moved = self.following;
-        moved.tell(model, self.seconds(start), step.get());
-        moved.tell(model, self.seconds(stop.max(start)), 0);
+        moved.command(model, self.seconds(start), step.get());
+        moved.command(model, self.seconds(stop.max(start)), 0);
         self.rest_of(context, moved, model)
     }
 
-    /// The hop on which a train that was told to stop comes to rest, as far as is known before that is told apart by hops.
+    /// The hop on which a train that was commanded to stop comes to rest, as far as is known before that is distinguished by hops.
     fn stops_on(
         &self,
         context: TrackContext<'_>,
@@ -404,7 +404,7 @@ impl Locator {
         let (rest, ..) = anywhere.rest(model)?;
         let mut way = 0.0;
         for hop in context.hops_ahead(self.node?).take(MOST_HOPS) {
-            way += felt_reach(context, model, &hop).mean;
+            way += hop_length(context, model, &hop).mean;
             if rest.mean < way {
                 return Some(hop.id);
             }

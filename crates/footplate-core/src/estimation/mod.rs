@@ -7,14 +7,14 @@
 //! ([`Forecast`]) whose intervals hold as often as they say.
 //!
 //! [`Locator`] follows a train that is driven: with a [`MotionModel`](crate::calibration::motion::MotionModel) it knows
-//! where the train is at any moment, and where it would come to rest if told to stop at another.
+//! where the train is at any moment, and where it would come to rest if commanded to stop at another.
 
 mod arrival_filter;
 mod claim;
-mod felt_way;
 mod forecast;
 mod locator;
 pub mod odometry;
+mod path_length;
 mod polls;
 mod predictor;
 mod reachable_set;
@@ -25,9 +25,9 @@ mod shown_length;
 mod track_context;
 mod train_forecaster;
 
-pub use felt_way::{landmark_of, place_of, way_to, way_to_landmark};
 pub use forecast::{Forecast, Phase};
 pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint};
+pub use path_length::{landmark_of, place_of, way_to, way_to_landmark};
 pub use predictor::{Hit, Predictor, Verdict};
 pub(crate) use reachable_set::ReachableSet;
 pub(crate) use rollout::Rollout;

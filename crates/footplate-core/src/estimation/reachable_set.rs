@@ -30,19 +30,19 @@ impl ReachableSet {
         Self { node, epoch, following }
     }
 
-    /// The contact from which ways are counted; `None` while nobody knows where the train is.
+    /// The contact from which ways are counted; `None` while the position of the train is unknown.
     pub(crate) const fn node(&self) -> Option<NodeId> {
         self.node
     }
 
-    /// The step told last.
+    /// The step commanded last.
     pub(crate) fn step(&self) -> u8 {
         self.following.step()
     }
 
     /// A step leaves the line at a time that is not before the last command.
-    pub(crate) fn tell(&mut self, model: &MotionModel, sent: Timestamp, step: SpeedStep) {
-        self.following.tell(model, (sent - self.epoch).as_s(), step.get());
+    pub(crate) fn command(&mut self, model: &MotionModel, sent: Timestamp, step: SpeedStep) {
+        self.following.command(model, (sent - self.epoch).as_s(), step.get());
     }
 
     /// Once all that was told has taken effect: what is asked of it many times.

@@ -1,6 +1,6 @@
 //! Where one train most likely goes from here, commands that have not been given included.
 
-use crate::calibration::motion::{Course, INTERRUPTED, MotionModel};
+use crate::calibration::motion::{FilterState, INTERRUPTED, MotionModel};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::Timestamp;
 
@@ -12,14 +12,14 @@ use crate::time::Timestamp;
 pub(crate) struct Rollout {
     node: NodeId,
     epoch: Timestamp,
-    course: Course,
+    course: FilterState,
 }
 
 /// By this much (s) later every change of speed is over.
 const LONG_AFTER: f64 = 20.0;
 
 impl Rollout {
-    pub(super) const fn new(node: NodeId, epoch: Timestamp, course: Course) -> Self {
+    pub(super) const fn new(node: NodeId, epoch: Timestamp, course: FilterState) -> Self {
         Self { node, epoch, course }
     }
 
@@ -33,15 +33,15 @@ impl Rollout {
         (time - self.epoch).as_s()
     }
 
-    /// The step told last.
+    /// The step commanded last.
     pub(crate) fn step(&self) -> u8 {
         self.course.step()
     }
 
     /// A step leaves the line at a time that is not before what was asked last.
-    pub(crate) fn tell(&mut self, model: &MotionModel, sent: f64, step: SpeedStep) {
+    pub(crate) fn command(&mut self, model: &MotionModel, sent: f64, step: SpeedStep) {
         self.course.settle(model, sent);
-        self.course.tell(sent, step.get());
+        self.course.command(sent, step.get());
     }
 
     /// How much way (m) nobody can foresee if it were told another step at a time that is not before what was asked last.

@@ -53,7 +53,7 @@ const FEWEST: usize = 8;
 /// A period found in this many gaps is only refined as long as gaps line up at it; the search for another one
 /// costs a hundred times more.
 const CONFIRMED: u32 = 16;
-/// Polls are told apart while their doubt is below this part of the period.
+/// Polls are distinguished while their doubt is below this part of the period.
 const TOLD_APART: i64 = 5;
 
 /// Learns the rhythm of a link from the stamps of its reports.

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
-    DispatchNotice, Dispatcher, Driver, Footprint, Journey, LinkNews, Machine, Order, Output, Refusal,
+    DispatchNotice, Dispatcher, Driver, Journey, LinkNews, Machine, Order, Output, Refusal, Reservation,
     TrainLengths, WatchdogNotice,
 };
 use footplate_core::estimation::WayPoint;
@@ -153,7 +153,7 @@ impl Traffic {
     }
 }
 
-fn is_held(layout: &Layout, point: Position, held: &Footprint) -> bool {
+fn is_held(layout: &Layout, point: Position, held: &Reservation) -> bool {
     let length = layout.edge(point.edge).map_or(Length::ZERO, |edge| edge.length);
     let first = EdgeId(2 * point.edge.stretch().0);
     let offset = if point.edge == first { point.offset } else { length - point.offset };

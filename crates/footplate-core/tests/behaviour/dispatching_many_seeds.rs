@@ -22,7 +22,7 @@ const MOST_STRAYS: f64 = 0.015;
 const THREADS: usize = 2;
 /// What happens in one world: so many times somebody asks for something, and then the trains come to rest.
 const ASKED: usize = 5;
-/// Steps at which trains are told to run by hand: 0 stands, and slower ones were not measured well.
+/// Steps at which trains are commanded to run by hand: 0 stands, and slower ones were not measured well.
 const SPEEDS: [u8; 6] = [0, 4, 6, 8, 10, 11];
 /// How often a contact is deaf, or one closes by itself, between two things asked for.
 const DEAF: f64 = 0.05;
@@ -46,7 +46,7 @@ fn live(seed: u64, faults: bool) -> Result<Said, String> {
         } else {
             let speed = SPEEDS[(draw.share() * SPEEDS.len() as f64) as usize];
             let order = Order::Speed { train, step: step(speed) };
-            // Who has just been told to stop may not be told this now.
+            // Who has just been commanded to stop may not be told this now.
             let _ = traffic.dispatcher.order(traffic.world.now, order);
         }
         traffic.run(1.0 + draw.share() * 10.0);

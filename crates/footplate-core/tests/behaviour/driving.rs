@@ -116,7 +116,7 @@ fn the_stop_is_commanded_by_the_clock_when_no_contact_reports() {
     world.run_until(&mut driver, 20.0, |world| world.beyond_mm("A1") > 0.0 && world.beyond_mm("A1") < 40.0);
     // when from then on every contact is silent,
     world.dead = (0..8).map(SensorId).collect();
-    // then it is told to stop all the same, and not far from where it should.
+    // then it is commanded to stop all the same, and not far from where it should.
     assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
     assert!(world.commands.iter().any(|(_, command)| speed_of_stop(command)));
     assert!(world.beyond_mm("D1+100mm").abs() < 150.0, "{} mm", world.beyond_mm("D1+100mm"));

@@ -137,7 +137,7 @@ proptest! {
 
     #[test]
     fn no_follower_touches_its_leader_whatever_that_one_is_told(
-        told in proptest::collection::vec((0_u8..11, 2.0..9.0_f64), 4..9),
+        commanded in proptest::collection::vec((0_u8..11, 2.0..9.0_f64), 4..9),
         more in 0.0..1.5_f64,
         dead in proptest::option::of(0_u16..8),
     ) {
@@ -150,7 +150,7 @@ proptest! {
             other => panic!("{other:?}"),
         };
         driver.order(world.now, follow(seconds(shortest + 0.05 + more))).expect("a safe gap");
-        for (at, lasts) in told {
+        for (at, lasts) in commanded {
             run_leader(&world, &mut driver, at);
             let until = world.now + TimeSpan::from_s(lasts);
             while world.now < until {

@@ -16,8 +16,8 @@ fn true_stop_mm(number: u8) -> f64 {
 
 /// Runs at one step for some seconds and comes to rest; the command to start is noted so much later than it was sent.
 fn trip(world: &mut ToyRailway, fit: &mut MotionFit, number: u8, noted_later: TimeSpan) {
-    for (told, seconds) in [(step(number), 9.0), (SpeedStep::STAND, 5.0)] {
-        world.command(Command::Speed { train: TRAIN, step: told });
+    for (commanded, seconds) in [(step(number), 9.0), (SpeedStep::STAND, 5.0)] {
+        world.command(Command::Speed { train: TRAIN, step: commanded });
         let end = world.now + TimeSpan::from_s(seconds);
         while world.now < end {
             for event in world.tick() {

@@ -78,9 +78,9 @@ fn another_order_ends_it() {
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(0) }).expect("a step");
     world.run(&mut driver, 10.0);
     assert!(world.train().speed_mm_per_s == 0.0 && driver.busy(TRAIN).is_none());
-    let told = commanded(&world).len();
+    let count = commanded(&world).len();
     world.run(&mut driver, 20.0);
-    assert_eq!(commanded(&world).len(), told, "nothing is told to a train that should stand");
+    assert_eq!(commanded(&world).len(), count, "nothing is commanded to a train that should stand");
 }
 
 proptest! {
@@ -102,11 +102,11 @@ proptest! {
             let since = world.commands.len();
             world.run(&mut driver, 25.0);
             // The order's own command comes at once, and one of the order before may still have been on its way.
-            let told: Vec<Timestamp> = commanded(&world).into_iter().skip(since + 1).collect();
-            for pair in told.windows(2) {
+            let commanded: Vec<Timestamp> = commanded(&world).into_iter().skip(since + 1).collect();
+            for pair in commanded.windows(2) {
                 prop_assert!(pair[1] - pair[0] >= TimeSpan::from_ms(195), "{pair:?}");
             }
-            for four in told.windows(4) {
+            for four in commanded.windows(4) {
                 prop_assert!(four[3] - four[0] >= TimeSpan::from_ms(1_990), "{four:?}");
             }
         }

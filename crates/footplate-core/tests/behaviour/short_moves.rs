@@ -9,7 +9,7 @@ use footplate_core::kinematics::{
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 use proptest::prelude::*;
 
-/// How far a model train got when it was told to go and, after so many quarters of a second, to stop: a team's
+/// How far a model train got when it was commanded to go and, after so many quarters of a second, to stop: a team's
 /// tape measure, course CS 452 of the University of Waterloo, autumn 2023, train 58.
 const MEASURED_MM: [f64; 16] = [
     10.0, 25.0, 72.0, 118.0, 192.0, 245.0, 290.0, 330.0, 384.0, 446.0, 477.0, 540.0, 575.0, 639.0, 672.0,

@@ -65,19 +65,19 @@ fn restraints(world: &ToyRailway) -> usize {
 
 #[test]
 fn a_train_told_to_run_at_a_step_slows_down_for_a_zone_and_gets_as_fast_again_behind_it() {
-    for told in [9, 11, 12] {
+    for commanded in [9, 11, 12] {
         let mut world = restricted();
         let mut driver = driver_of(&world, "D1", 300.0);
-        driver.order(world.now, Order::Speed { train: TRAIN, step: step(told) }).expect("a step");
+        driver.order(world.now, Order::Speed { train: TRAIN, step: step(commanded) }).expect("a step");
         let worst = too_fast(&mut world, &mut driver, 60.0);
-        assert!(worst <= 0.0, "step {told}: {worst} mm/s too fast");
+        assert!(worst <= 0.0, "step {commanded}: {worst} mm/s too fast");
         // No slower than two steps of 32 mm/s below the limit.
-        assert!(worst > -64.0, "step {told}: {worst} mm/s");
+        assert!(worst > -64.0, "step {commanded}: {worst} mm/s");
         assert!(restraints(&world) >= 2, "said on every round");
         // At the end of the way back to A1 it has long been as fast as it was told to be.
         let back = |world: &ToyRailway| (2_150.0..ROUND).contains(&round_mm(world, 0));
         assert!(world.run_until(&mut driver, 30.0, back));
-        let full = 32.0 * f64::from(told);
+        let full = 32.0 * f64::from(commanded);
         assert!((world.train().speed_mm_per_s - full).abs() < 1.0, "{} mm/s", world.train().speed_mm_per_s);
     }
 }
@@ -88,8 +88,8 @@ fn who_is_slow_enough_is_left_alone() {
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(5) }).expect("a step");
     world.run(&mut driver, 40.0);
-    let told: Vec<&Command> = world.commands.iter().map(|(_, command)| command).collect();
-    assert_eq!(told, [&Command::Speed { train: TRAIN, step: step(5) }]);
+    let commanded: Vec<&Command> = world.commands.iter().map(|(_, command)| command).collect();
+    assert_eq!(commanded, [&Command::Speed { train: TRAIN, step: step(5) }]);
     assert_eq!(restraints(&world), 0);
 }
 
@@ -102,8 +102,8 @@ fn a_train_that_stands_in_a_zone_starts_as_slowly_as_that_allows() {
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(14) }).expect("a step");
     let first = |world: &ToyRailway| world.commands.first().map(|(_, command)| *command);
     world.run(&mut driver, 0.5);
-    let Some(Command::Speed { step: told, .. }) = first(&world) else { panic!("{:?}", world.commands) };
-    assert!((5..=6).contains(&told.get()), "{told}");
+    let Some(Command::Speed { step: commanded, .. }) = first(&world) else { panic!("{:?}", world.commands) };
+    assert!((5..=6).contains(&commanded.get()), "{commanded}");
     assert!(too_fast(&mut world, &mut driver, 3.0) <= 0.0);
     // Step 14 is not worth while on the way to where the zone begins again.
     let is_fast = |world: &ToyRailway| world.train().speed_mm_per_s > 380.0;
@@ -241,7 +241,7 @@ fn a_limit_below_the_slowest_step_is_run_at_that() {
     let slowest = (1..=14).filter_map(SpeedStep::new).find(|step| {
         driver.model(TRAIN).expect("known").uses(*step) == footplate_core::calibration::motion::StepUse::Moves
     });
-    assert_eq!(Some(driver.told(TRAIN)), slowest);
+    assert_eq!(Some(driver.commanded(TRAIN)), slowest);
 }
 
 #[test]

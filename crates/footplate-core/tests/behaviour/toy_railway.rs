@@ -356,8 +356,8 @@ fn known_after(train: u16, steps: &[u8]) -> MotionModel {
     let runs =
         [(8, 16.0), (12, 16.0), (5, 16.0), (4, 12.0), (4, 1.0), (6, 0.7), (14, 16.0), (4, 2.0), (10, 16.0)];
     for (speed, runs_for) in runs.into_iter().chain([(6, 10.0), (5, 0.5), (4, 16.0), (8, 0.6), (4, 16.0)]) {
-        for (told, seconds) in [(step(speed), runs_for), (step(0), 5.0)] {
-            world.command(Command::Speed { train: id, step: told });
+        for (commanded, seconds) in [(step(speed), runs_for), (step(0), 5.0)] {
+            world.command(Command::Speed { train: id, step: commanded });
             let end = world.now + TimeSpan::from_s(seconds);
             while world.now < end {
                 for event in world.tick() {

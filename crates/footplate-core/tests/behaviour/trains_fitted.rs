@@ -97,7 +97,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     };
     // then it is where it is believed to be, speeding up and running,
     assert!(follow(&mut world, &mut locator, 14.0) > 0.95);
-    // and when it is told to stop,
+    // and when it is commanded to stop,
     let before = world.train().travelled_mm;
     let rest = locator.rest_if_stopped(context, model(), world.now).unwrap();
     let here = locator.locate(context, model(), world.now).unwrap();

@@ -25,7 +25,7 @@ struct Watched {
     world: ToyRailway,
     dog: Watchdog,
     said: Vec<WatchdogNotice>,
-    told: Vec<(Timestamp, Command)>,
+    commanded: Vec<(Timestamp, Command)>,
 }
 
 impl Watched {
@@ -33,7 +33,7 @@ impl Watched {
         let world = ToyRailway::new(24, "D1", 300.0);
         let driver = driver_of(&world, "D1", 300.0);
         let dog = Watchdog::new(driver, world.now);
-        Self { world, dog, said: Vec::new(), told: Vec::new() }
+        Self { world, dog, said: Vec::new(), commanded: Vec::new() }
     }
 
     /// The same, and train 58 half a round ahead.
@@ -43,14 +43,14 @@ impl Watched {
         let mut driver = driver_of(&world, "D1", 300.0);
         add_train(&mut driver, &world, 58, Some(("B1", 100.0)));
         let dog = Watchdog::new(driver, world.now);
-        Self { world, dog, said: Vec::new(), told: Vec::new() }
+        Self { world, dog, said: Vec::new(), commanded: Vec::new() }
     }
 
     fn listen(&mut self) {
         while let Some(output) = self.dog.poll_output() {
             match output {
                 Output::Command(command) => {
-                    self.told.push((self.world.now, command));
+                    self.commanded.push((self.world.now, command));
                     // Power is not part of the toy world.
                     if !matches!(command, Command::PowerOff | Command::PowerOn) {
                         self.world.command(command);
@@ -109,7 +109,7 @@ impl Watched {
     }
 
     fn power_off(&self) -> Option<Timestamp> {
-        self.told.iter().find(|(_, command)| *command == Command::PowerOff).map(|(at, _)| *at)
+        self.commanded.iter().find(|(_, command)| *command == Command::PowerOff).map(|(at, _)| *at)
     }
 }
 
@@ -420,7 +420,7 @@ proptest! {
                     Output::Command(command) => {
                         if let Command::Speed { train, step } = command {
                             let stands = step == SpeedStep::STAND || !must_stand.contains(&train);
-                            prop_assert!(stands, "{train} is in danger and told {step}");
+                            prop_assert!(stands, "{train} is in danger and commanded {step}");
                         }
                         waiting.push(command);
                     }
@@ -465,7 +465,7 @@ proptest! {
         watched.world.dead = (0..12).map(SensorId).collect();
         let stops = |watched: &Watched| {
             watched.alarm().is_some()
-                && watched.told.iter().any(|(_, command)| {
+                && watched.commanded.iter().any(|(_, command)| {
                     matches!(command, Command::Speed { train: FIRST, step: SpeedStep::STAND })
                 })
         };

@@ -100,7 +100,7 @@ fn leads(plan: &LayoutPlan) -> Leads {
 }
 
 /// A hop in words: the nodes it passes with the legs it leaves them by, and its length in mm.
-type Told = (Vec<(String, Option<Leg>)>, i64);
+type FoundReach = (Vec<(String, Option<Leg>)>, i64);
 
 /// All ways from a node to the next sensor or track end that pass no node twice.
 fn search(
@@ -108,16 +108,16 @@ fn search(
     way: &mut Vec<(String, Option<Leg>)>,
     at: &str,
     mm: f64,
-    found: &mut BTreeSet<Told>,
+    found: &mut BTreeSet<FoundReach>,
 ) {
     let mut leads_on = leads.get(at).cloned().unwrap_or_default();
     leads_on.sort_by_key(|(leg, ..)| *leg);
     for (leg, to, length) in leads_on {
         way.push((at.to_owned(), leg));
         if to.starts_with(['S', 's', 'e']) {
-            let mut told = way.clone();
-            told.push((to, None));
-            found.insert((told, (mm + length) as i64));
+            let mut commanded = way.clone();
+            commanded.push((to, None));
+            found.insert((commanded, (mm + length) as i64));
         } else if way.iter().all(|(passed, _)| *passed != to) {
             search(leads, way, &to, mm + length, found);
         }
@@ -153,13 +153,13 @@ proptest! {
         for (id, node) in layout.nodes() {
             let mut expected = BTreeSet::new();
             search(&leads, &mut Vec::new(), &node.name, 0.0, &mut expected);
-            let told = layout.hops_from(id).map(|hop| {
+            let commanded = layout.hops_from(id).map(|hop| {
                 let edge = |id: &EdgeId| *layout.edge(*id).unwrap();
                 let left = hop.edges.iter().map(edge).map(|edge| (layout.node_name(edge.from).to_owned(), edge.leg));
                 let arrived = (layout.node_name(hop.to).to_owned(), None);
                 (left.chain([arrived]).collect(), hop.length.as_mm().round() as i64)
             });
-            prop_assert_eq!(told.collect::<BTreeSet<Told>>(), expected, "from {}", node.name);
+            prop_assert_eq!(commanded.collect::<BTreeSet<FoundReach>>(), expected, "from {}", node.name);
         }
     }
 

@@ -26,7 +26,7 @@ pub enum HandError {
 impl LivingLayout<'_> {
     /// Puts a train on the rails, standing, with the leading end of its shoe at a place in true lengths. It will run
     /// in the direction of the place's edge when it is told a step, with the end in front that is given. A wrecked
-    /// train is sound again. What the station told it last it is told again, and so may start at once.
+    /// train is sound again. What the station told it last it is commanded again, and so may start at once.
     ///
     /// # Errors
     /// [`HandError`] when there is no such train or no room for it; it is where it was then.

@@ -160,8 +160,8 @@ impl<'w, 'l> Truth<'w, 'l> {
         let place = found.body.as_ref()?.place()?;
         let contact = self.contact(sensor)?;
         let feel = found.train.curve_feel;
-        let past = self.felt_way(feel, contact, place);
-        let short = || self.felt_way(feel, place, contact).map(|mm| -mm);
+        let past = self.path_length(feel, contact, place);
+        let short = || self.path_length(feel, place, contact).map(|mm| -mm);
         past.or_else(short).map(Length::from_mm)
     }
 
@@ -175,7 +175,7 @@ impl<'w, 'l> Truth<'w, 'l> {
     }
 
     /// The way ahead from one place to another as the turnouts lie and as long as it feels, in mm.
-    fn felt_way(&self, feel: f64, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
+    fn path_length(&self, feel: f64, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
         let rails = &self.world.rails;
         let lies = |turnout| self.world.points.lies(turnout);
         let (mut edge, mut begins, mut felt) = (from.0, from.1, 0.0);

@@ -84,7 +84,7 @@ impl<'l> LivingLayout<'l> {
         self.rails.layout
     }
 
-    /// Up to when everything has happened: the next whole millisecond after the time it was told to go on to.
+    /// Up to when everything has happened: the next whole millisecond after the time it was commanded to go on to.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now

@@ -1,4 +1,4 @@
-//! How well standing and running were told apart, by marked stops.
+//! How well standing and running were distinguished, by marked stops.
 
 use footplate_core::Timestamp;
 
@@ -8,7 +8,7 @@ use super::stop_marks::StopMarks;
 /// A stop or a departure within this time of a mark is the marked one (s).
 const MEANT_WITHIN_S: f64 = 3.0;
 
-/// How well standing and running were told apart between the first marked stop and the last.
+/// How well standing and running were distinguished between the first marked stop and the last.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StandingScore {
     /// How long is marked (s).

@@ -8,7 +8,7 @@ use super::rival::Rival;
 /// A passage and the forecasts of its report.
 ///
 /// A forecast says when the contact that did report would, if it is the next to report: the way is taken from
-/// the report, its time never. Whether that contact had been named as the next is told apart, by `hit.named`.
+/// the report, its time never. Whether that contact had been named as the next is distinguished, by `hit.named`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoredHit {
     /// The run.

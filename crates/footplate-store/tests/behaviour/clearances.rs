@@ -1,7 +1,7 @@
 //! Where rails come together or cross, only one train is granted room: at single turnouts, at slips, and at the crossovers in the
 //! middle of the built-in tracks, where four turnouts lie in one place.
 
-use footplate_core::control::Footprint;
+use footplate_core::control::Reservation;
 use footplate_core::track::{Layout, Leg, NodeKind};
 use footplate_core::{EdgeId, Length, NodeId, TurnoutId};
 use footplate_store::built_in;
@@ -51,8 +51,8 @@ fn beyond(layout: &Layout, toe: NodeId) -> Vec<Beyond> {
     found
 }
 
-fn taken(layout: &Layout, at: &Beyond) -> Footprint {
-    let mut taken = Footprint::empty();
+fn taken(layout: &Layout, at: &Beyond) -> Reservation {
+    let mut taken = Reservation::empty();
     taken.take(layout, at.edge, at.offset, at.offset);
     taken
 }
@@ -115,8 +115,8 @@ fn two_ways_over_the_middle_of_a_crossover_never_have_room_beside_each_other() {
         assert_eq!(ways.len(), 18, "{name}");
         // A train of 260 mm in the middle of its way.
         let half = Length::from_mm(130.0);
-        let footprint = |way: &Vec<EdgeId>| {
-            let mut taken = Footprint::empty();
+        let reservation = |way: &Vec<EdgeId>| {
+            let mut taken = Reservation::empty();
             let (first, last) = (way[0], way[way.len() - 1]);
             let length = layout.edge(first).expect("an edge").length;
             taken.take(&layout, first, length - half, length);
@@ -129,7 +129,7 @@ fn two_ways_over_the_middle_of_a_crossover_never_have_room_beside_each_other() {
         };
         for one in &ways {
             for other in &ways {
-                assert!(footprint(one).meets(&footprint(other)), "{name}: {one:?} and {other:?}");
+                assert!(reservation(one).meets(&reservation(other)), "{name}: {one:?} and {other:?}");
             }
         }
     }
@@ -141,7 +141,7 @@ fn who_holds_one_turnout_of_a_place_holds_the_other_with_it() {
         let layout = track(name);
         for [one, other] in layout.never_both_curved() {
             for (first, second) in [(one, other), (other, one)] {
-                let mut taken = Footprint::empty();
+                let mut taken = Reservation::empty();
                 taken.take_turnout(&layout, *first);
                 assert!(taken.takes(*first) && taken.takes(*second), "{name}: {first} without {second}");
             }

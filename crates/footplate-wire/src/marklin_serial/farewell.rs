@@ -1,4 +1,4 @@
-//! Who has to be told to stand when the session ends, and how far that has come.
+//! Who has to be commanded to stop when the session ends, and how far that has come.
 
 use alloc::vec::Vec;
 
@@ -68,8 +68,8 @@ impl Farewell {
             driven.map(|driven| driven.train).collect()
         };
         Closing {
-            told_to_stand: trains(true),
-            not_told: trains(false),
+            commanded_to_stop: trains(true),
+            not_commanded: trains(false),
             solenoids_released: Some(self.released),
             power_off: self.is_over(),
             confirmation: if hand_shaken { Confirmation::HandShake } else { Confirmation::Nothing },

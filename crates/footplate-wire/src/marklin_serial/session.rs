@@ -48,7 +48,7 @@ pub struct Interface {
     recovery: Recovery,
     /// A stop is said before the line has fallen silent; it goes on to wait for that afterwards.
     is_overtaken: bool,
-    /// What was told since the last whole reply.
+    /// What was commanded since the last whole reply.
     unanswered: Vec<Command>,
     farewell: Farewell,
     /// Whether the track is meant to have power.

@@ -358,7 +358,7 @@ fn what_was_not_confirmed_at_the_end_is_named() {
     desk.run_for(5_000);
     let closing = desk.client.closing();
     assert!(!closing.is_complete() && closing.power_off, "{closing}");
-    assert_eq!((closing.told_to_stand, closing.not_told), (vec![T24], vec![T58]));
+    assert_eq!((closing.commanded_to_stop, closing.not_commanded), (vec![T24], vec![T58]));
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Bytes that are lost, added or never come: noticed, said, and the line brought back into step; coils are released and
-//! trains told to stand whatever happens.
+//! trains commanded to stop whatever happens.
 
 use footplate_core::{Command, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Message, Pace, Settings};
@@ -164,7 +164,7 @@ fn closing_stops_every_train_that_was_ever_driven() {
     assert!(are_safe(&coil_times(&bench)), "{:?}", coil_times(&bench));
     let Some(LinkNotice::Closed(closing)) = bench.notices.last() else { panic!("not closed") };
     assert!(closing.is_complete() && closing.confirmation == Confirmation::HandShake);
-    assert_eq!(closing.told_to_stand.len(), 4);
+    assert_eq!(closing.commanded_to_stop.len(), 4);
     assert_eq!(bench.session.handle_command(bench.now, speed(24, 3)), Err(CommandError::Closed));
     let written = bench.written.len();
     bench.run_for(5_000);
@@ -181,7 +181,7 @@ fn what_could_not_be_said_at_the_end_is_named() {
     bench.session.close(bench.now);
     bench.run_for(10);
     let closing = bench.session.closing();
-    assert_eq!((closing.told_to_stand, closing.not_told), (vec![], vec![TrainId(24)]));
+    assert_eq!((closing.commanded_to_stop, closing.not_commanded), (vec![], vec![TrainId(24)]));
     assert!(bench.session.closing().to_string().contains("NOT commanded to stop and possibly running: 24"));
 }
 

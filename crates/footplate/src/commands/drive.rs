@@ -1,6 +1,7 @@
 //! `footplate drive`: trains told what to do, line by line, and what comes of it.
 
 mod beginning;
+mod formatter;
 mod instruction;
 mod learning;
 mod parse;
@@ -11,7 +12,6 @@ mod script_runner;
 mod spoken;
 mod stage;
 mod terminal;
-mod told;
 mod trains;
 mod truth;
 mod words;
@@ -28,6 +28,7 @@ use footplate_core::{Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
 
 pub(crate) use self::beginning::DriveBeginning;
+pub(super) use self::formatter::NoticeFormatter;
 use self::instruction::HELP;
 use self::reader::Known;
 use self::result_line::ResultLine;
@@ -37,7 +38,6 @@ pub(crate) use self::script_runner::ScriptRunner;
 pub(crate) use self::spoken::Spoken;
 use self::stage::{Stage, ended, lines_of_stdin};
 use self::terminal::Terminal;
-pub(super) use self::told::Tongue;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;
@@ -57,7 +57,7 @@ use crate::witness::Witnessed;
 /// Without `--script` lines are read from standard input, at a prompt if that is a terminal, where a new order takes the
 /// place of the one before; `help` lists what can be
 /// said. Each contact that a train passes is printed with what had been predicted; each stop with what was promised.
-/// However the program ends, all trains are told to stand and the power is taken from the track first.
+/// However the program ends, all trains are commanded to stop and the power is taken from the track first.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -32,7 +32,7 @@ pub(super) use watched_slide::WatchedSlide;
 ///
 /// Recordings are CSV or Parquet with the columns t_s, pulses_1, pulses_2 (or counter_1, counter_2) and those that
 /// docs/formats/tachometer-recording.md lists; `-` is standard input, whose every line is answered at once with
-/// `--out -`. Runs that are told apart by `run_id` are independent of each other. With `--score`, estimates are
+/// `--out -`. Runs that are distinguished by `run_id` are independent of each other. With `--score`, estimates are
 /// compared with the truth in the recording (true_speed_m_s, true_distance_m), and so are both presets and what
 /// simpler odometers make of the same counts.
 #[derive(Args)]

@@ -23,7 +23,7 @@ pub(crate) use slides::slide_routes;
 /// Drive trains from browsers and programs, without a prompt.
 ///
 /// The dashboard and its HTTP interface, the same as `footplate drive --serve` with nobody at the prompt: prints where to look, and drives until it is told to
-/// `quit` or interrupted. Then all trains are told to stand and the power is taken from the track.
+/// `quit` or interrupted. Then all trains are commanded to stop and the power is taken from the track.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -182,7 +182,7 @@ impl Alarm {
         let none = Vec::new();
         Some(match notice {
             WatchdogNotice::Danger { train, why, .. } => {
-                Self::new(Grade::Danger, told_to_stand(*why), *train, none)
+                Self::new(Grade::Danger, commanded_to_stop(*why), *train, none)
             }
             WatchdogNotice::PowerOff { train } => Self::new(Grade::Danger, "power-off", *train, none),
             WatchdogNotice::NeedsPerson { train, .. } => {
@@ -219,7 +219,7 @@ impl Alarm {
 }
 
 /// Why a watchdog tells a train to stand.
-const fn told_to_stand(why: Noticed) -> &'static str {
+const fn commanded_to_stop(why: Noticed) -> &'static str {
     match why {
         Noticed::Drift(Drift::Slower) => "stands-slower",
         Noticed::Drift(Drift::Faster) => "stands-faster",

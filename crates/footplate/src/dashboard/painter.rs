@@ -206,7 +206,7 @@ impl Painter {
         for train in driver.trains() {
             let located = driver.locate(train, now);
             let way = located.map(|located| self.way(driver, train, located.at));
-            let told = located.filter(|_| self.follows).map_or_else(|| driver.told(train), |at| at.step);
+            let told = located.filter(|_| self.follows).map_or_else(|| driver.commanded(train), |at| at.step);
             trains.push(paint_train(driver, train, tasks.get(&train), now, told, way, held(train)));
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), told, located.as_ref(), way);

@@ -63,7 +63,7 @@ pub(super) struct TrainPicture {
     if_stopped: Option<RestPicture>,
 }
 
-/// Where a train comes to rest if it is told to stop now.
+/// Where a train comes to rest if it is commanded to stop now.
 #[derive(Debug, Serialize)]
 struct RestPicture {
     at: Option<String>,

@@ -1,6 +1,6 @@
 //! Which rails a stretch of way covers, for a body, a haze or a reservation to be drawn on them.
 
-use footplate_core::control::Footprint;
+use footplate_core::control::Reservation;
 use footplate_core::track::{Layout, Position, TurnoutStates};
 use footplate_core::{EdgeId, Length, StretchId};
 use serde::Serialize;
@@ -25,7 +25,7 @@ impl Span {
 const MOST_EDGES: usize = 200;
 
 /// The rails that somebody holds.
-pub(super) fn held_spans(held: &Footprint) -> Vec<Span> {
+pub(super) fn held_spans(held: &Reservation) -> Vec<Span> {
     // The first of the two edges of a stretch, from whose start its intervals are counted.
     let first = |stretch: StretchId| EdgeId(2 * stretch.0);
     held.spans().map(|(stretch, span)| Span::new(first(stretch), span.from, span.to)).collect()

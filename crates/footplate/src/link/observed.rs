@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
 
-use super::rhythm::{PowerTold, Rhythm};
+use super::rhythm::{PowerCommand, Rhythm};
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 use crate::tally::Tally;
@@ -23,7 +23,7 @@ pub(crate) struct LineTallies {
     /// For how long the loop was busy between two waits, by the clock on the wall.
     pub(crate) turns: Tally,
     /// What the station was told of the power.
-    pub(crate) power: Option<PowerTold>,
+    pub(crate) power: Option<PowerCommand>,
 }
 
 /// Where it is left for others.

@@ -12,16 +12,16 @@ pub(crate) struct Rhythm {
     /// The last request, and how many other messages went since.
     request: Option<(Timestamp, usize)>,
     is_awaited: bool,
-    power: Option<PowerTold>,
+    power: Option<PowerCommand>,
     /// Sensors were asked for after that.
     asked_since: bool,
     /// What a DCC-EX board says, once something was written to one.
     replies: Option<Framing>,
 }
 
-/// What the station was told last of the power, and whether anything was heard of it since.
+/// What the station was commanded last of the power, and whether anything was heard of it since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) struct PowerTold {
+pub(crate) struct PowerCommand {
     /// On, or off.
     is_on: bool,
     /// The station has answered a request since, so that it hears; whether it did what it was told no 6051 says.
@@ -42,7 +42,7 @@ impl Rhythm {
         let (message, _) = Message::decode(&self.said)?;
         let is_request = !message.modules_read().is_empty();
         if let Message::Stop | Message::Go = message {
-            self.power = Some(PowerTold { is_on: message == Message::Go, has_answered: false });
+            self.power = Some(PowerCommand { is_on: message == Message::Go, has_answered: false });
             self.asked_since = false;
         }
         self.said.clear();
@@ -62,7 +62,7 @@ impl Rhythm {
         let mut framing = Framing::default();
         let request = text.iter().find_map(|byte| framing.push(*byte).and_then(dcc_ex::Request::read));
         if let Some(dcc_ex::Request::Power { on, .. }) = request {
-            self.power = Some(PowerTold { is_on: on, has_answered: false });
+            self.power = Some(PowerCommand { is_on: on, has_answered: false });
         }
     }
 
@@ -76,7 +76,7 @@ impl Rhythm {
     }
 
     /// What the station was told of the power.
-    pub(crate) const fn power(&self) -> Option<PowerTold> {
+    pub(crate) const fn power(&self) -> Option<PowerCommand> {
         self.power
     }
 
@@ -100,11 +100,11 @@ mod tests {
     fn a_board_confirms_the_power_itself() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_message(b"<1 MAIN>");
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
         b"<# 50><p0 B>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
         b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: true }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
     }
 
     #[test]
@@ -114,16 +114,16 @@ mod tests {
         // 128 + 5 asks five modules, 97 takes the power, 96 gives it (6051 manual).
         assert_eq!(rhythm.written(at(0), 133), Some(Request { after: None }));
         assert_eq!(rhythm.written(at(5), 97), None);
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: false }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
         // The answer to what was asked before says nothing of it.
         assert!(rhythm.heard(at(12)).is_some());
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: false }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
         let request = rhythm.written(at(70), 133).expect("a request");
         assert_eq!(request.after, Some((TimeSpan::from_ms(70), 1)));
         assert_eq!(rhythm.heard(at(80)), Some(at(80) - (at(70) + BYTE_TIME)));
         assert_eq!(rhythm.heard(at(84)), None, "only the first byte of an answer");
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: false, has_answered: true }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: true }));
         rhythm.written(at(90), 96);
-        assert_eq!(rhythm.power(), Some(PowerTold { is_on: true, has_answered: false }));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
     }
 }

@@ -9,7 +9,7 @@ pub(crate) trait Recorder {
     /// Writes them down; what is not written when this returns must not be called measured.
     ///
     /// # Errors
-    /// Why they could not be written. The run ends, and trains are told to stand.
+    /// Why they could not be written. The run ends, and trains are commanded to stop.
     fn record(&mut self, events: &[Event]) -> anyhow::Result<()>;
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! run         bytes in, bytes out, entries written down before the machine sees them
 //! attendant   who watches it: notices to people, orders from them
-//! ending      trains are told to stand, whatever ends it; what could not be confirmed is said
+//! ending      trains are commanded to stop, whatever ends it; what could not be confirmed is said
 //! stop_flag   Ctrl-C and the signals that end a program
 //! ```
 

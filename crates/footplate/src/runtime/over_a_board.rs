@@ -85,7 +85,7 @@ fn trains_run_and_stop_over_a_network_whatever_its_line_is_like() {
         let ended = runtime.run(&mut machine, &mut until).expect("nothing is written down");
         assert!(matches!(ended, Ended::Finished), "{quirks}: {ended}");
         let closing = runtime.close();
-        assert!(closing.is_complete() && closing.told_to_stand.len() == 2, "{quirks}: {closing}");
+        assert!(closing.is_complete() && closing.commanded_to_stop.len() == 2, "{quirks}: {closing}");
         let seen = served.end();
         assert!(reports(&machine) > 5, "{quirks}: {} reports, {:?}", reports(&machine), until.1);
         assert!(seen.travelled_m.iter().all(|distance| *distance > 1.0), "{quirks}: {:?}", seen.travelled_m);

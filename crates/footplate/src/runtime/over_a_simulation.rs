@@ -113,7 +113,7 @@ fn trains_run_are_written_down_and_stand_in_the_end() {
         assert!(matches!(ended, Ended::Finished));
         let closing = runtime.close();
         assert!(closing.is_complete(), "{closing}");
-        assert_eq!(closing.told_to_stand.len(), 2);
+        assert_eq!(closing.commanded_to_stop.len(), 2);
         let station = runtime.link_mut().station_mut();
         let _ = station.advance(Timestamp::from_s(70.0));
         assert!(!station.world().is_powered());

@@ -21,7 +21,7 @@ const REOPEN_EVERY: Duration = Duration::from_millis(250);
 
 /// A line, a session over it and what writes down what happens.
 ///
-/// However it is left, at its end, with an error or in a panic: trains are told to stand first.
+/// However it is left, at its end, with an error or in a panic: trains are commanded to stop first.
 pub(crate) struct Runtime<'r, L: Link> {
     link: L,
     session: StationSession,

@@ -130,7 +130,7 @@ fn what_cannot_be_done_is_said_with_what_could_be_and_ends_with_status_1() {
     assert!(why.contains("mm beyond it"), "{why}");
     let unknown = drive("unknown-turnout", LINK, "speed 24 8\nwait 24 located\nstop 24 at A1\n", &[]);
     assert_eq!(unknown.status, 1);
-    assert!(unknown.output.contains("refused `stop 24 at A1`: no way"), "{}", unknown.output);
+    assert!(unknown.output.contains("refused `stop 24 at A1`: no known path"), "{}", unknown.output);
 }
 
 #[test]

@@ -140,7 +140,7 @@ fn runs_are_independent_of_each_other() {
     let of_b: Vec<&str> = estimates.lines().filter(|line| !line.ends_with(",a")).collect();
     assert_eq!(of_b.len(), 41);
     assert_eq!(alone.output.lines().collect::<Vec<_>>(), of_b);
-    // Several files without names of runs are told apart by their names.
+    // Several files without names of runs are distinguished by their names.
     let both = odometry(&[PLAIN, PLAIN, "--out", "-"]).output;
     assert!(both.lines().next().unwrap().ends_with(",run_id"));
     assert_eq!(both.lines().filter(|line| line.ends_with("plain.csv")).count(), 80);

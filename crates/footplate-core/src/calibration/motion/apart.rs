@@ -14,11 +14,11 @@
 //! interrupted leaves a speed that depends on both steps; the two on which it depends most are kept.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
-use super::course::{Course, E, H, N};
+use super::filter_state::{E, FilterState, H, N};
 use super::model::MotionModel;
 use super::motion_filter::MotionFilter;
 use super::priors::run_variance;
-use super::segment::{Pace, Segment, Told};
+use super::segment::{Pace, Segment, SpeedCommand};
 
 /// By so much, as ln, speeds differ between which slopes are taken.
 const STEP: f64 = 1e-3;
@@ -35,7 +35,8 @@ const NONE: (usize, f64) = (0, 0.0);
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Apart {
     /// What the change is an answer to; `None` once its law is no longer asked.
-    told: Option<Told>,
+    #[cfg_attr(feature = "serde", serde(rename = "told"))]
+    commanded: Option<SpeedCommand>,
     from: Pace,
     /// The letters on which the speed before depends, and by how much.
     before: [(usize, f64); 2],
@@ -52,7 +53,7 @@ impl Apart {
     fn steady(segment: &Segment) -> Self {
         let faster = Segment::steady(segment.begins, segment.to * libm::exp(STEP));
         Self {
-            told: None,
+            commanded: None,
             from: segment.from,
             before: [NONE; 2],
             at: [0.0; 3],
@@ -67,9 +68,9 @@ impl Apart {
     }
 
     /// A command takes effect on a train: what the speed it has then depends on.
-    pub(super) fn next(&self, course: &Course, told: &Told, begins: f64) -> Self {
+    pub(super) fn next(&self, course: &FilterState, commanded: &SpeedCommand, begins: f64) -> Self {
         let late = begins - course.x[H];
-        let pace = if told.at_rest { Pace::steady(0.0) } else { course.segment.pace(late) };
+        let pace = if commanded.at_rest { Pace::steady(0.0) } else { course.segment.pace(late) };
         let mut before = [NONE; 3];
         if pace.speed > 0.0 {
             let part = |segment: &Segment| (segment.speed(late) - pace.speed) / (STEP * pace.speed);
@@ -91,7 +92,7 @@ impl Apart {
         }
         let before = [before[0], before[1]];
         let at = [0.0, course.x[before[0].0], course.x[before[1].0]];
-        Self { told: Some(*told), from: pace, before, at, ..*self }
+        Self { commanded: Some(*commanded), from: pace, before, at, ..*self }
     }
 
     /// It runs on steadily.
@@ -100,7 +101,7 @@ impl Apart {
     }
 
     /// Adds how the place of a train changes with the letters of its steps.
-    pub(super) fn add_slopes(&self, course: &Course, time: f64, slope: &mut [f64; N]) {
+    pub(super) fn add_slopes(&self, course: &FilterState, time: f64, slope: &mut [f64; N]) {
         let way = |segment: &Segment| {
             if time.is_infinite() { segment.way_to_rest() } else { segment.way(time - course.x[H]) }
         };
@@ -128,7 +129,7 @@ impl<const L: usize> MotionFilter<L> {
     }
 }
 
-impl Course {
+impl FilterState {
     /// Holds what a run and its step differ by within what is believed at all.
     pub(super) fn hold_deviations(&mut self) {
         for letter in [Some(E), self.speed].into_iter().flatten() {
@@ -148,7 +149,7 @@ impl Course {
         let Some(mut apart) = self.apart else { return };
         let letter = self.speed.filter(|_| self.step != 0);
         let step = letter.map_or(0.0, |letter| self.x[letter]);
-        let Some(told) = apart.told else {
+        let Some(commanded) = apart.commanded else {
             if self.segment.is_steady() {
                 let to = self.segment.to * libm::exp(step - apart.at[0]);
                 self.segment = Segment::steady(self.segment.begins, to);
@@ -166,10 +167,10 @@ impl Course {
         apart.at[0] = step;
         apart.from = apart.from.faster(faster);
         let answers = model.answers();
-        let to = answers.speed(usize::from(told.to), told.above()) * libm::exp(step);
+        let to = answers.speed(usize::from(commanded.to), commanded.above()) * libm::exp(step);
         let begins = self.segment.begins;
         let change = |from: Pace, to: f64| {
-            let mut segment = Segment::toward(&told, &answers, from, to);
+            let mut segment = Segment::toward(&commanded, &answers, from, to);
             segment.begins = begins;
             segment
         };
@@ -199,7 +200,7 @@ impl Course {
             for (value, by) in apart.at.iter_mut().zip([own, moved[one], moved[other]]) {
                 *value -= by;
             }
-            apart.told = None;
+            apart.commanded = None;
         }
     }
 
@@ -241,8 +242,8 @@ mod tests {
             if let Some(step) =
                 [(5, 9), (20, 14)].into_iter().find_map(|(at, step)| (at == second).then_some(step))
             {
-                train.tell(&model, now, step);
-                believed.tell(&model, now, step);
+                train.command(&model, now, step);
+                believed.command(&model, now, step);
             }
             train = train.at(&model, now);
             if let Some(letter) = train.course.speed.filter(|_| train.course.step == 9) {

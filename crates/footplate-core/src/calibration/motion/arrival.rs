@@ -7,7 +7,7 @@
     reason = "arrays of letters, indexed by letters; companions are counted by the caller"
 )]
 
-use super::course::{B, E, N};
+use super::filter_state::{B, E, N};
 use super::model::MotionModel;
 use super::motion_filter::{Gaussian, MotionFilter};
 

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::parameters::Answers;
-use super::segment::Told;
+use super::segment::SpeedCommand;
 use super::trip::{MeasuredRest, Trip, TripContact};
 use crate::calibration::SectionIndex;
 use crate::event::{Event, EventKind};
@@ -64,7 +64,7 @@ impl Chain {
     }
 
     /// A command to the train. Whether it stands by then is judged by how it answers as far as is known.
-    pub(super) fn tell(&mut self, time: Timestamp, step: SpeedStep, answers: &Answers<'_>) {
+    pub(super) fn command(&mut self, time: Timestamp, step: SpeedStep, answers: &Answers<'_>) {
         let sent = self.seconds(time);
         let (from, to) = (self.step, step.get());
         if to == from {
@@ -85,7 +85,7 @@ impl Chain {
             self.unbroken = true;
         }
         if let Some(trip) = self.trips.last_mut() {
-            trip.tell(Told { sent, from, to, at_rest });
+            trip.command(SpeedCommand { sent, from, to, at_rest });
         }
         (self.step, self.above) = (to, to < from);
     }

@@ -8,7 +8,7 @@
 //! of the past for good ([`MarginalPrior`]): a fit costs as much after ten thousand stops as after sixty.
 //!
 //! A stop that is followed by a run to the next sensor is measured as the sum of stop and start: what one of them is longer,
-//! the other may be shorter. The covariance keeps that; what tells them apart are sensors passed in braking, tapes, and starts
+//! the other may be shorter. The covariance keeps that; what distinguishes them are sensors passed in braking, tapes, and starts
 //! to other speeds. What is far off counts little ([`robust`](super::robust)): one outlier costs one outlier.
 
 mod refit;
@@ -126,7 +126,7 @@ impl MotionFit {
                 self.chain.pass(layout, sections, turnouts, event);
             }
             EventKind::Speed { train, step } if train == self.model.train() => {
-                self.chain.tell(event.time, step, &self.model.answers());
+                self.chain.command(event.time, step, &self.model.answers());
             }
             EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
             EventKind::Stopped { train, landmark, offset } if train == self.model.train() => {
@@ -296,7 +296,8 @@ impl MotionFit {
             else {
                 continue;
             };
-            let stop_speed = before.told.iter().rev().nth(1).map_or(0.0, |told| point.speed(told.to));
+            let stop_speed =
+                before.commanded.iter().rev().nth(1).map_or(0.0, |commanded| point.speed(commanded.to));
             // Residuals of a young fit scatter too little: it has much to explain them by.
             let stops = self.model.scatter.stops.max(1.0);
             let usual = Scatter { stops, floor: 0.0, ..self.model.scatter }.of_stop(stop_speed);

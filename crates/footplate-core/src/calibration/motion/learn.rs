@@ -86,18 +86,24 @@ pub(super) fn count(counts: &mut [[Counts; 2]], trip: &Trip) {
             add(slot);
         }
     };
-    let mut told = trip.told.iter().peekable();
+    let mut commanded = trip.commanded.iter().peekable();
     let mut now = trip.running.unwrap_or((0, false));
     for contact in &trip.contacts {
-        while let Some(next) = told.next_if(|next| next.sent <= contact.time) {
+        while let Some(next) = commanded.next_if(|next| next.sent <= contact.time) {
             now = (next.to, next.above());
         }
         at(now, &|counts| counts.contacts += 1);
     }
-    if let ([.., last], true) = (trip.told.as_slice(), trip.came_to_rest)
+    if let ([.., last], true) = (trip.commanded.as_slice(), trip.came_to_rest)
         && last.to == 0
     {
-        let before = trip.told.iter().rev().nth(1).map(|told| (told.to, told.above())).or(trip.running);
+        let before = trip
+            .commanded
+            .iter()
+            .rev()
+            .nth(1)
+            .map(|commanded| (commanded.to, commanded.above()))
+            .or(trip.running);
         if let Some(before) = before {
             at(before, &|counts| counts.stops += 1);
         }

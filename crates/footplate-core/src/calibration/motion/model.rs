@@ -9,7 +9,7 @@ use super::motion_filter::Gaussian;
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
 use super::priors::section_variance;
 use super::scatter::Scatter;
-use super::segment::{Pace, Segment, Told};
+use super::segment::{Pace, Segment, SpeedCommand};
 use super::spread::Spread;
 use super::stop_offset::{StopOffsets, stop_offset_share};
 use super::variation::Variation;
@@ -236,10 +236,10 @@ impl MotionModel {
     #[must_use]
     pub fn stop(&self, step: SpeedStep, approach: Approach) -> StopForecast {
         let above = approach == Approach::Above;
-        let told = Told { sent: 0.0, from: step.get(), to: 0, at_rest: false };
+        let commanded = SpeedCommand { sent: 0.0, from: step.get(), to: 0, at_rest: false };
         let stop = |answers: &Answers<'_>| {
             let speed = answers.speed(usize::from(step.get()), above);
-            let segment = Segment::of(&told, answers, Pace::steady(speed));
+            let segment = Segment::of(&commanded, answers, Pace::steady(speed));
             (speed * segment.begins + segment.way_to_rest(), segment.settled())
         };
         let (distance, time) = stop(&self.answers());
@@ -281,9 +281,10 @@ impl MotionModel {
     #[must_use]
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
         let answers = self.answers();
-        let told = Told { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
+        let commanded =
+            SpeedCommand { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
         let pace = Pace::steady(answers.speed(usize::from(from.get()), false));
-        let segment = Segment::of(&told, &answers, pace);
+        let segment = Segment::of(&commanded, &answers, pace);
         TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
     }
 

@@ -1,13 +1,13 @@
 //! A train under way: where its laws take it from one command to the next, with the doubts that come with each.
 //!
-//! The letters of its [`Course`] are a Kalman filter's state. A new command begins a new segment: its `b` is the `x` at which it
+//! The letters of its [`FilterState`] are a Kalman filter's state. A new command begins a new segment: its `b` is the `x` at which it
 //! takes effect, and the doubt of what is its own alone comes to `ε` and `ζ`. What it has in common with those before, how
 //! late changes are and how fast its step is, `τ` and `s` go on knowing.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::apart::STEP_AGAIN;
 use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
-use super::course::{B, Course, E, H, LATER, N, Told, Z};
+use super::filter_state::{B, E, FilterState, H, LATER, N, SpeedCommand, Z};
 use super::model::MotionModel;
 use super::priors::{WANDER, change_error, run_variance};
 use crate::track::HopId;
@@ -19,7 +19,7 @@ const LOOKS: usize = 3;
 /// Share of a change from which on it is to blame for what is off: earlier, what is off by little would be off by many times
 /// that in the end.
 const BEGUN: f64 = 0.3;
-/// A steady run is counted anew after this long (s): before, the law of its start and its speed are still told apart.
+/// A steady run is counted anew after this long (s): before, the law of its start and its speed are still distinguished.
 const LONG_RUN: f64 = 20.0;
 /// Share of a change from which on the run is steady: what is left is less than a millimetre.
 const STEADY: f64 = 0.995;
@@ -46,12 +46,12 @@ pub(crate) struct Gaussian {
 
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
 ///
-/// `L` letters: those of its [`Course`], and behind them any number of companions, which are not its own but are known
+/// `L` letters: those of its [`FilterState`], and behind them any number of companions, which are not its own but are known
 /// together with it ([`pass_beside`](Self::pass_beside)). The companions' means are kept by the caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct MotionFilter<const L: usize = N> {
-    pub(super) course: Course,
+    pub(super) course: FilterState,
     #[cfg_attr(feature = "serde", serde(with = "super::square"))]
     pub(super) p: [[f64; L]; L],
     /// Until when wander is in the variance of `ε`.
@@ -68,35 +68,35 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
-        Self { course: Course::at_rest(time, place.mean), p, wandered: time, local: 0.0, stops_on: None }
+        Self { course: FilterState::at_rest(time, place.mean), p, wandered: time, local: 0.0, stops_on: None }
     }
 
     /// Running steadily at a step for long.
     pub(crate) fn running(model: &MotionModel, time: f64, step: u8, place: Gaussian) -> Self {
         let mut following = Self::at_rest(time, place);
-        following.course = Course::running(model, time, step, place.mean);
+        following.course = FilterState::running(model, time, step, place.mean);
         let variance = model.ln_speed_variance(step, false);
         following.p[E][E] = run_variance(variance) + variance;
         following
     }
 
     /// Where it most likely goes from here, doubts apart.
-    pub(crate) const fn course(&self) -> Course {
+    pub(crate) const fn course(&self) -> FilterState {
         self.course
     }
 
-    /// The step told last, whether it has taken effect or not.
+    /// The step commanded last, whether it has taken effect or not.
     pub(crate) fn step(&self) -> u8 {
         self.course.step()
     }
 
     /// A command has left the line.
-    pub(crate) fn tell(&mut self, model: &MotionModel, sent: f64, step: u8) {
+    pub(crate) fn command(&mut self, model: &MotionModel, sent: f64, step: u8) {
         if self.step() == step {
             return;
         }
         self.settle(model, sent);
-        self.course.tell(sent, step);
+        self.course.command(sent, step);
     }
 
     /// A stop that has not begun yet would end on a hop.
@@ -104,16 +104,17 @@ impl<const L: usize> MotionFilter<L> {
         self.stops_on = hop;
     }
 
-    /// Whether a train that was told to stop stands by a time.
+    /// Whether a train that was commanded to stop stands by a time.
     pub(crate) fn rests_at(&self, time: f64) -> bool {
         self.course.rests_at(time)
     }
 
     /// Takes all that has taken effect by a time into the state.
     fn settle(&mut self, model: &MotionModel, time: f64) {
-        while let Some((told, begins)) = self.course.next_effect(model).filter(|(_, begins)| *begins <= time)
+        while let Some((commanded, begins)) =
+            self.course.next_effect(model).filter(|(_, begins)| *begins <= time)
         {
-            self.begin(model, told, begins);
+            self.begin(model, commanded, begins);
         }
         let since = time - self.wandered;
         if since > 0.0 && self.course.step != 0 {
@@ -123,37 +124,37 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// The next segment begins: the way so far becomes its origin.
-    fn begin(&mut self, model: &MotionModel, told: Told, begins: f64) {
-        let from_rest = told.at_rest;
+    fn begin(&mut self, model: &MotionModel, commanded: SpeedCommand, begins: f64) {
+        let from_rest = commanded.at_rest;
         // A train at rest has run its whole way to rest, whenever it is told the next step.
         let time = if from_rest { f64::INFINITY } else { begins };
         let (way, slope) = self.way_and_slopes(time);
         let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
         let unsettled = self.course.unsettled(begins);
         self.transform(slope);
-        let kept = self.course.kept(told.to, told.above());
-        let speed = self.course.begin(model, told, begins, way);
+        let kept = self.course.kept(commanded.to, commanded.above());
+        let speed = self.course.begin(model, commanded, begins, way);
         for letter in [H, Z] {
             self.forget(letter);
         }
         if from_rest {
             self.forget(E);
-            self.p[E][E] = run_variance(model.ln_speed_variance(told.to, false));
+            self.p[E][E] = run_variance(model.ln_speed_variance(commanded.to, false));
             let late = model.start_scatter();
             self.p[H][H] = late * late + model.start_delay_variance();
         }
-        if told.to != 0 {
-            self.doubt_step(model.ln_speed_variance(told.to, told.above()), kept.is_some());
+        if commanded.to != 0 {
+            self.doubt_step(model.ln_speed_variance(commanded.to, commanded.above()), kept.is_some());
         }
         let to = self.course.segment.to;
-        let doubt = if told.to == 0 {
+        let doubt = if commanded.to == 0 {
             model.stop_doubt(speed)
         } else if from_rest {
             model.start_doubt(to)
         } else {
             model.change_doubt(speed, to)
         };
-        let error = if told.to == 0 || from_rest {
+        let error = if commanded.to == 0 || from_rest {
             0.0
         } else {
             let part = if self.course.apart.is_some() { OTHER_SHAPES } else { 1.0 };
@@ -162,7 +163,7 @@ impl<const L: usize> MotionFilter<L> {
         // Who begins faster than was thought is farther by so much once the change is done.
         let carried = unshaped * self.course.segment.delay();
         self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
-        if told.to == 0 {
+        if commanded.to == 0 {
             let speed = speed * self.course.grown();
             let (scatter, offset) = (model.scatter(speed), model.stop_offset(self.stops_on, speed));
             self.p[Z][Z] += scatter * scatter + offset.variance;
@@ -285,7 +286,7 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
-    /// train that was told to run.
+    /// train that was commanded to run.
     pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Gaussian, f64, f64)> {
         let later = self.after_all(model);
         if later.course.step != 0 {
@@ -474,8 +475,8 @@ mod tests {
         for nth in 0..80_u8 {
             // when it is told one step up and one down again, and again, and seen every two seconds,
             let (sent, step) = (2.0 * f64::from(nth), 8 + nth % 2);
-            train.tell(&model, sent + if nth == 0 { 0.0 } else { 0.06 }, step);
-            believed.tell(&model, sent, step);
+            train.command(&model, sent + if nth == 0 { 0.0 } else { 0.06 }, step);
+            believed.command(&model, sent, step);
             let seen = sent + 1.9;
             train = train.at(&model, seen);
             let place = Gaussian { mean: train.place(&model, seen).mean, variance: 1e-6 };

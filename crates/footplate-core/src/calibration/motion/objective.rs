@@ -10,8 +10,8 @@
 
 use alloc::vec::Vec;
 
+use super::expected_information::{ExpectedInformation, Seen, stop_way};
 use super::model::MotionModel;
-use super::prospect::{Prospect, Seen, stop_way};
 use super::short_moves::move_way;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
@@ -72,7 +72,7 @@ impl Objective {
 
     /// By how much an experiment is expected to lower it.
     #[must_use]
-    pub fn gain(&self, model: &MotionModel, prospect: &Prospect) -> f64 {
+    pub fn gain(&self, model: &MotionModel, prospect: &ExpectedInformation) -> f64 {
         let mut before: Vec<(&Seen, f64)> = Vec::new();
         let mut gain = 0.0;
         for seen in &prospect.seen {
@@ -101,7 +101,12 @@ impl Objective {
 impl MotionModel {
     /// The doubt of a stop at a step once an experiment has been made (m), for showing what a plan would reach.
     #[must_use]
-    pub fn stop_doubt_after(&self, step: SpeedStep, approach: Approach, prospect: &Prospect) -> f64 {
+    pub fn stop_doubt_after(
+        &self,
+        step: SpeedStep,
+        approach: Approach,
+        prospect: &ExpectedInformation,
+    ) -> f64 {
         let slopes = self.slopes(|answers| stop_way(answers, step.get(), approach == Approach::Above));
         let one = Objective { targets: alloc::vec![(slopes, 1.0)] };
         libm::sqrt((one.value(self) - one.gain(self, prospect)).max(0.0))

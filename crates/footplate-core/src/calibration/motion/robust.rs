@@ -5,14 +5,14 @@
 
 /// How large a residual is believed, in standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Belief {
+pub(super) struct RobustWeight {
     /// Beyond this a residual counts linearly.
     huber: f64,
     /// Beyond this it is of something else: a train that was pushed, a sensor that another train tripped.
     wild: f64,
 }
 
-impl Belief {
+impl RobustWeight {
     /// Of sensors: their times scatter within a poll, which has no tails.
     pub(super) const SENSORS: Self = Self { huber: 2.5, wild: 5.0 };
     /// Of stops and starts: dirt, load and temperature give them tails, and few of them are alike.
@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn the_slope_of_the_cost_is_twice_weight_times_residual() {
-        for belief in [Belief::SENSORS, Belief::STOPS] {
+        for belief in [RobustWeight::SENSORS, RobustWeight::STOPS] {
             for size in [0.5, 1.4, 1.6, 2.4, 2.6, 2.9, 3.1, 4.9, 5.1, 30.0] {
                 let slope = (belief.cost(size + 1e-6) - belief.cost(size - 1e-6)) / 2e-6;
                 assert!((slope - 2.0 * size * belief.weight(size)).abs() < 1e-6, "{size}");

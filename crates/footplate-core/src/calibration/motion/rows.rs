@@ -9,7 +9,7 @@ use super::parameters::{
     Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
 };
 use super::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
-use super::robust::Belief;
+use super::robust::RobustWeight;
 use super::scatter::Scatter;
 use super::segment::Segment;
 use super::stop_offset::stop_offset_share;
@@ -58,12 +58,12 @@ impl Linear {
     }
 
     /// How far it is believed; in full for what is only usual.
-    fn belief(&self, believes_all: bool) -> Option<Belief> {
+    fn belief(&self, believes_all: bool) -> Option<RobustWeight> {
         match self.source {
             _ if believes_all => None,
             Source::Usual => None,
-            Source::Sensor => Some(Belief::SENSORS),
-            Source::Stop | Source::Start => Some(Belief::STOPS),
+            Source::Sensor => Some(RobustWeight::SENSORS),
+            Source::Stop | Source::Start => Some(RobustWeight::STOPS),
         }
     }
 
@@ -261,10 +261,10 @@ impl Point<'_> {
                 }
             }
         }
-        for (index, told) in trip.told.iter().enumerate() {
+        for (index, commanded) in trip.commanded.iter().enumerate() {
             // Starts and stops have residuals of their own, by speed.
-            let is_end = told.to == 0 || told.at_rest;
-            let change = if is_end { 0.0 } else { self.speed(told.to) - self.speed(told.from) };
+            let is_end = commanded.to == 0 || commanded.at_rest;
+            let change = if is_end { 0.0 } else { self.speed(commanded.to) - self.speed(commanded.from) };
             let terms = vec![(columns.change(trip, index), 1.0)];
             add(terms, own.changes[index], change_error(change), Source::Usual);
         }
@@ -288,7 +288,7 @@ impl Point<'_> {
         let mut add = |moved: &Own, column| {
             slopes.push((column, outcome(trip, &answers, moved, &mut moved_segments)));
         };
-        if trip.told.first().is_some_and(|told| told.at_rest) {
+        if trip.commanded.first().is_some_and(|commanded| commanded.at_rest) {
             moved.late_start += STEP;
             add(&moved, columns.late_start());
             moved.late_start = own.late_start;
@@ -352,11 +352,11 @@ fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
             columns.push(column);
         }
     };
-    for (told, segment) in trip.told.iter().zip(segments.iter().skip(1)) {
-        let nodes = if told.to == 0 {
+    for (commanded, segment) in trip.commanded.iter().zip(segments.iter().skip(1)) {
+        let nodes = if commanded.to == 0 {
             Some((STOP_NODES, segment.from.set))
         } else {
-            told.at_rest.then_some((START_NODES, segment.to))
+            commanded.at_rest.then_some((START_NODES, segment.to))
         };
         for (node, weight) in nodes.into_iter().flat_map(|(first, speed)| {
             nodes_about(speed).into_iter().map(move |(node, weight)| (first + node.min(NODES - 1), weight))
@@ -366,7 +366,7 @@ fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
             }
         }
     }
-    let steps = trip.told.iter().flat_map(|told| [told.from, told.to]);
+    let steps = trip.commanded.iter().flat_map(|commanded| [commanded.from, commanded.to]);
     for step in steps.chain(trip.running.map(|(step, _)| step)).map(usize::from) {
         if (1..=highest).contains(&step) {
             add(speed_at(step));

@@ -7,17 +7,17 @@ use crate::kinematics::RampedLag;
 /// What a command asks of a train in the state it is in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Told {
+pub(crate) struct SpeedCommand {
     /// When the command left the line (s, on the clock of the run).
     pub(crate) sent: f64,
-    /// The step before and the step told.
+    /// The step before and the step commanded.
     pub(crate) from: u8,
     pub(crate) to: u8,
     /// Whether the train stands when it takes effect.
     pub(crate) at_rest: bool,
 }
 
-impl Told {
+impl SpeedCommand {
     /// Whether the speed of its step is reached from above.
     pub(crate) const fn above(&self) -> bool {
         self.to < self.from
@@ -132,29 +132,29 @@ impl Segment {
     }
 
     /// What a command makes of a train that goes at a pace when it takes effect.
-    pub(super) fn of(told: &Told, answers: &Answers<'_>, from: Pace) -> Self {
-        Self::toward(told, answers, from, answers.speed(usize::from(told.to), told.above()))
+    pub(super) fn of(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace) -> Self {
+        Self::toward(commanded, answers, from, answers.speed(usize::from(commanded.to), commanded.above()))
     }
 
-    /// The same where the steady speed at the step told is known to be `to`.
-    pub(super) fn toward(told: &Told, answers: &Answers<'_>, from: Pace, to: f64) -> Self {
+    /// The same where the steady speed at the step commanded is known to be `to`.
+    pub(super) fn toward(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace, to: f64) -> Self {
         let change = to - from.set;
         // Those steps that the set speed still has to go: a change that is interrupted has not gone all of its own.
-        let steps = f64::from(told.to) - answers.step_at(usize::from(told.from), from.set);
+        let steps = f64::from(commanded.to) - answers.step_at(usize::from(commanded.from), from.set);
         let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
         let shape = RampedLag::new(ramp, lag);
         // The shape cannot be less than nothing; the way that follows from the numbers is kept linear in them.
         let cut = -change * (lag + 0.5 * ramp - shape.delay());
-        let residual = if told.to == 0 {
+        let residual = if commanded.to == 0 {
             answers.stop_residual(from.set)
-        } else if told.at_rest {
+        } else if commanded.at_rest {
             answers.start_residual(to)
         } else {
             0.0
         };
-        let begins = told.effect(answers);
+        let begins = commanded.effect(answers);
         let mut segment = Self { begins, from, to, shape, residual: residual + cut, braking: None };
-        if told.to == 0 {
+        if commanded.to == 0 {
             segment.braking = Some(segment.rolling(answers.friction()));
         }
         segment

@@ -1,11 +1,11 @@
 //! Short moves by the motion model: "go, wait, stop", with the stop commanded before the speed is reached.
 
 use super::doubts::END_OF_STOP;
+use super::expected_information::{start_to, time_of};
 use super::model::MotionModel;
 use super::motion_filter::OTHER_SHAPES;
 use super::parameters::Answers;
-use super::prospect::{start_to, time_of};
-use super::segment::{Segment, Told};
+use super::segment::{Segment, SpeedCommand};
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
 use crate::units::Length;
@@ -38,13 +38,13 @@ impl ShortMoveForecast {
 /// The distance of a short move (m): a start, and a stop commanded some seconds later.
 pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
     let start = start_to(answers, step);
-    let mut told = Told { sent: run, from: step, to: 0, at_rest: false };
-    let effect = told.effect(answers);
+    let mut commanded = SpeedCommand { sent: run, from: step, to: 0, at_rest: false };
+    let effect = commanded.effect(answers);
     if effect <= start.begins {
         return 0.0;
     }
-    told.sent = 0.0;
-    start.way(effect) + Segment::of(&told, answers, start.pace(effect)).way_to_rest()
+    commanded.sent = 0.0;
+    start.way(effect) + Segment::of(&commanded, answers, start.pace(effect)).way_to_rest()
 }
 
 impl MotionModel {
@@ -57,11 +57,11 @@ impl MotionModel {
         let reached = start.speed(run);
         let unknown = self.deviation_with_scale(|answers| move_way(answers, step.get(), run));
         let distance = move_way(&answers, step.get(), run).max(0.0);
-        let told = Told { sent: run, from: step.get(), to: 0, at_rest: false };
-        let effect = told.effect(&answers);
+        let commanded = SpeedCommand { sent: run, from: step.get(), to: 0, at_rest: false };
+        let effect = commanded.effect(&answers);
         // The stop begins in the middle of the start, where its law is least known; it goes on for as long as the speed there
         // says, so that both errors go the same way.
-        let stop = Segment::of(&told, &answers, start.pace(effect));
+        let stop = Segment::of(&commanded, &answers, start.pace(effect));
         let stop_lasts = stop.way_to_rest() / start.speed(effect).max(LEAST_SPEED);
         let shape = OTHER_SHAPES * (start.shape_error(effect) + stop_lasts * start.shape_speed_error(effect));
         ShortMoveForecast {

@@ -1,4 +1,4 @@
-//! When a train that was told to stop stands, by the [kind of decoder](DecoderKind) that it most likely has.
+//! When a train that was commanded to stop stands, by the [kind of decoder](DecoderKind) that it most likely has.
 //!
 //! One set of numbers tells the ways of all decoders, and says little of their times: a stop that dies away and one that ends
 //! may be as long and half a second, or two, apart. Nobody sees a train come to rest, so that the kind is told by how ways
@@ -18,9 +18,9 @@ use alloc::vec::Vec;
 use super::decoder_kind::DecoderKind;
 use super::model::MotionModel;
 use super::parameters::Answers;
-use super::segment::{Pace, Segment, Told};
+use super::segment::{Pace, Segment, SpeedCommand};
 
-/// When a train stands that was told to stop.
+/// When a train stands that was commanded to stop.
 #[derive(Debug, Clone)]
 pub(crate) struct StandingTimes<'m> {
     model: &'m MotionModel,
@@ -30,7 +30,7 @@ pub(crate) struct StandingTimes<'m> {
 }
 
 impl MotionModel {
-    /// When it stands that was told to stop.
+    /// When it stands that was commanded to stop.
     pub(crate) fn standing_times(&self) -> StandingTimes<'_> {
         let (kind, supposed) = self.supposed();
         StandingTimes { model: self, kind, values: supposed.values }
@@ -59,8 +59,8 @@ impl StandingTimes<'_> {
     }
 
     fn stop(&self, answers: &Answers<'_>, speed: f64) -> Segment {
-        let told = Told { sent: 0.0, from: self.model.step_near(speed), to: 0, at_rest: false };
-        Segment::of(&told, answers, Pace::steady(speed))
+        let commanded = SpeedCommand { sent: 0.0, from: self.model.step_near(speed), to: 0, at_rest: false };
+        Segment::of(&commanded, answers, Pace::steady(speed))
     }
 
     /// The mean of the speeds that a counter passes on its way down, as part of the first.
@@ -100,9 +100,9 @@ mod tests {
             let mut covariance: Vec<f64> = covariance.collect();
             for step in 2..=12_u8 {
                 let speed = table(f64::from(step));
-                let told = Told { sent: 0.0, from: step, to: 0, at_rest: false };
+                let commanded = SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false };
                 let of = |values: &[f64]| {
-                    let stop = Segment::of(&told, &Answers::new(values, 14), Pace::steady(speed));
+                    let stop = Segment::of(&commanded, &Answers::new(values, 14), Pace::steady(speed));
                     speed * stop.begins + stop.way_to_rest()
                 };
                 let here = of(&model.values);

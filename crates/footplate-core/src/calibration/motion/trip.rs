@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::parameters::Answers;
-use super::segment::{Segment, Told};
+use super::segment::{Segment, SpeedCommand};
 use crate::ids::NodeId;
 
 /// A contact passed, and the way there from the one before (or from where the trip's ways are counted).
@@ -42,7 +42,8 @@ pub(super) struct Trip {
     pub(super) continues: bool,
     /// When it begins (s).
     pub(super) begins: f64,
-    pub(super) told: Vec<Told>,
+    #[cfg_attr(feature = "serde", serde(rename = "told"))]
+    pub(super) commanded: Vec<SpeedCommand>,
     pub(super) contacts: Vec<TripContact>,
     /// When pieces of a constant deviation of speed begin (s).
     #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
@@ -106,7 +107,7 @@ impl Trip {
             running,
             continues,
             begins,
-            told: Vec::new(),
+            commanded: Vec::new(),
             contacts: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
@@ -116,10 +117,10 @@ impl Trip {
         }
     }
 
-    pub(super) fn tell(&mut self, told: Told) {
-        self.told.push(told);
-        if self.told.len() > 1 {
-            self.pieces.push(told.sent);
+    pub(super) fn command(&mut self, commanded: SpeedCommand) {
+        self.commanded.push(commanded);
+        if self.commanded.len() > 1 {
+            self.pieces.push(commanded.sent);
         }
     }
 
@@ -133,11 +134,10 @@ impl Trip {
 
     /// The step from which the speed of a segment comes: of a stop, the one before.
     pub(super) fn step_of(&self, segment: usize) -> u8 {
-        let told = segment.checked_sub(1).and_then(|place| self.told.get(place));
-        told.map_or(
-            self.running.map_or(0, |(step, _)| step),
-            |told| if told.to == 0 { told.from } else { told.to },
-        )
+        let commanded = segment.checked_sub(1).and_then(|place| self.commanded.get(place));
+        commanded.map_or(self.running.map_or(0, |(step, _)| step), |commanded| {
+            if commanded.to == 0 { commanded.from } else { commanded.to }
+        })
     }
 
     /// Its own numbers as the last fit found them; what it has done since is as usual.
@@ -145,11 +145,11 @@ impl Trip {
         let mut own = self.own.clone().unwrap_or_default();
         let deviation = own.deviations.last().copied().unwrap_or(0.0);
         own.deviations.resize(self.pieces.len(), deviation);
-        own.changes.resize(self.told.len(), 0.0);
+        own.changes.resize(self.commanded.len(), 0.0);
         own
     }
 
-    /// When the train rests, if it was told to stop last (s).
+    /// When the train rests, if it was commanded to stop last (s).
     pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
         let mut segments = Vec::new();
         self.segments(answers, &self.start(), &mut segments);
@@ -162,13 +162,13 @@ impl Trip {
         let speed = self.running.map_or(0.0, |(step, above)| answers.speed(usize::from(step), above));
         let mut last = Segment::steady(self.begins, speed);
         segments.push(last);
-        for told in &self.told {
-            let mut effect = told.effect(answers);
-            if told.at_rest {
+        for commanded in &self.commanded {
+            let mut effect = commanded.effect(answers);
+            if commanded.at_rest {
                 effect += own.late_start;
             }
             let effect = effect.max(last.begins);
-            let mut next = Segment::of(told, answers, last.pace(effect));
+            let mut next = Segment::of(commanded, answers, last.pace(effect));
             next.begins = effect;
             segments.push(next);
             last = next;

@@ -40,8 +40,8 @@ impl Columns {
     }
 
     /// Of the additional distance of a change.
-    pub(super) fn change(&self, of: &Trip, told: usize) -> usize {
-        self.deviation(of.pieces.len() + told)
+    pub(super) fn change(&self, of: &Trip, commanded: usize) -> usize {
+        self.deviation(of.pieces.len() + commanded)
     }
 
     /// A trip's own numbers, from the values of all columns; the place is the first of them.
@@ -51,7 +51,7 @@ impl Columns {
             place: at(self.place()),
             late_start: at(self.late_start()),
             deviations: (0..of.pieces.len()).map(|piece| at(self.deviation(piece))).collect(),
-            changes: (0..of.told.len()).map(|told| at(self.change(of, told))).collect(),
+            changes: (0..of.commanded.len()).map(|commanded| at(self.change(of, commanded))).collect(),
         }
     }
 }

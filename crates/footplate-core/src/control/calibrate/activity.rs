@@ -10,7 +10,7 @@ use crate::time::Timestamp;
 pub(super) enum Activity {
     /// Nothing was said yet.
     Asleep,
-    /// The train was told to stand; contacts that report by themselves show now.
+    /// The train was commanded to stop; contacts that report by themselves show now.
     Listening { until: Timestamp },
     /// It runs, and any contact tells where. Without one it is pushed up a step.
     Finding { push_at: Timestamp },
@@ -22,7 +22,7 @@ pub(super) enum Activity {
     Trying(Trial),
     /// It stops because a person said so, and waits for them.
     Paused,
-    /// It was lost and told to stand; it is looked for again from then on.
+    /// It was lost and commanded to stop; it is looked for again from then on.
     Waiting { until: Timestamp },
     /// It stops for good.
     Ending { until: Timestamp },

@@ -42,9 +42,9 @@ pub struct Calibrator<'l> {
     pub(super) planner: Planner,
     pub(super) circuit: Option<Circuit>,
     pub(super) activity: Activity,
-    /// What the train was told last, since when, and when it is steady at it.
+    /// What the train was commanded last, since when, and when it is steady at it.
     pub(super) stance: Stance,
-    pub(super) told_at: Timestamp,
+    pub(super) commanded_at: Timestamp,
     pub(super) steady_at: Timestamp,
     /// A step that was asked for and has not left yet.
     pub(super) asked: Option<(SpeedStep, Timestamp)>,
@@ -91,7 +91,7 @@ impl<'l> Calibrator<'l> {
             circuit: None,
             activity: Activity::Asleep,
             stance: Stance::STANDS,
-            told_at: Timestamp::ZERO,
+            commanded_at: Timestamp::ZERO,
             steady_at: Timestamp::ZERO,
             asked: None,
             asked_turnouts: BTreeMap::new(),
@@ -201,8 +201,8 @@ impl<'l> Calibrator<'l> {
     }
 
     /// Tells the train a step, unless it was told so already.
-    pub(super) fn tell(&mut self, now: Timestamp, step: SpeedStep) {
-        if self.asked.is_none() && self.stance.step == step && self.told_at > Timestamp::ZERO {
+    pub(super) fn issue(&mut self, now: Timestamp, step: SpeedStep) {
+        if self.asked.is_none() && self.stance.step == step && self.commanded_at > Timestamp::ZERO {
             return;
         }
         self.asked = Some((step, now));
@@ -235,7 +235,7 @@ impl<'l> Calibrator<'l> {
         self.fit.take(self.layout, &self.turnouts, event);
         self.locator.handle_command(context, self.fit.model(), event);
         let before = self.stance.step;
-        self.told_at = event.time;
+        self.commanded_at = event.time;
         self.steady_at = event.time + self.model().settles_within(before, step);
         self.stance = match step.cmp(&before) {
             core::cmp::Ordering::Equal => self.stance,

@@ -57,7 +57,7 @@ impl Calibrator<'_> {
     pub(super) fn begin(&mut self, now: Timestamp) {
         if self.started.is_none() {
             self.started = Some(now);
-            self.tell(now, SpeedStep::STAND);
+            self.issue(now, SpeedStep::STAND);
             self.activity = Activity::Listening { until: now + LISTEN };
         }
     }
@@ -70,7 +70,7 @@ impl Calibrator<'_> {
         self.pushes = 0;
         self.pushed_from = None;
         let step = self.finding_step();
-        self.tell(now, step);
+        self.issue(now, step);
         self.activity = Activity::Finding { push_at: now + self.push_up_after() };
         self.say_progress(now);
     }
@@ -108,7 +108,7 @@ impl Calibrator<'_> {
         if step < highest {
             let next = SpeedStep::new(step.get() + 1).unwrap_or(highest);
             let patience = if next == highest { GIVE_UP_AFTER } else { PUSH_UP_AFTER };
-            self.tell(now, next);
+            self.issue(now, next);
             self.activity = Activity::Finding { push_at: now + patience };
         } else if self.turns < self.most_turns() {
             self.turn_around(now);
@@ -120,7 +120,7 @@ impl Calibrator<'_> {
     /// Stops the train, to turn it around when it stands.
     fn turn_around(&mut self, now: Timestamp) {
         self.turns = self.turns.saturating_add(1);
-        self.tell(now, SpeedStep::STAND);
+        self.issue(now, SpeedStep::STAND);
         self.activity = Activity::Turning { at: now + STANDS_WITHIN };
         self.say_progress(now);
     }
@@ -254,7 +254,7 @@ impl Calibrator<'_> {
         speed.value + speed.uncertainty
     }
 
-    /// The way within which the train would surely stand if it were told to stop now.
+    /// The way within which the train would surely stand if it were commanded to stop now.
     fn stopping_reach(&self) -> Length {
         let stop = self.model().stop(self.stance.step, self.stance.approach);
         stop.distance + 2.0 * stop.doubt + 2.0 * stop.scatter + MARGIN

@@ -3,7 +3,7 @@
 use super::accuracy::usable_steps;
 use super::experiment::Experiment;
 use super::planner::crawl_step;
-use crate::calibration::motion::{MotionModel, Objective, Prospect};
+use crate::calibration::motion::{ExpectedInformation, MotionModel, Objective};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::units::Length;
@@ -30,10 +30,10 @@ pub fn objective(model: &MotionModel) -> Objective {
 /// By how much an experiment is expected to lower the objective: the one place that says what an experiment is worth.
 #[must_use]
 pub fn gain(model: &MotionModel, objective: &Objective, experiment: &Experiment) -> f64 {
-    objective.gain(model, &prospect(model, experiment))
+    objective.gain(model, &expected_information(model, experiment))
 }
 
-fn prospect(model: &MotionModel, experiment: &Experiment) -> Prospect {
+fn expected_information(model: &MotionModel, experiment: &Experiment) -> ExpectedInformation {
     let crawl = crawl_step(model).unwrap_or(model.highest());
     match *experiment {
         Experiment::Speed { step, approach } => model.prospect_of_speed(step, approach),

@@ -50,7 +50,7 @@ impl Calibrator<'_> {
         if !runs || self.stance.step == SpeedStep::STAND {
             return;
         }
-        let since = self.tracker.last_time().map_or(self.told_at, |last| last.max(self.told_at));
+        let since = self.tracker.last_time().map_or(self.commanded_at, |last| last.max(self.commanded_at));
         let due = self.locator.next_contact(self.context(), self.model(), now);
         let due_by = match due {
             Some(due) => {
@@ -68,7 +68,7 @@ impl Calibrator<'_> {
             }
         };
         let pushed = self.tracker.last().and_then(|node| self.context().hop_from(node));
-        let pushed = pushed.map(|hop| self.told_at + self.longest(&hop) / PUSHED_SPEED + LATE);
+        let pushed = pushed.map(|hop| self.commanded_at + self.longest(&hop) / PUSHED_SPEED + LATE);
         self.due_by =
             Some(if self.pushes > 0 { pushed.unwrap_or(due_by).min(due_by) } else { due_by }.max(now));
     }
@@ -95,11 +95,11 @@ impl Calibrator<'_> {
         // The experiment is spoilt: what follows the next contact is planned anew.
         self.activity = Activity::Joining;
         if let Some(next) = SpeedStep::new(step.get() + 1) {
-            self.tell(now, next);
+            self.issue(now, next);
         }
     }
 
-    /// Nobody knows where the train is: it is told to stand, and looked for after a while.
+    /// Nobody knows where the train is: it is commanded to stop, and looked for after a while.
     pub(super) fn lose(&mut self, now: Timestamp) {
         self.report_mishap(Mishap::Lost { last: self.tracker.last() });
         self.fit.interrupt();
@@ -108,7 +108,7 @@ impl Calibrator<'_> {
         self.pushes = 0;
         self.pushed_from = None;
         self.hold_line(None);
-        self.tell(now, SpeedStep::STAND);
+        self.issue(now, SpeedStep::STAND);
         self.activity = Activity::Waiting { until: now + WAIT_FOR_LOST };
         self.say_progress(now);
     }
@@ -173,7 +173,7 @@ impl Calibrator<'_> {
             return;
         }
         self.hold_line(None);
-        self.tell(now, SpeedStep::STAND);
+        self.issue(now, SpeedStep::STAND);
         let stands = now + self.stops_within();
         self.ending = Some(ending);
         self.due_by = None;

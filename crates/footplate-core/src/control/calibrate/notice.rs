@@ -111,7 +111,7 @@ pub enum Mishap {
         /// The contact.
         sensor: SensorId,
     },
-    /// The train took the other leg of a turnout: it did not lie as it had been told. It is told again.
+    /// The train took the other leg of a turnout: it did not lie as it had been told. It is commanded again.
     WrongLeg {
         /// The turnout.
         turnout: TurnoutId,
@@ -144,7 +144,7 @@ pub enum Ending {
     Budget,
     /// No experiment would gain anything worth its time.
     NothingToGain,
-    /// Somebody said so.
+    /// The operator ended it. Recorded decisions hold this name, so it stays.
     Told,
     /// The train could not be found: no contact reported, at any step and in either direction.
     NotFound,

@@ -72,7 +72,7 @@ impl Calibrator<'_> {
                 if needs_run_up(self.stance, step, approach) {
                     let by = run_up_step(self.model(), step, approach);
                     self.set_stage(Stage::RunUp);
-                    self.tell(now, by);
+                    self.issue(now, by);
                 } else {
                     self.go_steady(now, step);
                 }
@@ -80,7 +80,7 @@ impl Calibrator<'_> {
             Experiment::Move { .. } => {
                 let slow = crawl_step(self.model()).unwrap_or(experiment.step());
                 self.set_stage(Stage::Steady { contacts: 1 });
-                self.tell(now, slow);
+                self.issue(now, slow);
             }
         }
         self.expect_contact(now);
@@ -97,7 +97,7 @@ impl Calibrator<'_> {
             Experiment::Stop { .. } | Experiment::Move { .. } => 1,
         };
         self.set_stage(Stage::Steady { contacts });
-        self.tell(now, step);
+        self.issue(now, step);
     }
 
     pub(super) fn trial(&self) -> Option<&Trial> {
@@ -127,7 +127,7 @@ impl Calibrator<'_> {
                 self.set_stage(Stage::BrakingAgain { until: self.rests_at(now) });
             }
             (Stage::Moving { .. }, Experiment::Move { run, .. }) => {
-                let stop_at = self.told_at + run;
+                let stop_at = self.commanded_at + run;
                 self.hold_line(Some(stop_at));
                 self.set_stage(Stage::Moving { stop_at });
             }
@@ -191,7 +191,7 @@ impl Calibrator<'_> {
             }
             Some(Experiment::Move { .. }) => {
                 self.set_stage(Stage::Aiming { at: None, again: AIM_AGAIN });
-                self.tell(now, SpeedStep::STAND);
+                self.issue(now, SpeedStep::STAND);
             }
             None => {}
         }
@@ -206,7 +206,7 @@ impl Calibrator<'_> {
         match at {
             Some(at) => self.hold_line(Some(at)),
             // Where it would rest is not known: then anywhere is as good.
-            None => self.tell(now, SpeedStep::STAND),
+            None => self.issue(now, SpeedStep::STAND),
         }
     }
 
@@ -241,7 +241,7 @@ impl Calibrator<'_> {
         None
     }
 
-    /// When the train rests that has been told to stop.
+    /// When the train rests that has been commanded to stop.
     fn rests_at(&self, now: Timestamp) -> Timestamp {
         let rest = self.locator.rest_if_stopped(self.context(), self.model(), now);
         rest.map_or(now + self.stops_within(), |rest| rest.time.max(now) + AFTER_REST)
@@ -284,21 +284,21 @@ impl Calibrator<'_> {
                 self.go_steady(now, step);
             }
             (Stage::Aiming { at: Some(at), .. }, _) if now >= *at - COMMAND_TAKES => {
-                self.tell(now, SpeedStep::STAND);
+                self.issue(now, SpeedStep::STAND);
             }
             (Stage::Moving { stop_at }, _) if now >= *stop_at - COMMAND_TAKES => {
-                self.tell(now, SpeedStep::STAND);
+                self.issue(now, SpeedStep::STAND);
             }
             (Stage::Braking { until }, Experiment::Move { step, .. }) if now >= *until => {
                 // Until it is told: the moment to stop counts from when the command has left.
                 self.set_stage(Stage::Moving { stop_at: Timestamp::from_ns(i64::MAX) });
-                self.tell(now, step);
+                self.issue(now, step);
             }
             (Stage::Braking { until } | Stage::BrakingAgain { until }, _) if now >= *until => {
                 self.refit();
                 self.set_stage(Stage::Crawling);
                 let step = self.step_to_next_contact(now);
-                self.tell(now, step);
+                self.issue(now, step);
             }
             _ => {}
         }
@@ -339,7 +339,7 @@ impl Calibrator<'_> {
         self.say(CalibrationNotice::Progress(progress));
     }
 
-    /// When the train has to be told to stand to do so within the budget; `None` while that is done already.
+    /// When the train has to be commanded to stop to do so within the budget; `None` while that is done already.
     fn last_moment(&self) -> Option<Timestamp> {
         let is_over =
             matches!(self.activity, Activity::Ending { .. } | Activity::Finished | Activity::Paused);
@@ -374,7 +374,7 @@ impl Calibrator<'_> {
     pub fn pause(&mut self, now: Timestamp) {
         if self.finished.is_none() && !matches!(self.activity, Activity::Ending { .. }) {
             self.hold_line(None);
-            self.tell(now, SpeedStep::STAND);
+            self.issue(now, SpeedStep::STAND);
             self.due_by = None;
             self.activity = Activity::Paused;
             self.say_progress(now);

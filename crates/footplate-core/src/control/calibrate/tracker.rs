@@ -35,7 +35,7 @@ pub(super) enum Verdict {
     First(NodeId),
     /// The train passed it on its way.
     Passed(NodeId),
-    /// It passed it by another leg of a turnout than the one for which it was told to lie.
+    /// It passed it by another leg of a turnout than the one for which it was set.
     ByOtherLeg {
         node: NodeId,
         turnout: TurnoutId,

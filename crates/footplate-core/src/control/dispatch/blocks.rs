@@ -7,7 +7,7 @@ use crate::ids::{EdgeId, NodeId, StretchId};
 use crate::track::Layout;
 use crate::units::Length;
 
-use super::footprint::Footprint;
+use super::reservation::Reservation;
 
 /// Who takes less of a block than this only touches it.
 const TOUCHES: Length = Length::from_mm(1.0);
@@ -16,7 +16,7 @@ const TOUCHES: Length = Length::from_mm(1.0);
 #[derive(Debug, Clone)]
 pub(super) struct Blocks {
     of: BTreeMap<StretchId, usize>,
-    whole: Vec<Footprint>,
+    whole: Vec<Reservation>,
 }
 
 impl Blocks {
@@ -32,7 +32,7 @@ impl Blocks {
 
     /// Adds the block of an edge: all rails that can be come to without passing a contact.
     fn add(&mut self, layout: &Layout, first: EdgeId) {
-        let mut whole = Footprint::empty();
+        let mut whole = Reservation::empty();
         let mut open = alloc::vec![first];
         while let Some(id) = open.pop() {
             let Some(edge) = layout.edge(id) else { continue };
@@ -52,7 +52,7 @@ impl Blocks {
     }
 
     /// What is taken if a block can only be taken as a whole.
-    pub(super) fn around(&self, layout: &Layout, taken: &Footprint) -> Footprint {
+    pub(super) fn around(&self, layout: &Layout, taken: &Reservation) -> Reservation {
         let mut around = taken.clone();
         for (stretch, span) in taken.spans() {
             let block = self.of.get(&stretch).and_then(|block| self.whole.get(*block));

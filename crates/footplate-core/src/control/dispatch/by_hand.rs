@@ -80,7 +80,7 @@ impl Dispatcher {
             row.push(leader);
         }
         let is_free = |end: Length| {
-            let taken = self.reserved(way.footprint(layout, at - room.behind, end + room.ahead));
+            let taken = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
             self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
         };
         let reach = (way.length() - room.ahead).min(at + ahead);
@@ -94,7 +94,7 @@ impl Dispatcher {
             self.driver.set_limit(now, id, Some(located.at));
             return;
         }
-        let mut held = self.reserved(way.footprint(layout, at - room.behind, end + room.ahead));
+        let mut held = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
         if self.driver.is_in_doubt(id) {
             held.add(layout, &train.held);

@@ -9,8 +9,8 @@ use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::footprint::{Footprint, Span};
 use super::notice::DispatchNotice;
+use super::reservation::{Reservation, Span};
 
 /// Track of two trains that touches is track of both: so much is left between them.
 const APART: Length = Length::from_mm(1.0);
@@ -33,8 +33,8 @@ impl Dispatcher {
                 self.crawlers.remove(train);
                 if let Some(known) = self.trains.get_mut(train) {
                     // What it was granted is long behind it.
-                    known.held = Footprint::empty();
-                    known.kept = Footprint::empty();
+                    known.held = Reservation::empty();
+                    known.kept = Reservation::empty();
                     known.seen_since_start = true;
                 }
                 self.halted(now, *train, true);
@@ -73,10 +73,10 @@ impl Dispatcher {
     }
 
     /// All that nobody else holds: a train that is let crawl may come onto any of it, and nobody else sets out.
-    fn all_that_is_free(&self, id: TrainId) -> Footprint {
+    fn all_that_is_free(&self, id: TrainId) -> Reservation {
         let layout = self.driver.layout();
         let others = || self.trains.values().filter(|other| other.id != id);
-        let mut free = Footprint::empty();
+        let mut free = Reservation::empty();
         for (edge, known) in layout.edges().filter(|(edge, _)| *edge < edge.twin()) {
             let taken = others().flat_map(|other| other.held.spans());
             let mut taken: Vec<Span> =

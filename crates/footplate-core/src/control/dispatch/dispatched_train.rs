@@ -9,10 +9,10 @@ use crate::time::Timestamp;
 use crate::track::Position;
 use crate::units::Length;
 
-use super::course::GrantedRun;
-use super::footprint::Footprint;
 use super::journey::{Journey, TrainLengths};
-use super::trail::Trail;
+use super::movement_authority::MovementAuthority;
+use super::occupied_path::OccupiedPath;
+use super::reservation::Reservation;
 
 /// A journey that was asked for and has not ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,7 +44,7 @@ pub(super) enum State {
     Turning { order: OrderId },
     /// It runs. Its rear end has certainly come as far as this on the way, and whether a contact has said so.
     Running { order: OrderId, rear: Length, confirmed: bool },
-    /// It was told to stop, and nothing is known of where it will go then; whether a contact said where it is, and whether
+    /// It was commanded to stop, and nothing is known of where it will go then; whether a contact said where it is, and whether
     /// that was on track that it had not been granted.
     Halting { confirmed: bool, strayed: bool },
     /// Somebody drives it by hand.
@@ -65,20 +65,20 @@ pub(super) struct DispatchedTrain {
     /// The journey that its runs were granted for; another may have been asked for since.
     pub(super) granted_for: Option<OrderId>,
     /// The last run to its destination, of a train that comes to rest before the end of it.
-    pub(super) last_run: Option<GrantedRun>,
+    pub(super) last_run: Option<MovementAuthority>,
     /// The runs granted, the present one first.
-    pub(super) course: VecDeque<GrantedRun>,
+    pub(super) course: VecDeque<MovementAuthority>,
     pub(super) state: State,
     /// All that it holds.
-    pub(super) held: Footprint,
+    pub(super) held: Reservation,
     /// What it held before and still might be on.
-    pub(super) kept: Footprint,
+    pub(super) kept: Reservation,
     /// Turnouts that cannot be thrown for its present run because it stands on them.
     pub(super) skipped: BTreeSet<TurnoutId>,
     /// Where it can stand, and whether clear of all turnouts.
     pub(super) parking: Vec<(Position, bool)>,
     /// Where it came from.
-    pub(super) came: Trail,
+    pub(super) came: OccupiedPath,
     /// How often others stepped aside for it since it set out last, or went to the end of the queue.
     pub(super) rooms_made: u32,
     /// Nobody is sent out of its way before this: it was tried in vain.
@@ -114,11 +114,11 @@ impl DispatchedTrain {
             last_run: None,
             course: VecDeque::new(),
             state: State::Resting,
-            held: Footprint::empty(),
-            kept: Footprint::empty(),
+            held: Reservation::empty(),
+            kept: Reservation::empty(),
             skipped: BTreeSet::new(),
             parking: Vec::new(),
-            came: Trail::default(),
+            came: OccupiedPath::default(),
             rooms_made: 0,
             no_room_until: Timestamp::ZERO,
             seen_since_turn: false,

@@ -15,13 +15,13 @@ use crate::track::Position;
 use crate::units::Length;
 
 use super::blocks::Blocks;
-use super::course::{Room, standing};
 use super::dispatched_train::{Asked, DispatchedTrain, State};
-use super::footprint::Footprint;
 use super::journey::{Journey, TrainLengths};
+use super::movement_authority::{ClearanceEnvelope, standing};
 use super::notice::DispatchNotice;
 use super::parking::{PARKED, parking_places};
-use super::setting::Told;
+use super::reservation::Reservation;
+use super::route_setting::TurnoutCommand;
 
 /// How often it looks what can be done while something waits to be.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
@@ -39,8 +39,8 @@ pub struct Dispatcher {
     /// Trains that were in danger and wait to be let crawl.
     pub(super) crawlers: BTreeSet<TrainId>,
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
-    /// How turnouts were told to lie, and how often and when last since anything said that they lay otherwise.
-    pub(super) told: BTreeMap<TurnoutId, Told>,
+    /// How turnouts were set, and how often and when last since anything said that they lay otherwise.
+    pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
     /// Turnouts that were asked for and not told yet, for whom and since when.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
     pub(super) outputs: VecDeque<Output<DispatchNotice>>,
@@ -75,14 +75,14 @@ impl Dispatcher {
 
     fn over(now: Timestamp, driver: Watchdog) -> Self {
         let layout = driver.layout();
-        let lies = |turnout| Some((turnout, Told::sure(now, driver.turnouts().get(turnout)?)));
-        let told = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
+        let lies = |turnout| Some((turnout, TurnoutCommand::sure(now, driver.turnouts().get(turnout)?)));
+        let commanded = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
         let ids: Vec<TrainId> = driver.trains().collect();
         let mut dispatcher = Self {
             driver,
             crawlers: BTreeSet::new(),
             trains: BTreeMap::new(),
-            told,
+            commanded,
             throwing: BTreeMap::new(),
             outputs: VecDeque::new(),
             is_stirred: true,
@@ -103,7 +103,7 @@ impl Dispatcher {
         self.driver.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
         let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
         known.lengths = lengths;
-        let room = Room::of(lengths, PARKED, Length::ZERO);
+        let room = ClearanceEnvelope::of(lengths, PARKED, Length::ZERO);
         let places = parking_places(self.driver.layout(), room);
         if let Some(known) = self.trains.get_mut(&train) {
             known.parking = places;
@@ -120,12 +120,12 @@ impl Dispatcher {
     }
 
     /// Whether no other train holds any of what a train would take.
-    pub(super) fn is_free_for(&self, id: TrainId, taken: &Footprint) -> bool {
+    pub(super) fn is_free_for(&self, id: TrainId, taken: &Reservation) -> bool {
         self.trains.values().all(|other| other.id == id || !other.held.meets(taken))
     }
 
     /// What is taken for a train that needs this.
-    pub(super) fn reserved(&self, needed: Footprint) -> Footprint {
+    pub(super) fn reserved(&self, needed: Reservation) -> Reservation {
         match &self.blocks {
             Some(blocks) => blocks.around(self.driver.layout(), &needed),
             None => needed,
@@ -146,7 +146,7 @@ impl Dispatcher {
 
     /// What a train holds: nobody else is let onto it.
     #[must_use]
-    pub fn holds(&self, train: TrainId) -> Option<&Footprint> {
+    pub fn holds(&self, train: TrainId) -> Option<&Reservation> {
         self.trains.get(&train).map(|train| &train.held)
     }
 
@@ -170,7 +170,7 @@ impl Dispatcher {
             known.seen_since_start = true;
             known.course.clear();
             known.unobstructed_s = None;
-            known.held = Footprint::empty();
+            known.held = Reservation::empty();
         }
         self.stand(now, train);
     }
@@ -247,10 +247,10 @@ impl Dispatcher {
     }
 
     /// The room that a train needs, with what is not known of its place now.
-    pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> Room {
+    pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> ClearanceEnvelope {
         let located = self.driver.locate(train.id, now);
         let uncertainty = located.map_or(Length::ZERO, |located| located.uncertainty);
-        Room::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
+        ClearanceEnvelope::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
     }
 
     /// What a train takes that has just come to rest at a known place: itself, and turnouts that decide where it is.
@@ -266,14 +266,14 @@ impl Dispatcher {
         let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.held.is_empty()) {
             train.held = held;
-            train.kept = Footprint::empty();
+            train.kept = Reservation::empty();
         }
         self.is_stirred = true;
     }
 
     /// A train is counted from a contact behind it: turnouts in between decide where it is, as far as is known, and are
     /// not thrown.
-    pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Footprint) {
+    pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Reservation) {
         let layout = self.driver.layout();
         // What was asked for it will be told, whatever it is asked to do since.
         let asked_for =
@@ -368,7 +368,7 @@ impl Dispatcher {
         self.gives_up(id);
     }
 
-    /// A train has been told to stop: what it holds it keeps until it stands.
+    /// A train has been commanded to stop: what it holds it keeps until it stands.
     pub(super) fn gives_up(&mut self, id: TrainId) {
         if let Some(train) = self.trains.get_mut(&id) {
             let confirmed = matches!(train.state, State::Running { confirmed: true, .. });

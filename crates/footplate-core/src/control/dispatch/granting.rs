@@ -11,14 +11,14 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::{Length, Speed};
 
-use super::course::{GrantedRun, Room, granted};
 use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
-use super::footprint::Footprint;
 use super::itinerary::{Itinerary, Pace, Search};
+use super::movement_authority::{ClearanceEnvelope, MovementAuthority, granted};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
-use super::trail::Trail;
+use super::occupied_path::OccupiedPath;
+use super::reservation::Reservation;
 use super::way::Way;
 
 /// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
@@ -55,11 +55,11 @@ const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(1_200.0)];
 #[derive(Debug, Clone)]
 pub(super) struct Proposal {
     pub(super) itinerary: Itinerary,
-    pub(super) runs: Vec<GrantedRun>,
+    pub(super) runs: Vec<MovementAuthority>,
 }
 
 impl Proposal {
-    pub(super) fn meets(&self, held: &Footprint) -> bool {
+    pub(super) fn meets(&self, held: &Reservation) -> bool {
         self.runs.iter().any(|run| run.taken.meets(held))
     }
 }
@@ -68,8 +68,8 @@ impl Proposal {
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     pub(super) place: Position,
-    pub(super) came: Trail,
-    pub(super) room: Room,
+    pub(super) came: OccupiedPath,
+    pub(super) room: ClearanceEnvelope,
     pub(super) pace: Pace,
     /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
     pub(super) frozen: Vec<TurnoutNeed>,
@@ -252,7 +252,7 @@ impl Dispatcher {
             layout,
             self.driver.turnouts(),
             turned,
-            &Trail::default(),
+            &OccupiedPath::default(),
             start.room.behind,
             Length::ZERO,
         );

@@ -84,7 +84,7 @@ impl Dispatcher {
         self.gives_up(id);
     }
 
-    /// Whether a train that was told to stop comes to rest near its destination is seen when it stands.
+    /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
         if self.driver.unseen(id, now).is_none()
@@ -113,7 +113,7 @@ impl Dispatcher {
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
         let (way, at) = Way::around(layout, self.driver.turnouts(), place, &train.came, room.behind, ahead);
-        let taken = self.reserved(way.footprint(layout, at - room.behind, at + ahead));
+        let taken = self.reserved(way.reservation(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut held = taken;

@@ -26,7 +26,7 @@ impl Dispatcher {
             let ahead = room.ahead + BEYOND;
             let turnouts = self.driver.turnouts();
             let (way, at) = Way::around(layout, turnouts, limit, &known.came, Length::ZERO, ahead);
-            let taken = way.footprint(layout, at, at + ahead);
+            let taken = way.reservation(layout, at, at + ahead);
             let others = self.trains.values().filter(|other| other.id != train && other.held.meets(&taken));
             Some(others.map(|other| other.id).collect())
         };

@@ -6,26 +6,26 @@
 
 mod blocks;
 mod by_hand;
-mod course;
 mod danger;
+mod deadlock;
 mod dispatched_train;
 mod dispatcher;
-mod footprint;
 mod granting;
 mod hearing;
 mod holders;
 mod itinerary;
 mod journey;
+mod movement_authority;
 mod notice;
 mod obstacles;
+mod occupied_path;
 mod parking;
+mod reservation;
+mod route_setting;
 mod running;
-mod setting;
-mod trail;
-mod untangling;
 mod way;
 
 pub use dispatcher::Dispatcher;
-pub use footprint::{CLEARANCE, Footprint, Span};
 pub use journey::{Journey, TrainLengths};
 pub use notice::DispatchNotice;
+pub use reservation::{CLEARANCE, Reservation, Span};

@@ -7,7 +7,7 @@ use crate::ids::{EdgeId, StretchId, TurnoutId};
 use crate::track::Layout;
 use crate::units::Length;
 
-use super::footprint::{Footprint, Span, turnouts_near};
+use super::reservation::{Reservation, Span, turnouts_near};
 
 /// Track that is closed, or costs time to wait for.
 #[derive(Debug, Clone, Default)]
@@ -19,7 +19,7 @@ pub(super) struct Obstacles {
 
 impl Obstacles {
     /// Adds what somebody holds, at a price in seconds for each stretch and turnout.
-    pub(super) fn add(&mut self, held: &Footprint, seconds: f64) {
+    pub(super) fn add(&mut self, held: &Reservation, seconds: f64) {
         for (stretch, span) in held.spans() {
             self.spans.entry(stretch).or_default().push((span, seconds));
         }

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use crate::track::{Layout, Position, TurnoutStates};
 use crate::units::Length;
 
-use super::course::{Room, standing};
-use super::trail::Trail;
+use super::movement_authority::{ClearanceEnvelope, standing};
+use super::occupied_path::OccupiedPath;
 
 /// From one place looked at to the next: less than what two trains differ by.
 const EVERY: Length = Length::from_mm(100.0);
@@ -16,15 +16,15 @@ pub(super) const PARKED: Length = Length::from_mm(15.0);
 pub(super) const OFF: Length = Length::from_mm(40.0);
 
 /// All places on a layout where there is room for a train, each once, and whether it is clear of all turnouts there.
-pub(super) fn parking_places(layout: &Layout, room: Room) -> Vec<(Position, bool)> {
+pub(super) fn parking_places(layout: &Layout, room: ClearanceEnvelope) -> Vec<(Position, bool)> {
     let turnouts = TurnoutStates::unknown();
-    let room = Room { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
+    let room = ClearanceEnvelope { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
     let mut places = Vec::new();
     for (id, edge) in layout.edges().filter(|(id, _)| *id < id.twin()) {
         let mut offset = EVERY / 2.0;
         while offset < edge.length {
             let place = Position { edge: id, offset };
-            let taken = standing(layout, &turnouts, place, &Trail::default(), room);
+            let taken = standing(layout, &turnouts, place, &OccupiedPath::default(), room);
             let length: Length = taken.spans().map(|(_, span)| span.to - span.from).sum();
             if length >= room.ahead + room.behind - Length::from_mm(1.0) {
                 places.push((place, taken.turnouts().next().is_none()));

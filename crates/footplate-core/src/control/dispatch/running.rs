@@ -7,12 +7,12 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, TurnoutNeed};
 use crate::units::Length;
 
-use super::course::{GrantedRun, SLACK};
 use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
-use super::footprint::Footprint;
 use super::itinerary::SHORTEST_RUN;
+use super::movement_authority::{MovementAuthority, SLACK};
 use super::notice::DispatchNotice;
+use super::reservation::Reservation;
 use super::way::Way;
 
 /// What could not be done is not tried again for so long.
@@ -210,7 +210,7 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
-    /// A train that was told to stop stands.
+    /// A train that was commanded to stop stands.
     pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
         let is_sure = self.driver.position(id, now).is_some();
         if let Some(train) = self.trains.get_mut(&id) {
@@ -254,7 +254,7 @@ impl Dispatcher {
 
     /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
     /// contact has confirmed it keeps what it had, all of it.
-    fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<GrantedRun>) {
+    fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<MovementAuthority>) {
         if ended.is_some() {
             self.free_anchors(now, id);
         }
@@ -266,12 +266,12 @@ impl Dispatcher {
         let layout = self.driver.layout();
         // What was let go is somebody else's by now.
         let from = (at - room.behind).max(rear);
-        let mut held = self.reserved(run.way.footprint(layout, from, (at + room.ahead).min(run.end)));
+        let mut held = self.reserved(run.way.reservation(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
         let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|_| is_free) {
             train.held = held;
-            train.kept = Footprint::empty();
+            train.kept = Reservation::empty();
         }
     }
 
@@ -371,7 +371,7 @@ impl Dispatcher {
         }
         if let Some(train) = self.trains.get_mut(&id) {
             train.state = State::Running { order, rear, confirmed: true };
-            train.kept = Footprint::empty();
+            train.kept = Reservation::empty();
         }
         self.hold(now, id);
         true

@@ -6,8 +6,8 @@ use crate::ids::{EdgeId, NodeId};
 use crate::track::{Layout, Leg, NodeKind, Position, TurnoutNeed, TurnoutStates, Ways};
 use crate::units::Length;
 
-use super::footprint::Footprint;
-use super::trail::Trail;
+use super::occupied_path::OccupiedPath;
+use super::reservation::Reservation;
 
 /// No way leads over more edges: some rounds of any layout in use.
 const MOST_EDGES: usize = 1_000;
@@ -51,7 +51,7 @@ impl Way {
         layout: &Layout,
         turnouts: &TurnoutStates,
         place: Position,
-        came: &Trail,
+        came: &OccupiedPath,
         behind: Length,
         ahead: Length,
     ) -> (Self, Length) {
@@ -126,8 +126,8 @@ impl Way {
     }
 
     /// What an interval of the way takes.
-    pub(super) fn footprint(&self, layout: &Layout, from: Length, to: Length) -> Footprint {
-        let mut taken = Footprint::empty();
+    pub(super) fn reservation(&self, layout: &Layout, from: Length, to: Length) -> Reservation {
+        let mut taken = Reservation::empty();
         for (id, [from, to]) in self.within(layout, from, to) {
             taken.take(layout, id, from, to);
         }

@@ -11,7 +11,7 @@ use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::contacts_until;
+use super::path_length::contacts_until;
 use super::refusal::Refusal;
 use super::task::Destination;
 

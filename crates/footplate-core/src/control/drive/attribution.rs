@@ -3,7 +3,7 @@
 //! Each explanation has a density in time (1/s) with its prior chance in it; that of a contact closing by itself comes
 //! from the contact's own conduct. The share of a train in the sum of all is the probability that it was this train. A
 //! train is believed from [`SURE`] on. Below that nobody's estimate is touched. What may have been otherwise is kept as
-//! [`Branch`]es, and the next closures decide between them: a train that was told apart wrongly is taken back.
+//! [`Branch`]es, and the next closures decide between them: a train that was distinguished wrongly is taken back.
 
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;

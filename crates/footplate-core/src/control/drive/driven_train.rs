@@ -8,11 +8,11 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::expectation::Expectation;
-use super::felt_way::contacts_until;
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
+use super::path_length::contacts_until;
 use super::refusal::Refusal;
 use super::speed_supervision::SpeedSupervision;
 use super::task::{Destination, Goal, Phase, Task};
@@ -44,8 +44,8 @@ pub(super) struct DrivenTrain {
     /// One standard deviation of its widest stop from a step that moves it.
     pub(super) widest_stop: Option<Length>,
     pub(super) task: Option<Task>,
-    /// The step it was told last, whether or not that has left yet.
-    pub(super) told: SpeedStep,
+    /// The step it was commanded last, whether or not that has left yet.
+    pub(super) commanded: SpeedStep,
     /// What has not left yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
     /// What should come next.
@@ -69,7 +69,7 @@ impl DrivenTrain {
             widest_stop: widest_stop(&model),
             model,
             task: None,
-            told: SpeedStep::STAND,
+            commanded: SpeedStep::STAND,
             unsent: None,
             expected: Expectation::default(),
             limit: None,
@@ -96,7 +96,7 @@ impl DrivenTrain {
 
     /// As far as is known; a train that nobody can find stands if it was told to and nobody waits for it to.
     pub(super) fn stands(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
-        let told_to = self.told == SpeedStep::STAND && self.unsent.is_none();
+        let told_to = self.commanded == SpeedStep::STAND && self.unsent.is_none();
         told_to
             && self.located(context, now).map_or_else(
                 || self.task.is_none() || matches!(self.goal(), Some(Goal::Run)),
@@ -141,7 +141,7 @@ impl DrivenTrain {
     }
 
     /// Tells it a step, or the fastest below that the zones about it allow.
-    pub(super) fn tell_step(
+    pub(super) fn issue_step(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -149,22 +149,22 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let step = self.restrained(context, now, step, out);
-        self.tell_at_once(now, step, out);
+        self.issue_at_once(now, step, out);
     }
 
     /// Tells it to stand.
-    pub(super) fn tell_stand(&mut self, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn issue_stop(&mut self, now: Timestamp, out: &mut Outputs) {
         self.speed_supervision = SpeedSupervision::default();
-        self.tell_at_once(now, SpeedStep::STAND, out);
+        self.issue_at_once(now, SpeedStep::STAND, out);
     }
 
     /// Tells it just this step.
-    pub(super) fn tell_at_once(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
-        self.told = step;
-        self.tell(now, Command::Speed { train: self.id(), step }, out);
+    pub(super) fn issue_at_once(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+        self.commanded = step;
+        self.issue(now, Command::Speed { train: self.id(), step }, out);
     }
 
-    fn tell(&mut self, now: Timestamp, command: Command, out: &mut Outputs) {
+    fn issue(&mut self, now: Timestamp, command: Command, out: &mut Outputs) {
         self.unsent = Some((command, now));
         out.command(command);
     }
@@ -179,8 +179,8 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
-        self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
-        self.tell_step(context, now, step, out);
+        self.take(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+        self.issue_step(context, now, step, out);
     }
 
     /// Comes to rest if it does not, and turns around.
@@ -195,10 +195,10 @@ impl DrivenTrain {
         let goal = Goal::Reverse(then);
         if self.stands(context, now) {
             self.take(Task { order, goal, phase: Phase::Turning }, out);
-            self.tell(now, Command::Reverse { train: self.id() }, out);
+            self.issue(now, Command::Reverse { train: self.id() }, out);
         } else {
-            self.take(Task { order, goal, phase: Phase::Telling { promise: None } }, out);
-            self.tell_stand(now, out);
+            self.take(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+            self.issue_stop(now, out);
         }
     }
 
@@ -218,7 +218,7 @@ impl DrivenTrain {
                 if waits_for == Some(Command::Speed { train, step }) {
                     self.unsent = None;
                 } else if waits_for.is_none() {
-                    self.told = step;
+                    self.commanded = step;
                 }
                 self.expect_on(context, now);
                 self.paced_step_left(event.time);
@@ -240,8 +240,8 @@ impl DrivenTrain {
                 if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
                     if then > SpeedStep::STAND {
                         self.task =
-                            Some(Task { order, goal: Goal::Run, phase: Phase::Telling { promise: None } });
-                        self.tell_step(context, now, then, out);
+                            Some(Task { order, goal: Goal::Run, phase: Phase::Commanding { promise: None } });
+                        self.issue_step(context, now, then, out);
                     } else {
                         self.finish(context, now, order, None, None, out);
                     }
@@ -258,12 +258,12 @@ impl DrivenTrain {
     fn step_left(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         let Some(task) = self.task else { return };
         match (task.phase, task.goal) {
-            (Phase::Telling { .. }, Goal::Run) if step > SpeedStep::STAND => {
+            (Phase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
                 self.finish(context, now, task.order, None, None, out);
             }
-            // A stop that leaves after it has been told to run again was of what it did before.
-            (Phase::Telling { .. } | Phase::Running { .. }, _)
-                if step == SpeedStep::STAND && self.told == SpeedStep::STAND =>
+            // A stop that leaves after it has been commanded to run again was of what it did before.
+            (Phase::Commanding { .. } | Phase::Running { .. }, _)
+                if step == SpeedStep::STAND && self.commanded == SpeedStep::STAND =>
             {
                 let rest = self.locator.rest_if_stopped(context, &self.model, now);
                 let promise = match task.goal {
@@ -273,7 +273,7 @@ impl DrivenTrain {
                     _ => None,
                 };
                 let promise = promise.or(match task.phase {
-                    Phase::Telling { promise } => promise,
+                    Phase::Commanding { promise } => promise,
                     _ => None,
                 });
                 let until = rest.map_or(now + REST_UNFORESEEN, |rest| {
@@ -346,7 +346,7 @@ impl DrivenTrain {
             out.say(DriveNotice::Unconfirmed { command });
             self.unsent = None;
             if matches!(command, Command::Speed { step: SpeedStep::STAND, .. }) {
-                self.tell(now, command, out);
+                self.issue(now, command, out);
             }
         }
         self.keep_on_track(context, now, out);
@@ -379,8 +379,8 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        self.task = Some(Task { phase: Phase::Telling { promise }, ..task });
-        self.tell_stand(now, out);
+        self.task = Some(Task { phase: Phase::Commanding { promise }, ..task });
+        self.issue_stop(now, out);
     }
 
     /// Ends what cannot be done, and the run with it.
@@ -388,8 +388,8 @@ impl DrivenTrain {
         if let Some(task) = self.task.take() {
             out.say(DriveNotice::GivenUp { order: task.order, train: self.id(), why });
         }
-        if self.told > SpeedStep::STAND {
-            self.tell_stand(now, out);
+        if self.commanded > SpeedStep::STAND {
+            self.issue_stop(now, out);
         }
     }
 
@@ -408,7 +408,7 @@ impl DrivenTrain {
         match task.goal {
             Goal::Reverse(_) => {
                 self.task = Some(Task { phase: Phase::Turning, ..task });
-                self.tell(now, Command::Reverse { train: self.id() }, out);
+                self.issue(now, Command::Reverse { train: self.id() }, out);
             }
             Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),
             Goal::Rest | Goal::Run | Goal::Pace => self.finish(context, now, task.order, None, None, out),

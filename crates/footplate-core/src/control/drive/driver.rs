@@ -128,10 +128,10 @@ impl Driver {
         self.trains.get(&train).is_some_and(|train| train.stands(self.track.context(), now))
     }
 
-    /// The step that a train was told last, whether or not that has left yet; 0 for one that is not part of this session.
+    /// The step that a train was commanded last, whether or not that has left yet; 0 for one that is not part of this session.
     #[must_use]
-    pub fn told(&self, train: TrainId) -> SpeedStep {
-        self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.told)
+    pub fn commanded(&self, train: TrainId) -> SpeedStep {
+        self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.commanded)
     }
 
     /// The step at which a train that nobody has seen is let run over a contact; 0 for one that is not part of this session.

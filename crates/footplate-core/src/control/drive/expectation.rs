@@ -7,10 +7,10 @@ use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::track_end;
 use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
+use super::path_length::track_end;
 use super::refusal::Refusal;
 use super::task::Phase;
 
@@ -45,9 +45,9 @@ pub(super) struct Expectation {
     pub(super) unseen: Option<SensorId>,
     /// When it is lost if nothing reports it until then; only once a contact is overdue.
     lost_by: Option<Timestamp>,
-    /// When it has to be told to stop because the track ends, and where.
+    /// When it has to be commanded to stop because the track ends, and where.
     end: Option<(Timestamp, NodeId)>,
-    /// When it has to be told to stop so that it stays within its limit.
+    /// When it has to be commanded to stop so that it stays within its limit.
     limit: Option<Timestamp>,
 }
 
@@ -94,7 +94,7 @@ impl DrivenTrain {
     pub(super) fn expect_on(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let before = self.expected;
         self.expect_next(context, now);
-        if self.told == SpeedStep::STAND {
+        if self.commanded == SpeedStep::STAND {
             // Each run is judged by its own contacts; that one was silent stays known.
             self.expected.silent = 0;
             self.expected.lost_by = None;
@@ -116,7 +116,7 @@ impl DrivenTrain {
     /// When a contact that does not come is overdue, and after that when the train is lost.
     pub(super) fn next_doubt(&self) -> Option<Timestamp> {
         // Nothing is expected of a train that has not heard yet that it should move.
-        if self.told == SpeedStep::STAND || !self.is_told() {
+        if self.commanded == SpeedStep::STAND || !self.is_told() {
             return None;
         }
         let Expectation { due, since, overdue_said, .. } = self.expected;
@@ -164,7 +164,7 @@ impl DrivenTrain {
         self.give_up(now, Refusal::Lost { train }, out);
     }
 
-    /// When the train has to be told to stop so that it stays on the track and within its limit, whatever is reported
+    /// When the train has to be commanded to stop so that it stays on the track and within its limit, whatever is reported
     /// until then.
     pub(super) fn guard(&self) -> Option<Timestamp> {
         [self.end_guard(), self.limit_guard()].into_iter().flatten().min()
@@ -173,13 +173,13 @@ impl DrivenTrain {
     /// Whoever has a plan stops before the end of the track.
     fn end_guard(&self) -> Option<Timestamp> {
         let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
-        let (leaves, _) = self.expected.end.filter(|_| self.told > SpeedStep::STAND && !has_plan)?;
+        let (leaves, _) = self.expected.end.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
         Some(leaves - LINE_TIME)
     }
 
     /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
     fn limit_guard(&self) -> Option<Timestamp> {
-        let leaves = self.expected.limit.filter(|_| self.told > SpeedStep::STAND)?;
+        let leaves = self.expected.limit.filter(|_| self.commanded > SpeedStep::STAND)?;
         Some(leaves - LINE_TIME)
     }
 
@@ -202,7 +202,7 @@ impl DrivenTrain {
     }
 
     fn end_of_track(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
-        let located = self.located(context, now).filter(|_| self.told > SpeedStep::STAND)?;
+        let located = self.located(context, now).filter(|_| self.commanded > SpeedStep::STAND)?;
         let (end, way) = track_end(context, &self.model, located.at.node)?;
         let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
         Some((self.last_stop_before(context, now, at)?, end))
@@ -217,7 +217,7 @@ impl DrivenTrain {
         now: Timestamp,
         at: WayPoint,
     ) -> Option<Timestamp> {
-        if self.told == SpeedStep::STAND {
+        if self.commanded == SpeedStep::STAND {
             return None;
         }
         let earliest = now + LINE_TIME;

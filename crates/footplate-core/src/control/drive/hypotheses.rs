@@ -130,7 +130,7 @@ fn may_have_moved(
 /// ln of the density (1/s) with which a train that may be anywhere comes to one contact: its speed over all ways there
 /// are, in either direction.
 fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
-    let speed = train.model.speed(train.told, Approach::Below).value.as_m_per_s();
+    let speed = train.model.speed(train.commanded, Approach::Below).value.as_m_per_s();
     let ways: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
     let ways = if ways > 0.0 { ways } else { SOMEWHERE_M };
     libm::log(speed.max(f64::MIN_POSITIVE) / ways)

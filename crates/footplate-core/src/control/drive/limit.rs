@@ -10,13 +10,13 @@ use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
-use super::felt_way::{counted_from, lap};
 use super::order::OrderId;
+use super::path_length::{counted_from, lap};
 use super::turning::{trailing_place, turned_as_it_lies, turned_place};
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
-    /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is told to stop in time, by
+    /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is commanded to stop in time, by
     /// the clock if nothing is heard of it, so that it comes to rest before but for one time in a thousand. Whoever plans
     /// a stop plans it before the limit. A train that is put elsewhere or turned around may not move until it is given
     /// another limit; `None` lifts it.

@@ -25,9 +25,9 @@ pub enum DriveNotice {
         /// What comes next.
         next: Option<DueContact>,
     },
-    /// When a train told to stop will be told so, for the first time or again because something was learnt.
+    /// When a train commanded to stop will be told so, for the first time or again because something was learnt.
     Planned(PlannedStop),
-    /// It was too late for the target: the train was told to stop at once, and will come to rest beyond.
+    /// It was too late for the target: the train was commanded to stop at once, and will come to rest beyond.
     Overshoots {
         /// The order.
         order: OrderId,
@@ -40,7 +40,7 @@ pub enum DriveNotice {
     Paced(PacedLine),
     /// How a train that shall be somewhere in time is going to do that.
     Arrives(PlannedArrival),
-    /// A follower has been told to stand, because it would have come too near to its leader or nobody knows where that is.
+    /// A follower has been commanded to stop, because it would have come too near to its leader or nobody knows where that is.
     /// It goes on by itself.
     HeldBack {
         /// The order.
@@ -64,7 +64,7 @@ pub enum DriveNotice {
     },
     /// An order has been carried out.
     Done(Finished),
-    /// An order was given up on the way; the train has been told to stop.
+    /// An order was given up on the way; the train has been commanded to stop.
     GivenUp {
         /// The order.
         order: OrderId,
@@ -107,19 +107,19 @@ pub enum DriveNotice {
         /// By how much.
         by: TimeSpan,
     },
-    /// The track ends ahead of a train. It has been told to stop.
+    /// The track ends ahead of a train. It has been commanded to stop.
     TrackEnds {
         /// The train.
         train: TrainId,
         /// Where.
         end: NodeId,
     },
-    /// What a train may enter ends ahead of it. It has been told to stop.
+    /// What a train may enter ends ahead of it. It has been commanded to stop.
     AtLimit {
         /// The train.
         train: TrainId,
     },
-    /// Nobody knows any more where a train is. It has been told to stop.
+    /// Nobody knows any more where a train is. It has been commanded to stop.
     Lost {
         /// The train.
         train: TrainId,

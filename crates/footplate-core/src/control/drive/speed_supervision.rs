@@ -24,7 +24,7 @@ use super::driver::Driver;
 use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
-use super::restricted_way::RestrictedWay;
+use super::restricted_stretch::RestrictedStretch;
 use super::stop_planning::SOONEST;
 use super::task::{Destination, Goal, Phase};
 
@@ -61,13 +61,13 @@ pub(super) struct SpeedSupervision {
 }
 
 /// From where a train is judged: when a command can leave, how far it reaches and how it moves.
-struct Prospect<'t> {
+struct Lookahead<'t> {
     train: &'t DrivenTrain,
     here: ReachableSet,
     now: Timestamp,
     usable: Vec<SpeedStep>,
     k: f64,
-    /// Whether it is still faster than the step told last will have it, ...
+    /// Whether it is still faster than the step commanded last will have it, ...
     slows_down: bool,
     /// ... or slower, or one of the two.
     changes: bool,
@@ -77,7 +77,7 @@ struct Prospect<'t> {
 
 /// A restricted way, and the fastest step that keeps to it.
 struct Slow<'g> {
-    way: RestrictedWay<'g>,
+    way: RestrictedStretch<'g>,
     step: SpeedStep,
 }
 
@@ -97,7 +97,7 @@ impl Driver {
 impl DrivenTrain {
     /// When the zones about it are looked at next.
     pub(super) fn zone_look(&self) -> Option<Timestamp> {
-        self.speed_supervision.look.filter(|_| self.told > SpeedStep::STAND)
+        self.speed_supervision.look.filter(|_| self.commanded > SpeedStep::STAND)
     }
 
     /// Something is known anew, or the train was told something. Where nothing is restricted nobody looks.
@@ -125,15 +125,15 @@ impl DrivenTrain {
         context: TrackContext<'g>,
         now: Timestamp,
         at: WayPoint,
-    ) -> Vec<(RestrictedWay<'g>, SpeedStep)> {
+    ) -> Vec<(RestrictedStretch<'g>, SpeedStep)> {
         if context.layout.zones().is_empty() {
             return Vec::new();
         }
-        let prospect = Prospect::of(self, now);
-        let [_, rear] = prospect.ends;
-        let mut ways = RestrictedWay::about(context, &self.model, at.node, -rear, at.way.as_m());
+        let lookahead = Lookahead::of(self, now);
+        let [_, rear] = lookahead.ends;
+        let mut ways = RestrictedStretch::about(context, &self.model, at.node, -rear, at.way.as_m());
         ways.retain(|way| way.to >= rear && way.from <= at.way.as_m());
-        ways.into_iter().map(|way| (way, prospect.within(way.zone.limit.as_m_per_s()))).collect()
+        ways.into_iter().map(|way| (way, lookahead.within(way.zone.limit.as_m_per_s()))).collect()
     }
 
     /// The step to be told if one is asked for, which is kept in mind. Says so if zones leave less.
@@ -165,49 +165,52 @@ impl DrivenTrain {
         }
     }
 
-    /// The fastest step up to one that may be told now, and the zone that leaves no more.
+    /// The fastest step up to one that may be commanded now, and the zone that leaves no more.
     fn allowed<'g>(
         &self,
         context: TrackContext<'g>,
         now: Timestamp,
         step: SpeedStep,
     ) -> (SpeedStep, Option<&'g Zone>) {
-        let prospect = Prospect::of(self, now);
-        let ways = prospect.ways(context, step);
-        // Who slows down for a zone is told nothing faster until it has: what came of a change and its opposite within a moment
+        let lookahead = Lookahead::of(self, now);
+        let ways = lookahead.ways(context, step);
+        // Who slows down for a zone is commanded nothing faster until it has: what came of a change and its opposite within a moment
         // nobody could say.
-        if prospect.slows_down
-            && step > self.told
-            && self.told > SpeedStep::STAND
+        if lookahead.slows_down
+            && step > self.commanded
+            && self.commanded > SpeedStep::STAND
             && let Some(slow) = ways.iter().find(|slow| step > slow.step)
         {
-            let told = prospect.forbids(&ways, self.told, UNDONE);
-            let step =
-                if told.is_some() { prospect.fastest_below(&ways, self.told, UNDONE) } else { self.told };
+            let commanded = lookahead.forbids(&ways, self.commanded, UNDONE);
+            let step = if commanded.is_some() {
+                lookahead.fastest_below(&ways, self.commanded, UNDONE)
+            } else {
+                self.commanded
+            };
             return (step, Some(slow.way.zone));
         }
-        let Some(zone) = prospect.forbids(&ways, step, UNDONE) else { return (step, None) };
-        (prospect.fastest_below(&ways, step, UNDONE), Some(zone))
+        let Some(zone) = lookahead.forbids(&ways, step, UNDONE) else { return (step, None) };
+        (lookahead.fastest_below(&ways, step, UNDONE), Some(zone))
     }
 
     /// Slows down for what is ahead, and gets faster where nothing restricts it any more.
     fn heed_zones(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
-        let told = self.told;
-        let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > told);
-        let prospect = Prospect::of(self, now);
-        let ways = prospect.ways(context, wanted.unwrap_or(told));
-        let by = prospect.slow_down_by(&ways, told);
-        let due = by.filter(|(by, _)| *by <= prospect.start() + TICK);
-        let slower = due.map(|(_, zone)| (prospect.fastest_below(&ways, told, WORTHWHILE), zone));
-        let slower = slower.filter(|(step, _)| *step < told);
-        let leaves = prospect.leaves(&ways);
+        let commanded = self.commanded;
+        let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > commanded);
+        let lookahead = Lookahead::of(self, now);
+        let ways = lookahead.ways(context, wanted.unwrap_or(commanded));
+        let by = lookahead.slow_down_by(&ways, commanded);
+        let due = by.filter(|(by, _)| *by <= lookahead.start() + TICK);
+        let slower = due.map(|(_, zone)| (lookahead.fastest_below(&ways, commanded, WORTHWHILE), zone));
+        let slower = slower.filter(|(step, _)| *step < commanded);
+        let leaves = lookahead.leaves(&ways);
         let faster = wanted.filter(|_| due.is_none()).and_then(|wanted| {
-            let faster = prospect.usable.iter().rev().filter(|step| **step > told && **step <= wanted);
+            let faster = lookahead.usable.iter().rev().filter(|step| **step > commanded && **step <= wanted);
             let mut faster = faster.copied().chain(Some(wanted));
             faster.find(|step| {
-                !prospect.slows_down
-                    && prospect.forbids(&ways, *step, WORTHWHILE).is_none()
-                    && prospect.spares(&ways, *step)
+                !lookahead.slows_down
+                    && lookahead.forbids(&ways, *step, WORTHWHILE).is_none()
+                    && lookahead.spares(&ways, *step)
                     && self.is_worth_it(context, now, *step)
             })
         });
@@ -219,17 +222,17 @@ impl DrivenTrain {
             if self.is_paced_by_itself() {
                 self.speed_supervision.wanted = None;
             } else {
-                self.speed_supervision.wanted.get_or_insert(told);
+                self.speed_supervision.wanted.get_or_insert(commanded);
             }
             self.say_restrained(step, zone, out);
             self.interrupt_line();
-            self.tell_at_once(now, step, out);
+            self.issue_at_once(now, step, out);
         } else if let Some(step) = faster {
             if Some(step) == wanted {
                 self.speed_supervision.wanted = None;
             }
             self.resume_line(now, step);
-            self.tell_at_once(now, step, out);
+            self.issue_at_once(now, step, out);
         } else if by.is_none() && leaves.is_none() {
             self.speed_supervision.said = None;
         }
@@ -244,15 +247,15 @@ impl DrivenTrain {
     }
 }
 
-impl<'t> Prospect<'t> {
+impl<'t> Lookahead<'t> {
     fn of(train: &'t DrivenTrain, now: Timestamp) -> Self {
         let k = Aim::NotBeyond(TOO_FAST).margin();
         let here = train.locator.reachable_set();
         let [ahead, behind] = train.reach.map(Length::as_m);
         let ends = [here.place(&train.model, now, k) + ahead, here.place(&train.model, now, -k) - behind];
         let beyond = here.unsettled(&train.model, now + SOONEST);
-        let slows_down = train.told.get() < here.step() || beyond > SETTLED;
-        let changes = slows_down || train.told.get() != here.step() || beyond < -SETTLED;
+        let slows_down = train.commanded.get() < here.step() || beyond > SETTLED;
+        let changes = slows_down || train.commanded.get() != here.step() || beyond < -SETTLED;
         Self { train, here, now, usable: train.usable_steps(), k, slows_down, changes, ends }
     }
 
@@ -264,30 +267,30 @@ impl<'t> Prospect<'t> {
     /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
     /// slowest of all, wherever it goes.
     fn ways<'g>(&self, context: TrackContext<'g>, step: SpeedStep) -> Vec<Slow<'g>> {
-        let slow = |way: RestrictedWay<'g>| Slow { way, step: self.within(way.zone.limit.as_m_per_s()) };
+        let slow = |way: RestrictedStretch<'g>| Slow { way, step: self.within(way.zone.limit.as_m_per_s()) };
         let Some(node) = self.here.node() else {
             let zones = context.layout.zones().iter();
             let slowest =
                 zones.min_by(|one, other| one.limit.as_m_per_s().total_cmp(&other.limit.as_m_per_s()));
-            let everywhere = |zone| RestrictedWay { zone, from: f64::NEG_INFINITY, to: f64::INFINITY };
+            let everywhere = |zone| RestrictedStretch { zone, from: f64::NEG_INFINITY, to: f64::INFINITY };
             return slowest.map(everywhere).map(slow).into_iter().collect();
         };
         let model = &self.train.model;
-        let step = step.max(self.train.told);
+        let step = step.max(self.train.commanded);
         let slowest = self.usable.first().copied().unwrap_or(step);
         let soon = SOONEST + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
         let [front, rear] = self.ends;
         let ahead = front + (model.steady_speed(step, Approach::Above) * soon).as_m() * (1.0 + SPARED);
-        let ways = RestrictedWay::about(context, model, node, -rear, ahead);
+        let ways = RestrictedStretch::about(context, model, node, -rear, ahead);
         ways.into_iter().filter(|way| way.to >= rear && way.from <= ahead).map(slow).collect()
     }
 
     /// The fastest step within a limit, of which the slowest that moves it is taken to be.
     fn within(&self, limit: f64) -> SpeedStep {
         let keeps = |step: &SpeedStep| {
-            let mut told = self.here;
-            told.tell(&self.train.model, self.start(), *step);
-            let settled = told.after_all(&self.train.model).fastest_settled(self.k);
+            let mut commanded = self.here;
+            commanded.command(&self.train.model, self.start(), *step);
+            let settled = commanded.after_all(&self.train.model).fastest_settled(self.k);
             settled * self.gain_from_above(*step) <= limit
         };
         let within = self.usable.partition_point(keeps).max(1);
@@ -297,7 +300,7 @@ impl<'t> Prospect<'t> {
     /// By which factor it is faster at a step than if it came to it from below: a train that is told another step while
     /// it still changes to the last one may come to it from above.
     fn gain_from_above(&self, step: SpeedStep) -> f64 {
-        if !self.changes || step <= self.train.told {
+        if !self.changes || step <= self.train.commanded {
             return 1.0;
         }
         let [below, above] =
@@ -306,19 +309,19 @@ impl<'t> Prospect<'t> {
     }
 
     /// Whether it may be on a way already.
-    fn may_be_on(&self, way: &RestrictedWay<'_>) -> bool {
+    fn may_be_on(&self, way: &RestrictedStretch<'_>) -> bool {
         way.from <= self.ends[0]
     }
 
-    /// The first zone that a step would be too fast for, if it is told now and a slower one so long after.
+    /// The first zone that a step would be too fast for, if it is commanded now and a slower one so long after.
     fn forbids<'g>(&self, ways: &[Slow<'g>], step: SpeedStep, lasting: TimeSpan) -> Option<&'g Zone> {
-        let (mut told, mut brakes) = (self.here, self.start());
-        if told.step() != step.get() {
-            told.tell(&self.train.model, brakes, step);
+        let (mut commanded, mut brakes) = (self.here, self.start());
+        if commanded.step() != step.get() {
+            commanded.command(&self.train.model, brakes, step);
             brakes += lasting;
         }
         let is_too_fast = |slow: &&Slow<'g>| {
-            step > slow.step && (self.may_be_on(&slow.way) || !self.slows_for(told, slow, brakes))
+            step > slow.step && (self.may_be_on(&slow.way) || !self.slows_for(commanded, slow, brakes))
         };
         ways.iter().find(is_too_fast).map(|slow| slow.way.zone)
     }
@@ -330,22 +333,22 @@ impl<'t> Prospect<'t> {
     }
 
     /// Whether a train is within the limit when it comes to a zone ahead if it is told the slower step at a time.
-    fn slows_for(&self, mut told: ReachableSet, slow: &Slow<'_>, at: Timestamp) -> bool {
+    fn slows_for(&self, mut commanded: ReachableSet, slow: &Slow<'_>, at: Timestamp) -> bool {
         let model = &self.train.model;
-        told.tell(model, at, slow.step);
-        let told = told.after_all(model);
+        commanded.command(model, at, slow.step);
+        let commanded = commanded.after_all(model);
         let limit = slow.way.zone.limit.as_m_per_s();
-        let limit = limit.max(told.fastest_settled(self.k) * (1.0 + SETTLED));
-        let enters = told.reaches(model, self.entry(&slow.way), self.now, self.k);
-        enters.is_none_or(|enters| told.fastest_from(model, enters, self.k) <= limit)
+        let limit = limit.max(commanded.fastest_settled(self.k) * (1.0 + SETTLED));
+        let enters = commanded.reaches(model, self.entry(&slow.way), self.now, self.k);
+        enters.is_none_or(|enters| commanded.fastest_from(model, enters, self.k) <= limit)
     }
 
     /// Where it is when its front comes to a way.
-    fn entry(&self, way: &RestrictedWay<'_>) -> f64 {
+    fn entry(&self, way: &RestrictedStretch<'_>) -> f64 {
         way.from - self.train.reach[0].as_m()
     }
 
-    /// The fastest step below one that may be told now if a slower one follows so long after; the slowest that moves it where
+    /// The fastest step below one that may be commanded now if a slower one follows so long after; the slowest that moves it where
     /// none may.
     fn fastest_below(&self, ways: &[Slow<'_>], step: SpeedStep, lasting: TimeSpan) -> SpeedStep {
         let below = self.usable.partition_point(|usable| *usable < step);
@@ -355,12 +358,12 @@ impl<'t> Prospect<'t> {
     }
 
     /// When a slower step has to leave at the latest, and for which zone; at once for a zone that it may be in.
-    fn slow_down_by<'g>(&self, ways: &[Slow<'g>], told: SpeedStep) -> Option<(Timestamp, &'g Zone)> {
+    fn slow_down_by<'g>(&self, ways: &[Slow<'g>], commanded: SpeedStep) -> Option<(Timestamp, &'g Zone)> {
         let model = &self.train.model;
         let mut here = self.here;
-        here.tell(model, self.start(), told);
+        here.command(model, self.start(), commanded);
         let by = |slow: &Slow<'g>| {
-            if told <= slow.step {
+            if commanded <= slow.step {
                 return None;
             }
             let is_in_time = |at: Timestamp| self.slows_for(here, slow, at);

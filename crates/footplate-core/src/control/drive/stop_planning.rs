@@ -10,10 +10,10 @@ use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::{DrivenTrain, LINE_TIME};
-use super::felt_way::{contacts_until, counted_from, lap, unknown_turnout, way_between};
 use super::notice::{DriveNotice, PlannedStop, Promise};
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
+use super::path_length::{contacts_until, counted_from, lap, unknown_turnout, way_between};
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Plan, Task};
 
@@ -50,7 +50,7 @@ impl DrivenTrain {
         };
         context.layout.locate(stop.target, context.turnouts).map_err(Refusal::Place)?;
         let stands = self.stands(context, now);
-        if !stands && self.told == SpeedStep::STAND {
+        if !stands && self.commanded == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
         // Who was not seen where it should have been is looked for first.
@@ -62,7 +62,7 @@ impl DrivenTrain {
             );
             if stands {
                 let step = stop.step.unwrap_or_else(|| self.finding_step());
-                self.tell_step(context, now, step, out);
+                self.issue_step(context, now, step, out);
             }
             return Ok(());
         };
@@ -147,11 +147,11 @@ impl DrivenTrain {
             }
             let step = self.approach_step(context, now, located, &destination)?;
             self.take(task, out);
-            self.tell_step(context, now, step, out);
+            self.issue_step(context, now, step, out);
         } else {
             self.take(task, out);
-            match destination.step.filter(|step| *step != self.told) {
-                Some(step) => self.tell_step(context, now, step, out),
+            match destination.step.filter(|step| *step != self.commanded) {
+                Some(step) => self.issue_step(context, now, step, out),
                 None => self.plan(context, now, out),
             }
         }

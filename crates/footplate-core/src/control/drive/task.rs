@@ -55,12 +55,12 @@ pub(super) enum Phase {
     /// The train runs, and the stop is being planned.
     Running { plan: Option<Plan> },
     /// A step has been asked for, mostly 0, and has not left yet.
-    Telling { promise: Option<Promise> },
+    Commanding { promise: Option<Promise> },
     /// Step 0 has left, and the train comes to rest by this time.
     Settling { promise: Option<Promise>, until: Timestamp },
-    /// It has been told to turn around.
+    /// It has been commanded to reverse.
     Turning,
-    /// It is told step after step.
+    /// It is commanded step after step.
     Pacing,
 }
 

@@ -10,7 +10,7 @@ use crate::track::{NodeKind, Position};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
-use super::felt_way::nodes_of_turnout;
+use super::path_length::nodes_of_turnout;
 
 /// From the pickup to either end of a train, which nobody has measured: a long locomotive of the gauge, or a short one
 /// with a wagon.

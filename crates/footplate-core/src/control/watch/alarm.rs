@@ -23,7 +23,7 @@ pub enum Alarm {
     LinkSilent,
     /// A command to stop has not left in time.
     StopUnconfirmed,
-    /// The train has been told to stand and still closes contacts.
+    /// The train has been commanded to stop and still closes contacts.
     DoesNotStop(SensorId),
     /// Whoever is above does not trust it.
     Distrusted,

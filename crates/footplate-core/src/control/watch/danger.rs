@@ -52,7 +52,7 @@ impl Watchdog {
         let stopped = self.hold_what_could_meet(now);
         let interrupted = interrupted.map(|(_, order)| order);
         self.say(WatchdogNotice::Danger { train, why, stopped, interrupted });
-        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
     /// Stops every moving train that could meet one in danger; returns which.
@@ -60,7 +60,7 @@ impl Watchdog {
         let others: Vec<TrainId> = self.driver.trains().collect();
         let mut stopped = Vec::new();
         for other in others {
-            let moves = !self.driver.stands(other, now) || self.driver.told(other) > SpeedStep::STAND;
+            let moves = !self.driver.stands(other, now) || self.driver.commanded(other) > SpeedStep::STAND;
             let is_known = self.dangers.contains_key(&other) || self.held.contains_key(&other);
             if moves && !is_known && self.could_meet(now, other) {
                 self.hold(now, other);
@@ -74,7 +74,7 @@ impl Watchdog {
     pub(super) fn hold(&mut self, now: Timestamp, train: TrainId) {
         let order = self.standing.remove(&train);
         self.held.insert(train, order);
-        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
     /// Whether a train could meet one in danger, wherever that may be by now.
@@ -91,7 +91,7 @@ impl Watchdog {
     fn own_reach(&self, now: Timestamp, train: TrainId) -> Option<BTreeSet<EdgeId>> {
         let located = self.driver.locate(train, now)?;
         let place = self.driver.position(train, now)?;
-        let step = self.driver.told(train).max(located.step);
+        let step = self.driver.commanded(train).max(located.step);
         let stop = self.driver.model(train)?.stop(step, Approach::Below);
         let doubt = located.uncertainty * CERTAIN + BODY + CLEAR;
         let ahead = stop.distance * LONGER_STOP + doubt;
@@ -106,7 +106,7 @@ impl Watchdog {
             let place: Position = *self.seen.get(&train)?;
             return Some(rails_within(layout, place, LOST_REACH, LOST_REACH));
         };
-        let step = self.driver.told(train).max(located.step);
+        let step = self.driver.commanded(train).max(located.step);
         let stop = self.driver.model(train)?.stop(step, Approach::Below);
         let doubt = located.uncertainty * CERTAIN + BODY + CLEAR + DANGER_REACH;
         Some(rails_within(layout, place, stop.distance * LONGER_STOP + doubt, doubt))
@@ -149,7 +149,7 @@ impl Watchdog {
     pub(super) fn cut_power(&mut self, now: Timestamp) {
         self.power = Power::Off { since: now };
         self.command(Command::PowerOff);
-        // Everything stops, and decoders forget: what is told now is what they hear when they have power again.
+        // Everything stops, and decoders forget: what is commanded now is what they hear when they have power again.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
             let moved = !self.driver.stands(train, now);
@@ -158,7 +158,7 @@ impl Watchdog {
                 let order = self.standing.remove(&train);
                 self.held.insert(train, order);
             }
-            self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
             if let Some(located) = located.filter(|_| moved) {
                 let at = crate::estimation::WayPoint { way: located.at.way + DEAD_WAY, ..located.at };
                 let doubt = Length::from_m(libm::hypot(located.uncertainty.as_m(), DEAD_DOUBT.as_m()));
@@ -170,8 +170,8 @@ impl Watchdog {
     /// Gives power again once everything stands and is told to.
     pub(super) fn power_on_again(&mut self, now: Timestamp) {
         let Power::Off { since } = self.power else { return };
-        let told = self.driver.trains().all(|train| !self.stops.waits(train));
-        if now - since >= DEAD_AFTER && told && !self.is_silent() && !self.is_switched_off {
+        let commanded = self.driver.trains().all(|train| !self.stops.waits(train));
+        if now - since >= DEAD_AFTER && commanded && !self.is_silent() && !self.is_switched_off {
             self.power = Power::On;
             self.command(Command::PowerOn);
             self.say(WatchdogNotice::PowerOn);

@@ -17,7 +17,7 @@ pub enum LinkNews {
     Silent,
     /// It answers, for the first time or again.
     Answers,
-    /// A train was told to turn around, and nobody knows whether it heard: it may face either way.
+    /// A train was commanded to reverse, and nobody knows whether it heard: it may face either way.
     ReverseInDoubt {
         /// The train.
         train: TrainId,
@@ -34,7 +34,7 @@ impl Watchdog {
                 self.silent = Some(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
-                    if self.driver.told(train) > SpeedStep::STAND || !self.driver.stands(train, now) {
+                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.stands(train, now) {
                         self.raise(now, train, Alarm::LinkSilent);
                     }
                 }
@@ -45,7 +45,7 @@ impl Watchdog {
                     // Who knows what of it has been heard: everything stands, and is told so once more.
                     let trains: Vec<TrainId> = self.driver.trains().collect();
                     for train in trains {
-                        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+                        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
                     }
                 }
             }

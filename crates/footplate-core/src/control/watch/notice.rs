@@ -15,7 +15,7 @@ use super::alarm::Alarm;
 pub enum WatchdogNotice {
     /// What the driver has to say.
     Drive(DriveNotice),
-    /// A train is not as it was. It has been told to stand, and so have the others.
+    /// A train is not as it was. It has been commanded to stop, and so have the others.
     Danger {
         /// The train.
         train: TrainId,
@@ -31,7 +31,7 @@ pub enum WatchdogNotice {
         /// The train that could not be stopped otherwise.
         train: TrainId,
     },
-    /// The track has power again; all trains have been told to stand.
+    /// The track has power again; all trains have been commanded to stop.
     PowerOn,
     /// A train would crawl to the next contacts now, if it is permitted to.
     AsksToCrawl {

@@ -153,7 +153,7 @@ impl Watchdog {
                 Phase::LearningStop { until } if until <= now => {
                     let low = recovery.steps.low;
                     self.set_phase(train, Phase::LearningRest, now + MEASURED_WITHIN);
-                    self.tell(now, Order::Speed { train, step: low });
+                    self.issue(now, Order::Speed { train, step: low });
                 }
                 Phase::Ending { outcome } if self.stops.stands(train).is_some_and(|stands| stands <= now) => {
                     self.recovered(now, train, outcome);
@@ -206,7 +206,7 @@ impl Watchdog {
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.phase = Phase::Crawling { step, pushed: now, seen };
         }
-        self.tell(now, Order::Speed { train, step });
+        self.issue(now, Order::Speed { train, step });
     }
 
     /// A command to a train in recovery has left.
@@ -223,7 +223,7 @@ impl Watchdog {
                 &mut recovery.phase
             && trial.step == step
         {
-            trial.told(&recovery.base, *from, event.time);
+            trial.commanded(&recovery.base, *from, event.time);
         }
     }
 
@@ -240,7 +240,7 @@ impl Watchdog {
         let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
         let event = Event { time: passed.window.until, kind: EventKind::Sensor(report) };
         recovery.fit.take(self.driver.layout(), self.driver.turnouts(), &event);
-        let told = self.driver.told(train);
+        let commanded = self.driver.commanded(train);
         match recovery.phase {
             Phase::Crawling { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
@@ -273,10 +273,10 @@ impl Watchdog {
             Phase::LearningSpeed { mut trial, from } => {
                 trial.pass(node, passed.window, None);
                 recovery.phase = Phase::LearningSpeed { trial, from };
-                if trial.last().is_some() && told == trial.step {
+                if trial.last().is_some() && commanded == trial.step {
                     let until = now + SURELY_STANDS + SURELY_STANDS;
                     self.set_phase(train, Phase::LearningStop { until }, until + MEASURED_WITHIN);
-                    self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+                    self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
                 }
             }
             Phase::LearningRest => self.next_lesson(now, train),
@@ -300,7 +300,7 @@ impl Watchdog {
         let crawl = recovery.steps.crawl;
         if why.is_none() {
             self.set_phase(train, Phase::Creeping { way }, now + MEASURED_WITHIN);
-            self.tell(now, Order::Speed { train, step: crawl });
+            self.issue(now, Order::Speed { train, step: crawl });
         } else {
             self.end_rescaled(now, train);
         }
@@ -351,7 +351,7 @@ impl Watchdog {
         recovery.by = now + STANDS_WITHIN;
         // Behind it is where it came from.
         self.driver.set_limit(now, train, None);
-        self.tell(now, Order::Reverse { train, then: step });
+        self.issue(now, Order::Reverse { train, then: step });
     }
 
     /// Everything is known: the train comes to rest.
@@ -367,15 +367,15 @@ impl Watchdog {
         };
         self.driver.set_model(model);
         self.set_phase(train, Phase::Ending { outcome }, now + STANDS_WITHIN);
-        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
     /// It stands and is known again.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
         self.driver.set_limit(now, train, None);
-        if let Some(vigil) = self.vigils.get_mut(&train) {
-            vigil.place();
+        if let Some(monitor) = self.monitors.get_mut(&train) {
+            monitor.place();
         }
         self.say(WatchdogNotice::Recovered { train, outcome, took: now - recovery.began });
         if self.dangers.is_empty() {
@@ -419,6 +419,6 @@ impl Watchdog {
         if let Some((_, order)) = order {
             self.say(WatchdogNotice::Dropped { train, order });
         }
-        self.tell(now, Order::Speed { train, step: SpeedStep::STAND });
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 }

@@ -33,7 +33,7 @@ const HOPS_TO_STOP: usize = 8;
 impl Watchdog {
     /// Begins with the next speed, or decides what the train is.
     pub(super) fn measure(&mut self, now: Timestamp, train: TrainId) {
-        let told = self.driver.told(train);
+        let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
         let is_same =
@@ -45,17 +45,17 @@ impl Watchdog {
         let plan = [low, middle, high];
         let next = plan.iter().find(|step| recovery.ratios.iter().all(|one| one.step != **step));
         if let Some(step) = next.filter(|_| !is_enough) {
-            let trial = SpeedTrial::new(*step, told);
-            self.set_phase(train, Phase::Measuring { trial, from: told }, now + MEASURED_WITHIN);
-            if told == *step {
+            let trial = SpeedTrial::new(*step, commanded);
+            self.set_phase(train, Phase::Measuring { trial, from: commanded }, now + MEASURED_WITHIN);
+            if commanded == *step {
                 let base = self.dangers.get(&train).map(|recovery| recovery.base.clone());
                 if let (Some(base), Some(Recovery { phase: Phase::Measuring { trial, .. }, .. })) =
                     (base, self.dangers.get_mut(&train))
                 {
-                    trial.told(&base, told, now);
+                    trial.commanded(&base, commanded, now);
                 }
             } else {
-                self.tell(now, Order::Speed { train, step: *step });
+                self.issue(now, Order::Speed { train, step: *step });
             }
             return;
         }
@@ -98,7 +98,7 @@ impl Watchdog {
         let way = self.driver.model(train).map(|model| model.stop(step, Approach::Below).distance);
         let ordered = target.zip(way).and_then(|(target, way)| {
             let stop = StopOrder { step: Some(step), ..StopOrder::at(train, target) };
-            Some((self.tell(now, Order::Stop(stop))?, way))
+            Some((self.issue(now, Order::Stop(stop))?, way))
         });
         match ordered {
             Some((order, way)) => {
@@ -150,22 +150,22 @@ impl Watchdog {
 
     /// Another engine: one more speed and the stop from it.
     pub(super) fn next_lesson(&mut self, now: Timestamp, train: TrainId) {
-        let told = self.driver.told(train);
+        let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Some(step) = recovery.lessons().get(recovery.lesson).copied() else {
             return self.end(now, train, Outcome::LearntAnew);
         };
         recovery.lesson += 1;
-        let trial = SpeedTrial::new(step, told);
-        self.set_phase(train, Phase::LearningSpeed { trial, from: told }, now + MEASURED_WITHIN);
-        if told == step {
+        let trial = SpeedTrial::new(step, commanded);
+        self.set_phase(train, Phase::LearningSpeed { trial, from: commanded }, now + MEASURED_WITHIN);
+        if commanded == step {
             if let Some(Recovery { phase: Phase::LearningSpeed { trial, .. }, base, .. }) =
                 self.dangers.get_mut(&train)
             {
-                trial.told(base, told, now);
+                trial.commanded(base, commanded, now);
             }
         } else {
-            self.tell(now, Order::Speed { train, step });
+            self.issue(now, Order::Speed { train, step });
         }
     }
 }

@@ -11,7 +11,7 @@ pub(super) const CONFIRMED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 /// For so long after it should stand a train is expected to close the contact ahead if it does not.
 pub(super) const WATCHED_FOR: TimeSpan = TimeSpan::from_s(10.0);
 
-/// One train that was told to stop.
+/// One train that was commanded to stop.
 #[derive(Debug, Clone, Copy)]
 struct Stop {
     asked: Timestamp,
@@ -26,7 +26,7 @@ pub(super) struct Stops {
 }
 
 impl Stops {
-    /// A train is being told to stop.
+    /// A train is being commanded to stop.
     pub(super) fn ask(&mut self, train: TrainId, now: Timestamp) {
         self.stops.insert(train, Stop { asked: now, stands: None });
     }
@@ -43,7 +43,7 @@ impl Stops {
         self.stops.remove(&train);
     }
 
-    /// Whether a train was told to stop and nothing says that this has left.
+    /// Whether a train was commanded to stop and nothing says that this has left.
     pub(super) fn waits(&self, train: TrainId) -> bool {
         self.stops.get(&train).is_some_and(|stop| stop.stands.is_none())
     }

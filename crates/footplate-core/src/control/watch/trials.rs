@@ -74,7 +74,7 @@ impl SpeedTrial {
     }
 
     /// The command has left.
-    pub(super) fn told(&mut self, model: &MotionModel, from: SpeedStep, at: Timestamp) {
+    pub(super) fn commanded(&mut self, model: &MotionModel, from: SpeedStep, at: Timestamp) {
         let settles = TimeSpan::from_s(model.settles_within(from, self.step).as_s() * SETTLES_PART);
         self.settled = Some(at + settles + SETTLES_MORE);
     }

@@ -15,10 +15,10 @@ use crate::track::Position;
 use crate::units::Length;
 
 use super::alarm::Alarm;
+use super::consistency_monitor::ConsistencyMonitor;
 use super::notice::WatchdogNotice;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
-use super::vigil::Vigil;
 
 /// Times to rest are foreseen to this part, ...
 const REST_PART: f64 = 1.3;
@@ -39,7 +39,7 @@ pub(super) enum Power {
 pub struct Watchdog {
     pub(super) driver: Driver,
     queue: VecDeque<Output<WatchdogNotice>>,
-    pub(super) vigils: BTreeMap<TrainId, Vigil>,
+    pub(super) monitors: BTreeMap<TrainId, ConsistencyMonitor>,
     pub(super) stops: Stops,
     pub(super) power: Power,
     /// Since when the station has been silent.
@@ -48,7 +48,7 @@ pub struct Watchdog {
     pub(super) dangers: BTreeMap<TrainId, Recovery>,
     /// Trains that are held until the danger is over, with what they were doing.
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
-    /// What each train was told last that is not done with.
+    /// What each train was commanded last that is not done with.
     pub(super) standing: BTreeMap<TrainId, (OrderId, Order)>,
     /// Where each train was seen last.
     pub(super) seen: BTreeMap<TrainId, Position>,
@@ -72,7 +72,7 @@ impl Watchdog {
         let mut watchdog = Self {
             driver,
             queue: VecDeque::new(),
-            vigils: BTreeMap::new(),
+            monitors: BTreeMap::new(),
             stops: Stops::default(),
             power: Power::On,
             silent: None,
@@ -90,7 +90,7 @@ impl Watchdog {
         let trains: Vec<TrainId> = watchdog.driver.trains().collect();
         for train in trains {
             if watchdog.driver.locate(train, now).is_some() {
-                watchdog.vigils.entry(train).or_default().place();
+                watchdog.monitors.entry(train).or_default().place();
                 watchdog.note_place(now, train);
             }
         }
@@ -141,7 +141,7 @@ impl Watchdog {
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         self.trust_again(train);
         self.driver.place(now, train, at, uncertainty);
-        self.vigils.entry(train).or_default().place();
+        self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
         if self.dangers.is_empty() {
             // A hand was at the track: nothing that waited sets off by itself.
@@ -264,7 +264,7 @@ impl Watchdog {
     }
 
     /// An order of the watchdog's own.
-    pub(super) fn tell(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
+    pub(super) fn issue(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
         let id = self.driver.order(now, order).ok()?;
         if let Some(train) = order.train() {
             self.own.insert(id, train);
@@ -285,7 +285,7 @@ impl Watchdog {
         self.held.remove(&train);
         self.standing.remove(&train);
         self.stops.forget(train);
-        self.vigils.remove(&train);
+        self.monitors.remove(&train);
         self.seen.remove(&train);
     }
 
@@ -331,7 +331,7 @@ impl Watchdog {
         match &notice {
             DriveNotice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
             DriveNotice::Lost { train } => {
-                self.vigils.entry(*train).or_default().lose();
+                self.monitors.entry(*train).or_default().lose();
                 let train = *train;
                 self.say(WatchdogNotice::Drive(notice));
                 if self.dangers.get(&train).is_some_and(Recovery::is_active) {
@@ -401,7 +401,7 @@ impl Watchdog {
     }
 
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::estimation::PassedContact) {
-        let alarm = self.vigils.entry(train).or_default().pass(passed);
+        let alarm = self.monitors.entry(train).or_default().pass(passed);
         self.note_place(now, train);
         if self.is_watching && self.stops.should_stand(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
@@ -455,7 +455,7 @@ impl Machine for Watchdog {
             if step == SpeedStep::STAND {
                 let stands = self.stands_by(train, event.time);
                 self.stops.left(train, stands);
-                self.vigils.entry(train).or_default().stand();
+                self.monitors.entry(train).or_default().stand();
             } else {
                 self.stops.forget(train);
             }

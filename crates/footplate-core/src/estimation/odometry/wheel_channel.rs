@@ -2,8 +2,8 @@
 
 use super::command_watch::Allowed;
 use crate::wheels::{
-    CountWindows, Expected, Heading, Period, Quality, Range, Tachometer, ToldWay, Vehicle, WheelReading,
-    WheelTracker, Wheelset,
+    CountWindows, Expected, Heading, Period, Quality, Range, ReportedDirection, Tachometer, Vehicle,
+    WheelReading, WheelTracker, Wheelset,
 };
 
 /// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
@@ -44,7 +44,7 @@ pub(super) struct WheelChannel {
     pub(super) doubt: f64,
     doubt_before: f64,
     /// Which way its sensor lately said it turned.
-    pub(super) told: ToldWay,
+    pub(super) told: ReportedDirection,
     tachometer: Tachometer,
     windows: CountWindows,
     readings: u32,
@@ -68,7 +68,7 @@ impl WheelChannel {
             same_for: 0.0,
             doubt: 0.0,
             doubt_before: 0.0,
-            told: ToldWay::default(),
+            told: ReportedDirection::default(),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,

@@ -84,8 +84,8 @@ impl Client {
 
     pub(super) fn statement(&self) -> Closing {
         Closing {
-            told_to_stand: self.locomotives.driven(true),
-            not_told: self.locomotives.driven(false),
+            commanded_to_stop: self.locomotives.driven(true),
+            not_commanded: self.locomotives.driven(false),
             solenoids_released: None,
             power_off: matches!(
                 self.farewell,

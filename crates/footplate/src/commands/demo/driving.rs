@@ -15,7 +15,7 @@ use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::stage::Stage;
 use super::targets::{Dice, steps_to_stop_from, target_ahead};
-use crate::commands::drive::Tongue;
+use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
 use crate::witness::{Input, Witnessed};
@@ -147,8 +147,8 @@ impl<'l> Tour<'l> {
                 if let (Some(showing), Some(alarm)) =
                     (&mut stage.showing, Alarm::of_drive(self.layout, &notice))
                 {
-                    let tongue = Tongue { driver: self.driver.machine(), began: Timestamp::ZERO };
-                    showing.alarm(now, &alarm.said(&tongue.line(&notice).unwrap_or_default()));
+                    let formatter = NoticeFormatter { driver: self.driver.machine(), began: Timestamp::ZERO };
+                    showing.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
                 }
                 match notice {
                     DriveNotice::Done(done) if done.order == order => finished = Some(done),

@@ -105,7 +105,7 @@ impl<'o> Screen<'o> {
         self.say(&format!("  {}", learnt.sentence()))
     }
 
-    /// A train stands where it was told to stop.
+    /// A train stands where it was commanded to stop.
     pub(super) fn stopped(&mut self, stop: &MadeStop) -> io::Result<()> {
         self.record(&json!({ "stop": stop.value() }))?;
         self.say(&format!("  {}", stop.sentence()))

@@ -136,7 +136,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         Ok(())
     }
 
-    /// A train stands where it was told to stop.
+    /// A train stands where it was commanded to stop.
     pub(super) fn stopped(&mut self, stop: MadeStop) -> io::Result<()> {
         self.tell(&stop.sentence());
         self.screen.stopped(&stop)?;

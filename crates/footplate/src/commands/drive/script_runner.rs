@@ -16,12 +16,12 @@ use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
 use self::waiting::{LOOK_AGAIN, Wait, runs_on};
+use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::{Step, step};
 use super::spoken::Spoken;
-use super::told::Tongue;
 use crate::dashboard::{Painter, TrainTask};
 use crate::witness::{Input, Listener};
 
@@ -171,7 +171,7 @@ impl ScriptRunner {
     }
 
     fn say(&mut self, line: String) {
-        let status = self.tongue().status(self.looked);
+        let status = self.formatter().status(self.looked);
         self.outputs.push_back(Output::Notice(Spoken::Line { text: line, status }));
     }
 
@@ -179,8 +179,8 @@ impl ScriptRunner {
         time - self.began.unwrap_or(time)
     }
 
-    fn tongue(&self) -> Tongue<'_> {
-        Tongue { driver: self.driver(), began: self.began.unwrap_or_default() }
+    fn formatter(&self) -> NoticeFormatter<'_> {
+        NoticeFormatter { driver: self.driver(), began: self.began.unwrap_or_default() }
     }
 
     /// Does what can be done now.
@@ -250,12 +250,12 @@ impl ScriptRunner {
             Instruction::Halt => self.halt(now),
             Instruction::PowerOn => self.dispatcher.switch_power(now, true),
             Instruction::Where(Some(train)) => {
-                let line = self.tongue().whereabouts(train, now);
+                let line = self.formatter().whereabouts(train, now);
                 self.say(line);
             }
             Instruction::Where(None) => {
                 for train in self.trains.keys().copied().collect::<Vec<_>>() {
-                    let line = self.tongue().whereabouts(train, now);
+                    let line = self.formatter().whereabouts(train, now);
                     self.say(line);
                 }
             }
@@ -346,7 +346,7 @@ impl ScriptRunner {
             let at = WayPoint { node: at.node, way: at.offset };
             self.dispatcher.place(now, train, at, SEEN_BY_HAND);
             self.learning.interrupt(train);
-            let line = self.tongue().whereabouts(train, now);
+            let line = self.formatter().whereabouts(train, now);
             self.say(line);
         } else {
             self.refuse(now, step, &Refusal::StillMoves { train });

@@ -41,7 +41,7 @@ pub(super) struct Stage {
     lines: Option<Receiver<String>>,
     screen: Screen,
     watched: Option<Watched>,
-    /// What was heard of the line since the script runner was told last.
+    /// What was heard of the line since the script runner was commanded last.
     news: Vec<LinkNews>,
     /// What whoever knows the truth should look at before anything moves on.
     pub(super) for_referee: Vec<Spoken>,

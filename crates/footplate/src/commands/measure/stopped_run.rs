@@ -9,14 +9,14 @@ use footplate_store::{RecordingKey, Run, Store, StoredRecording, StoredRun};
 
 use crate::clock::now;
 
-/// A person who reads a tape does so at least this long after the train was told to stop; a reading without a watch
+/// A person who reads a tape does so at least this long after the train was commanded to stop; a reading without a watch
 /// is dated so late that nobody takes its date for the time of the stop.
 const TAPE_LATER: TimeSpan = TimeSpan::from_ms(60_000);
 /// The layout is surveyed to the centimetre: a train may stand this far beyond the next contact by the survey before it
 /// has closed it.
 const SURVEY: Length = Length::from_m(0.03);
 
-/// A run at whose end a train was told to stop.
+/// A run at whose end a train was commanded to stop.
 pub(super) struct StoppedRun {
     pub(super) recording: StoredRecording,
     pub(super) run: StoredRun,
@@ -26,7 +26,7 @@ pub(super) struct StoppedRun {
 }
 
 impl StoppedRun {
-    /// The last run in which the train was told anything, of one recording or of all.
+    /// The last run in which the train was commanded anything, of one recording or of all.
     pub(super) fn find(store: &Store, train: TrainId, of: Option<RecordingKey>) -> anyhow::Result<Self> {
         let at = now();
         let recordings = store.recordings(at)?;
@@ -110,7 +110,7 @@ impl StoppedRun {
     }
 }
 
-/// When a run's train was told to stop last and from which step; an error if it has been told to go on since.
+/// When a run's train was commanded to stop last and from which step; an error if it has been commanded to go on since.
 fn last_told(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, SpeedStep)>> {
     let starts = run.trains.iter().find(|at_start| at_start.train == train);
     let mut step = starts.map_or(SpeedStep::STAND, |at_start| at_start.step);

@@ -7,10 +7,10 @@ use alloc::vec::Vec;
 use crate::calibration::motion::MotionModel;
 use crate::control::drive::command_time::{CommandTime, spread};
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
-use crate::control::drive::felt_way::{counted_from, lap};
 use crate::control::drive::notice::{DriveNotice, PlannedArrival};
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
+use crate::control::drive::path_length::{counted_from, lap};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
@@ -40,7 +40,7 @@ pub(in crate::control::drive) struct Arriving {
     plan: Option<ArrivalPlan>,
     /// What the times of the plan count from.
     since: Timestamp,
-    /// For a train that stands: the step to start with, which it is told when the times begin to count.
+    /// For a train that stands: the step to start with, which it is commanded when the times begin to count.
     start: Option<SpeedStep>,
 }
 
@@ -95,7 +95,7 @@ impl DrivenTrain {
     ) -> Result<(), Refusal> {
         context.layout.locate(target, context.turnouts).map_err(Refusal::Place)?;
         let stands = self.stands(context, now);
-        if !stands && self.told == SpeedStep::STAND {
+        if !stands && self.commanded == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
         let located = self.located(context, now).filter(|_| self.unseen().is_none() || !stands);
@@ -285,7 +285,7 @@ impl DrivenTrain {
         let mut rollout = self.locator.rollout()?;
         let after = self.model.settles_within(SpeedStep::STAND, step).as_s();
         let zero = rollout.seconds(now);
-        rollout.tell(&self.model, zero + (LINE_TIME + POLL_WAIT).as_s(), step);
+        rollout.command(&self.model, zero + (LINE_TIME + POLL_WAIT).as_s(), step);
         let [place, speed] = rollout.place_and_speed(&self.model, zero + after);
         Some(Beginning { after, left: at.way.as_m() - place, speed })
     }
@@ -312,7 +312,7 @@ impl DrivenTrain {
             if arriving.plan.is_none() {
                 self.leave_to_stop(task, destination);
             }
-            self.tell_step(context, now, step, out);
+            self.issue_step(context, now, step, out);
             return false;
         }
         if now < begins {
@@ -324,7 +324,7 @@ impl DrivenTrain {
         }
         self.leave_to_stop(task, destination);
         match self.step_in_time(context, now, &destination) {
-            Some(step) => self.tell_step(context, now, step, out),
+            Some(step) => self.issue_step(context, now, step, out),
             None => self.plan(context, now, out),
         }
         false

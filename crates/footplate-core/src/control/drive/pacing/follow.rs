@@ -5,7 +5,7 @@
 //! that one does to make up for its own errors: it follows the first train of all, by the sum of the gaps, so that errors do
 //! not grow from train to train.
 //!
-//! Whatever the gap, the follower can come to rest before the rear of its leader, should that be told to stand now, but for
+//! Whatever the gap, the follower can come to rest before the rear of its leader, should that be commanded to stop now, but for
 //! one time in about a thousand. It slows down step by step before that needs a stop. Of a leader that is in doubt only the
 //! contact counts at which it was seen last.
 
@@ -15,10 +15,10 @@ use crate::calibration::motion::INTERRUPTED;
 use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::driver::Driver;
-use crate::control::drive::felt_way::way_between;
 use crate::control::drive::notice::DriveNotice;
 use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
+use crate::control::drive::path_length::way_between;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
 use crate::estimation::{TrackContext, WayPoint};
@@ -75,7 +75,7 @@ const SPEEDS_JUDGED: u8 = 4;
 pub(in crate::control::drive) struct Following {
     leader: TrainId,
     gap: Gap,
-    /// It has been told to stand because it would come too near.
+    /// It has been commanded to stop because it would come too near.
     is_held: bool,
     /// What it shall not pass, as of the last look, ...
     rear: Option<WayPoint>,
@@ -135,7 +135,7 @@ impl DrivenTrain {
         }
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         let following =
-            Following { leader, gap, is_held: self.told == SpeedStep::STAND, rear: None, fastest: None };
+            Following { leader, gap, is_held: self.commanded == SpeedStep::STAND, rear: None, fastest: None };
         self.pacing = Some(Pacing::new(Pace::Follow(following), self.usable_steps(), now));
         Ok(())
     }
@@ -162,14 +162,14 @@ impl DrivenTrain {
         true
     }
 
-    /// The shortest gap at which it could still stop behind a leader that is told to stand, whatever usual speed they run at.
+    /// The shortest gap at which it could still stop behind a leader that is commanded to stop, whatever usual speed they run at.
     fn shortest_gap(&self, leader: &Self, gap: Gap, others: &Others) -> Gap {
         // Who follows runs faster for a while to catch up: the first of all says how fast all of them usually are.
         let mut first = leader;
         while let Some(next) = first.followed().and_then(|following| others.get(&following.leader)) {
             first = next;
         }
-        let fastest = first.model.steady_speed(first.told, Approach::Below).max(USUAL_SPEED);
+        let fastest = first.model.steady_speed(first.commanded, Approach::Below).max(USUAL_SPEED);
         let speeds = (0..=SPEEDS_JUDGED).map(|nth| {
             SLOWEST_JUDGED + (fastest - SLOWEST_JUDGED) * (f64::from(nth) / f64::from(SPEEDS_JUDGED))
         });
@@ -244,7 +244,7 @@ impl DrivenTrain {
         Some(Reference::of(|ahead| line.place(ahead - late) - behind, speeds))
     }
 
-    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is told to stand at a time
+    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is commanded to stop at a time
     /// from now on, on the follower's way. `None` if no way leads there.
     fn rear_of(
         &self,
@@ -276,16 +276,16 @@ impl DrivenTrain {
     /// Of one that creeps only the contact is sure that it came by last: it stalls any time, and the next is late long after.
     fn is_in_doubt(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let Some(located) = self.located(context, now) else { return true };
-        let speed = self.model.steady_speed(self.told, Approach::Below);
+        let speed = self.model.steady_speed(self.commanded, Approach::Below);
         if self.unseen().is_none() {
-            return self.told > SpeedStep::STAND && speed < CREEPS;
+            return self.commanded > SpeedStep::STAND && speed < CREEPS;
         }
         let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
         let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * RAN_ON);
         !(has_run && speed >= LIVELY && self.missed_just_one(now))
     }
 
-    /// The fastest step that it could be told now and still stop before the rear of its leader in a while, if neither is told
+    /// The fastest step that it could be commanded now and still stop before the rear of its leader in a while, if neither is told
     /// anything else until then; `None` if it is time to stand.
     fn fastest_behind(&self, context: TrackContext<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
         let later = now + FORESEEN;
@@ -321,14 +321,14 @@ impl DrivenTrain {
         let soon = now + LINE_TIME + TimeSpan::from_s(LOOK_AGAIN);
         let stop_by = rear.and_then(|rear| self.last_stop_before(context, now, rear));
         let is_free = rear.is_some_and(|rear| {
-            if self.told > SpeedStep::STAND {
+            if self.commanded > SpeedStep::STAND {
                 return fastest.is_some() && stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
             }
             let rest = self.locator.rest_if_stopped(context, &self.model, now);
             let beyond = rest.and_then(|rest| self.beyond(context, rest.at, rear));
-            ahead.told > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
+            ahead.commanded > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
         });
-        let told = self.told;
+        let commanded = self.commanded;
         let Some(Pacing { pace: Pace::Follow(following), look, budget, .. }) = &mut self.pacing else {
             return true;
         };
@@ -336,23 +336,23 @@ impl DrivenTrain {
         (following.rear, following.fastest) = (rear, fastest);
         if is_free {
             following.is_held = false;
-            let slower = fastest.filter(|step| *step < told);
+            let slower = fastest.filter(|step| *step < commanded);
             if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
-                self.tell_step(context, now, step, out);
+                self.issue_step(context, now, step, out);
             }
             return slower.is_none();
         }
-        if told > SpeedStep::STAND {
+        if commanded > SpeedStep::STAND {
             if !following.is_held {
                 following.is_held = true;
                 out.say(DriveNotice::HeldBack { order: task.order, train: self.id(), leader });
             }
-            self.tell_stand(now, out);
+            self.issue_stop(now, out);
         }
         false
     }
 
-    /// Whether a step may be told now: whether a stop that is told as soon as the line is free again would still end before
+    /// Whether a step may be commanded now: whether a stop that is told as soon as the line is free again would still end before
     /// the leader. Who gets slower always may.
     pub(super) fn could_still_stop(
         &self,
@@ -360,7 +360,7 @@ impl DrivenTrain {
         now: Timestamp,
         step: SpeedStep,
     ) -> bool {
-        let Some(following) = self.followed().filter(|_| step > self.told) else { return true };
+        let Some(following) = self.followed().filter(|_| step > self.commanded) else { return true };
         let Some(rear) = following.rear else { return false };
         let start = now + LINE_TIME + POLL_WAIT;
         let rest = self.locator.rest_after_move(context, &self.model, start, step, start + UNDONE);

@@ -67,16 +67,19 @@ impl DrivenTrain {
             .iter()
             .copied()
             .min_by(|one, other| off(one).as_m_per_s().total_cmp(&off(other).as_m_per_s()));
-        let step = nearest.unwrap_or(self.told);
-        let settles =
-            if step == self.told { TimeSpan::ZERO } else { self.model.settles_within(self.told, step) };
+        let step = nearest.unwrap_or(self.commanded);
+        let settles = if step == self.commanded {
+            TimeSpan::ZERO
+        } else {
+            self.model.settles_within(self.commanded, step)
+        };
         let holding = Holding { speed, settled: now + settles, line: None };
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
         // Where zones are, it may have to slow down at any time, and what keeps it to them knows it as it was calibrated.
         self.locator.repeat(context.layout.zones().is_empty());
-        if step != self.told {
-            self.tell_step(context, now, step, out);
+        if step != self.commanded {
+            self.issue_step(context, now, step, out);
         }
         Ok(())
     }
@@ -127,7 +130,7 @@ impl DrivenTrain {
 
     /// It is told a step again at which it can hold its speed: another line begins once it is settled.
     pub(in crate::control::drive) fn resume_line(&mut self, now: Timestamp, step: SpeedStep) {
-        let settles = self.model.settles_within(self.told, step);
+        let settles = self.model.settles_within(self.commanded, step);
         if let Some(Pacing { pace: Pace::Hold(holding), .. }) = &mut self.pacing {
             holding.settled = now + settles;
         }

@@ -45,11 +45,11 @@ impl DrivenTrain {
             return;
         }
         if let Some(step) = self.step_in_time(context, now, &destination) {
-            self.tell_step(context, now, step, out);
+            self.issue_step(context, now, step, out);
         }
     }
 
-    /// The step that it should be told now, if another is better than the one it has been told.
+    /// The step that it should be commanded now, if another is better than the one it has been told.
     pub(super) fn step_in_time(
         &self,
         context: TrackContext<'_>,
@@ -61,16 +61,16 @@ impl DrivenTrain {
         if !is_free {
             return None;
         }
-        let told = self.told.get();
-        let about = told.saturating_sub(ABOUT)..=told.saturating_add(ABOUT);
+        let commanded = self.commanded.get();
+        let about = commanded.saturating_sub(ABOUT)..=commanded.saturating_add(ABOUT);
         let steps = self.usable_steps();
-        let others = steps.iter().filter(|step| about.contains(&step.get()) && **step != self.told);
+        let others = steps.iter().filter(|step| about.contains(&step.get()) && **step != self.commanded);
         let stands = self.model.standing_times();
         let cost = |step: SpeedStep| {
             let found = self.rest_from(context, now, &stands, step, destination);
             found.map_or(f64::INFINITY, |(time, rest)| cost_of(by, time, &rest))
         };
-        let as_it_is = cost(self.told);
+        let as_it_is = cost(self.commanded);
         let costs = others.map(|step| (*step, cost(*step)));
         let (step, cost) = costs.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
         (cost + BETTER < as_it_is).then_some(step)
@@ -87,7 +87,7 @@ impl DrivenTrain {
     ) -> Option<(Timestamp, Rest)> {
         let at = destination.at?;
         let start = now + LINE_TIME + POLL_WAIT;
-        let first = if step == self.told { now + LINE_TIME } else { start + FELT };
+        let first = if step == self.commanded { now + LINE_TIME } else { start + FELT };
         let found = command_time(first, |stop| {
             let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
             Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))
@@ -111,7 +111,7 @@ impl DrivenTrain {
     ) -> Option<Timestamp> {
         let mut rollout = self.locator.rollout()?;
         if start < stop {
-            rollout.tell(&self.model, rollout.seconds(start), step);
+            rollout.command(&self.model, rollout.seconds(start), step);
         }
         let [_, speed] = rollout.place_and_speed(&self.model, rollout.seconds(stop));
         Some(rest.time + TimeSpan::from_s(stands.later(speed)))

@@ -104,10 +104,10 @@ impl<'a> StepSearch<'a> {
         let Sequence { budget, first, commands, .. } = sequence;
         let time = self.now + GRID * at as f64;
         let leaves = time + self.leaves_after;
-        let told = rollout.step();
+        let commanded = rollout.step();
         let steps = self.steps;
         let may = commands < MOST_COMMANDS && budget.free() <= time + SAME_TIME;
-        let others = steps.iter().flatten().filter(|step| may && step.get() != told);
+        let others = steps.iter().flatten().filter(|step| may && step.get() != commanded);
         for command in core::iter::once(None).chain(others.map(Some)) {
             let mut next = *rollout;
             let mut paid = 0.0;
@@ -115,7 +115,7 @@ impl<'a> StepSearch<'a> {
             if let Some(step) = command {
                 let doubt = next.doubt_of_interruption(self.model, leaves);
                 paid = COMMAND_COST + END_WEIGHT * doubt * doubt;
-                next.tell(self.model, leaves, *step);
+                next.command(self.model, leaves, *step);
                 left.take(time);
             }
             let place = self.way.of_felt(next.place(self.model, time + GRID));

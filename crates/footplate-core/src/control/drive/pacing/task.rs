@@ -181,7 +181,7 @@ impl DrivenTrain {
             Some((0, step)) => {
                 pacing.look = Some(now + SPACING);
                 if self.could_still_stop(context, now, step) {
-                    self.tell_step(context, now, step, out);
+                    self.issue_step(context, now, step, out);
                 }
             }
             Some((grid, _)) => {

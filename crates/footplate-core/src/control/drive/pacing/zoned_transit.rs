@@ -10,7 +10,7 @@ use crate::units::{Length, Speed};
 
 /// A change of speed takes so long (s): as long as a train needs for some steps.
 const CHANGE: f64 = 2.0;
-/// Parts of the way that are told apart, with changes between them and at both ends: two zones, and what is before, between and
+/// Parts of the way that are distinguished, with changes between them and at both ends: two zones, and what is before, between and
 /// behind them. A way with more is as slow all along as its slowest part.
 const MOST_PARTS: usize = 5;
 const MOST_PIECES: usize = 2 * MOST_PARTS + 1;

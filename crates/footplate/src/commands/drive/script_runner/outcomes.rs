@@ -8,10 +8,10 @@ use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
 use super::ScriptRunner;
+use crate::commands::drive::formatter::{promises_broken, trains, verb};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 use crate::commands::drive::spoken::{Ended, Spoken, Target};
-use crate::commands::drive::told::{promises_broken, trains, verb};
 use crate::dashboard::{Alarm, TrainPassed};
 
 /// A train is said to break its promises once they are wider by this, one standard deviation (chosen: ±30 mm are seen beside a
@@ -60,7 +60,7 @@ impl ScriptRunner {
 
     /// Says what the dispatcher says, and does what follows.
     pub(super) fn dispatched(&mut self, now: Timestamp, notice: &DispatchNotice) {
-        if let Some(mut line) = self.tongue().dispatched(notice) {
+        if let Some(mut line) = self.formatter().dispatched(notice) {
             if let DispatchNotice::Drive(DriveNotice::AtLimit { train }) = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
@@ -86,7 +86,7 @@ impl ScriptRunner {
                 let faced =
                     faced.map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
                 let ended = Ended { error: *error, faced, ..self.ended(now, &step) };
-                let achieved = achieved.map(|achieved| self.tongue().place(achieved.at));
+                let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
                 let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
                 let ended = Ended { achieved, ..ended };
                 self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
@@ -177,11 +177,11 @@ impl ScriptRunner {
 
     /// With the place where a train came to rest, and what had been promised of that.
     fn at_rest(&self, rest: &Finished, ended: Ended) -> Ended {
-        let name = |achieved: Achieved| self.tongue().place(achieved.at);
+        let name = |achieved: Achieved| self.formatter().place(achieved.at);
         Ended {
             achieved: rest.achieved.map(name),
             promise: rest.promise,
-            unseen: rest.unseen.map(|sensor| self.tongue().sensor(sensor).to_owned()),
+            unseen: rest.unseen.map(|sensor| self.formatter().sensor(sensor).to_owned()),
             ..ended
         }
     }

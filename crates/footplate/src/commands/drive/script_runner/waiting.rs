@@ -77,7 +77,7 @@ impl ScriptRunner {
     /// Whether a train cannot be driven now and may be soon; not for ever, so that in the end it is refused and said why.
     fn is_kept_waiting(&mut self, now: Timestamp, train: TrainId) -> bool {
         let comes_to_rest =
-            self.driver().told(train) == SpeedStep::STAND && !self.driver().stands(train, now);
+            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().stands(train, now);
         if !comes_to_rest && !self.dispatcher.is_interrupted(now, train) {
             self.interrupted = None;
             return false;
@@ -136,7 +136,7 @@ impl ScriptRunner {
             self.wait = None;
         } else if let Until::AtRest(train) = wait.until
             && self.is_idle(train)
-            && self.driver().told(train) > SpeedStep::STAND
+            && self.driver().commanded(train) > SpeedStep::STAND
         {
             self.wait = None;
             self.fell_short = true;

@@ -15,7 +15,7 @@ use super::trial::{Counts, Plan, Results, TRAIN};
 
 /// After a command a train runs steadily from here on, in s (chosen: the slowest trains need five).
 const SETTLES_S: f64 = 6.0;
-/// A train that was told to stop stands, in s.
+/// A train that was commanded to stop stands, in s.
 const STANDS_S: f64 = 7.0;
 /// A speed is the way over the time between so many contacts (a lap and a little).
 const HOPS_TIMED: usize = 14;

@@ -14,7 +14,7 @@ pub(in crate::commands::simulate) const TRAIN: TrainId = TrainId(24);
 const HIGHEST: u8 = 14;
 /// An order that is not carried out by then has failed.
 const ORDER_PATIENCE_S: f64 = 60.0;
-/// A train that was told to stop stands after this, in s.
+/// A train that was commanded to stop stands after this, in s.
 const STANDS_WITHIN_S: f64 = 8.0;
 /// How often the position is compared with the truth.
 const LOOK: TimeSpan = TimeSpan::from_ms(200);

@@ -1,4 +1,4 @@
-//! Trains told to stand at a place in time, beside trains that run there at the step with the mean speed.
+//! Trains commanded to stop at a place in time, beside trains that run there at the step with the mean speed.
 
 use anyhow::Context;
 use footplate_core::control::{DriveNotice, Order, OrderId, Refusal, StopOrder};
@@ -26,7 +26,7 @@ const RUNS_FOR: f64 = 5.0;
 const OFFERED: f64 = 1.02;
 /// An order that is not carried out so long (s) after its time has failed.
 const PATIENCE: f64 = 30.0;
-/// A train that has been told to stop stands after so long (s), whatever is believed.
+/// A train that has been commanded to stop stands after so long (s), whatever is believed.
 const STANDS_WITHIN: f64 = 4.0;
 
 /// Who drove.

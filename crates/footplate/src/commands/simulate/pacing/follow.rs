@@ -215,7 +215,7 @@ impl<'a, 'l> Row<'a, 'l> {
     fn begin(&mut self, place: usize) {
         let [leader, train] = [self.trains[place - 1], self.trains[place]];
         if self.by == By::Steps {
-            let step = self.counted.driver.told(leader);
+            let step = self.counted.driver.commanded(leader);
             let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, step));
             let step = self.nearest(train, leads_at);
             let _ = self.counted.driver.order(self.now(), Order::Speed { train, step });
@@ -288,7 +288,7 @@ impl<'a, 'l> Row<'a, 'l> {
         let Some(leader) = place.checked_sub(1).map(|ahead| self.trains[ahead]) else { return };
         let Some(led) = self.reported.get(&(leader, sensor)) else { return };
         let late = (at - *led).as_s() - self.gap;
-        let told = self.counted.driver.told(leader);
+        let told = self.counted.driver.commanded(leader);
         let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, told));
         let like = self.nearest(train, leads_at).get();
         let step = match late {

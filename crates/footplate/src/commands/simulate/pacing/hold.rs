@@ -1,4 +1,4 @@
-//! Trains told to run at a speed that none of their steps has, beside the step that comes nearest to it.
+//! Trains commanded to run at a speed that none of their steps has, beside the step that comes nearest to it.
 
 use anyhow::Context;
 use footplate_core::calibration::SectionIndex;
@@ -58,9 +58,9 @@ pub(super) struct Held {
     /// What was asked for (mm/s).
     pub(super) speed: f64,
     /// What it did, ...
-    pub(super) course: Course,
+    pub(super) course: HoldRecord,
     /// ... and what the driver believed at the same time that it did.
-    pub(super) believed: Course,
+    pub(super) believed: HoldRecord,
     pub(super) seconds: f64,
     pub(super) commands: usize,
     /// What went wrong.
@@ -69,7 +69,7 @@ pub(super) struct Held {
 
 /// A course beside the ideal.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Course {
+pub(super) struct HoldRecord {
     /// When the train was looked at (s since it began), and how far ahead of the ideal it was (mm).
     pub(super) ahead: Vec<[f64; 2]>,
     /// When a window began (s), and by how much the mean speed in it was off (%).
@@ -143,8 +143,8 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
         by,
         train,
         speed: asked,
-        course: Course::default(),
-        believed: Course::default(),
+        course: HoldRecord::default(),
+        believed: HoldRecord::default(),
         seconds: 0.0,
         commands: 0,
         trouble: None,
@@ -209,16 +209,16 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
     held.seconds = (stage.line.now() - ideal.time).as_s();
     held.commands = counted.steps(train) - commands;
     let way = TrueWay::since(layout, &stage.turnouts, stage.world().truth(), train, began);
-    held.course = Course::of_way(&way, &odometer, ideal, asked);
+    held.course = HoldRecord::of_way(&way, &odometer, ideal, asked);
     let believed = believed.into_iter().map(|(at, ahead)| {
         let since = (at - ideal.time).as_s();
         (since, asked * since + ahead)
     });
-    held.believed = Course::beside(&believed.collect::<Vec<_>>(), asked);
+    held.believed = HoldRecord::beside(&believed.collect::<Vec<_>>(), asked);
     held
 }
 
-impl Course {
+impl HoldRecord {
     /// What the train did beside what it should have done.
     fn of_way(way: &TrueWay, odometer: &Odometer, ideal: Ideal, speed: f64) -> Self {
         // A contact closes up to a poll before it is reported.

@@ -9,7 +9,7 @@ use super::Scored;
 use super::arrive::{self, Arrived};
 use super::figures::{quantile, root_mean_square, shown, within_pct};
 use super::follow::{self, Followed, Kept};
-use super::hold::{By, Course, Held};
+use super::hold::{By, Held, HoldRecord};
 use crate::commands::simulate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -63,7 +63,7 @@ const PLACE_WITHIN: f64 = 15.0;
 /// What is asked of an arrival: so many seconds and millimetres.
 const ARRIVES_WITHIN: [f64; 2] = [0.3, 25.0];
 
-/// Parts of a run that are told apart: on the first round lengths are as good as their survey, or as a calibration elsewhere
+/// Parts of a run that are distinguished: on the first round lengths are as good as their survey, or as a calibration elsewhere
 /// left them.
 const MINUTES: [(&str, Range<f64>); 2] = [("first", 0.0..60.0), ("second", 60.0..f64::INFINITY)];
 
@@ -303,7 +303,7 @@ impl Page<'_> {
 struct HeldRow {
     name: &'static str,
     by: By,
-    course: fn(&Held) -> &Course,
+    course: fn(&Held) -> &HoldRecord,
 }
 
 /// All rows, for each part of a run.
@@ -329,7 +329,11 @@ struct Figures {
 }
 
 impl Figures {
-    fn of<'h>(runs: impl Iterator<Item = &'h Held>, course: fn(&Held) -> &Course, span: Range<f64>) -> Self {
+    fn of<'h>(
+        runs: impl Iterator<Item = &'h Held>,
+        course: fn(&Held) -> &HoldRecord,
+        span: Range<f64>,
+    ) -> Self {
         let runs: Vec<&Held> = runs.collect();
         let within = |looks: &[[f64; 2]]| {
             let looks = looks.iter().filter(|[since, _]| span.contains(since));

@@ -14,14 +14,14 @@ const TOUCHING: f64 = 1e-6;
 
 /// A part of the way on which the speed is restricted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RestrictedWay<'g> {
+pub(super) struct RestrictedStretch<'g> {
     pub(super) zone: &'g Zone,
     /// Where it begins and where it ends (m past the node from which the train is counted, negative behind it).
     pub(super) from: f64,
     pub(super) to: f64,
 }
 
-impl<'g> RestrictedWay<'g> {
+impl<'g> RestrictedStretch<'g> {
     /// What is restricted behind a node and ahead of it, so far each (m), as the turnouts lie; the ways behind first. Where
     /// nobody knows how a turnout ahead lies, what is restricted on either leg.
     pub(super) fn about(
@@ -60,7 +60,7 @@ impl<'g> RestrictedWay<'g> {
 
 /// Adds the restricted edges of a hop that begins so far ahead (m); returns how long the train feels the hop.
 fn add<'g>(
-    found: &mut Vec<RestrictedWay<'g>>,
+    found: &mut Vec<RestrictedStretch<'g>>,
     context: TrackContext<'g>,
     model: &MotionModel,
     hop: &Hop<'g>,
@@ -77,7 +77,7 @@ fn add<'g>(
         let Some(zone) = context.layout.zone(*id) else { continue };
         match found.last_mut() {
             Some(last) if last.zone == zone && (from - last.to).abs() <= TOUCHING => last.to = to,
-            _ => found.push(RestrictedWay { zone, from, to }),
+            _ => found.push(RestrictedStretch { zone, from, to }),
         }
     }
     felt

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use super::model::MotionModel;
 use super::parameters::Answers;
 use super::priors::{LATE_START, TRIP_DEVIATION};
-use super::segment::{Pace, Segment, Told};
+use super::segment::{Pace, Segment, SpeedCommand};
 use super::short_moves::move_way;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
@@ -28,7 +28,7 @@ const SHAPE: f64 = 0.01;
 
 /// Sums of the model's numbers that an experiment would see, each with noise of its own.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prospect {
+pub struct ExpectedInformation {
     pub(super) seen: Vec<Seen>,
 }
 
@@ -48,11 +48,11 @@ pub(super) fn stop_way(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
 }
 
 fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
-    Segment::of(&Told { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
+    Segment::of(&SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
 }
 
 pub(super) fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
-    Segment::of(&Told { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
+    Segment::of(&SpeedCommand { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
 }
 
 /// The time (s) at which something that only grows reaches a value, by halving.
@@ -77,14 +77,14 @@ impl MotionModel {
 
     /// A hop at a steady step.
     #[must_use]
-    pub fn prospect_of_speed(&self, step: SpeedStep, approach: Approach) -> Prospect {
+    pub fn prospect_of_speed(&self, step: SpeedStep, approach: Approach) -> ExpectedInformation {
         let (place, above) = (usize::from(step.get()), approach == Approach::Above);
         let speed = self.answers().speed(place, above).max(0.01);
         let takes = HOP / speed;
         let slopes = self.slopes(|answers| takes * answers.speed(place, above));
         let variance =
             sum_of_squares(&[speed * TIMING * core::f64::consts::SQRT_2, PLACE, TRIP_DEVIATION * HOP]);
-        Prospect { seen: vec![Seen { slopes, variance }] }
+        ExpectedInformation { seen: vec![Seen { slopes, variance }] }
     }
 
     /// A stop from a steady step and a crawl to the next contact. With `past`, the train is to pass a contact so far
@@ -96,13 +96,13 @@ impl MotionModel {
         approach: Approach,
         crawl: SpeedStep,
         past: Option<Length>,
-    ) -> Prospect {
+    ) -> ExpectedInformation {
         let (step, above) = (step.get(), approach == Approach::Above);
         let answers = self.answers();
         let speed = answers.speed(usize::from(step), above);
         let scatter = self.scatter(speed);
         let whole = stop_way(&answers, step, above);
-        // Where it was when it was told to stop.
+        // Where it was when it was commanded to stop.
         let begin = sum_of_squares(&[speed * TIMING, PLACE]);
         let mut seen = Vec::new();
         if let Some(past) = past {
@@ -125,12 +125,12 @@ impl MotionModel {
         let variance =
             begin + sum_of_squares(&[scatter, late, crawl_speed * TIMING, TRIP_DEVIATION * rest, PLACE]);
         seen.push(Seen { slopes, variance });
-        Prospect { seen }
+        ExpectedInformation { seen }
     }
 
     /// A short move from a place of rest that was reached at a crawl, and another crawl to the next contact.
     #[must_use]
-    pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, crawl: SpeedStep) -> Prospect {
+    pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, crawl: SpeedStep) -> ExpectedInformation {
         let (time, crawl_speed) = self.crawl(crawl, CRAWL);
         let slopes = self.slopes(|answers| {
             stop_way(answers, crawl.get(), false)
@@ -142,7 +142,7 @@ impl MotionModel {
         let late =
             sum_of_squares(&[crawl_speed * LATE_START, reached * LATE_START, crawl_speed * TIMING, PLACE]);
         let scatter = self.scatter(reached);
-        Prospect { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
+        ExpectedInformation { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
     }
 
     /// The time (s) of a crawl over a way (m) from rest, and the speed (m/s) then.

@@ -25,8 +25,8 @@ const MOST_MISSES: usize = 4;
 
 /// What is remembered of a train from contact to contact.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Vigil {
-    /// It was told to run since it stood, and has come to no contact yet: from rest, trains are late that are as they were.
+pub(super) struct ConsistencyMonitor {
+    /// It was commanded to run since it stood, and has come to no contact yet: from rest, trains are late that are as they were.
     starts: bool,
     drift: DriftTest,
     wild: u8,
@@ -35,13 +35,13 @@ pub(super) struct Vigil {
     is_located: bool,
 }
 
-impl Vigil {
+impl ConsistencyMonitor {
     /// Somebody knows where it is.
     pub(super) fn place(&mut self) {
         *self = Self { starts: true, is_located: true, ..Self::default() };
     }
 
-    /// It was told to stand: what comes next is a start.
+    /// It was commanded to stop: what comes next is a start.
     pub(super) const fn stand(&mut self) {
         self.starts = true;
     }

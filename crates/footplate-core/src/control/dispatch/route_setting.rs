@@ -21,16 +21,16 @@ const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 /// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
-/// How a turnout was told to lie.
+/// How a turnout was set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Told {
+pub(super) struct TurnoutCommand {
     leg: Leg,
     /// How many times in a row.
     times: u8,
     last: Timestamp,
 }
 
-impl Told {
+impl TurnoutCommand {
     /// A turnout of which somebody knows how it lies.
     pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
         Self { leg, times: SURE, last: now }
@@ -68,8 +68,10 @@ impl Dispatcher {
         }
         for need in missing {
             // Points that are still moving might be left half way by a second word that fails.
-            let moves = |told: &Told| told.leg == need.leg && now - told.last < MOVES;
-            if self.is_being_thrown(now, need.turnout) || self.told.get(&need.turnout).is_some_and(moves) {
+            let moves =
+                |commanded: &TurnoutCommand| commanded.leg == need.leg && now - commanded.last < MOVES;
+            if self.is_being_thrown(now, need.turnout) || self.commanded.get(&need.turnout).is_some_and(moves)
+            {
                 continue;
             }
             let order = Order::Turnout { turnout: need.turnout, curved: need.leg.is_curved() };
@@ -155,7 +157,9 @@ impl Dispatcher {
     }
 
     fn is_sure(&self, need: TurnoutNeed) -> bool {
-        self.told.get(&need.turnout).is_some_and(|told| told.leg == need.leg && told.times >= SURE)
+        self.commanded
+            .get(&need.turnout)
+            .is_some_and(|commanded| commanded.leg == need.leg && commanded.times >= SURE)
     }
 
     /// A turnout has been told how to lie.
@@ -167,13 +171,17 @@ impl Dispatcher {
             self.stand(now, id);
         }
         let leg = Leg::from_curved(curved);
-        let times = self.told.get(&turnout).filter(|told| told.leg == leg).map_or(0, |told| told.times);
-        self.told.insert(turnout, Told { leg, times: times.saturating_add(1), last: now });
+        let times = self
+            .commanded
+            .get(&turnout)
+            .filter(|commanded| commanded.leg == leg)
+            .map_or(0, |commanded| commanded.times);
+        self.commanded.insert(turnout, TurnoutCommand { leg, times: times.saturating_add(1), last: now });
     }
 
     /// A train has shown how a turnout lies.
     pub(super) fn turnout_shown(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
-        self.told.insert(turnout, Told::sure(now, Leg::from_curved(curved)));
+        self.commanded.insert(turnout, TurnoutCommand::sure(now, Leg::from_curved(curved)));
     }
 
     pub(super) fn set_state(&mut self, id: TrainId, state: State) {

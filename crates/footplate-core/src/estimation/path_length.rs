@@ -11,7 +11,7 @@ use crate::units::Length;
 const BELIEVED_MISSED: usize = 2;
 /// One contact in so many stays silent, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
 const LOG_MISSED: f64 = -3.9;
-/// The same where trains are told apart, as ln: 0.3 % on a layout that is looked after (chosen from what course reports
+/// The same where trains are distinguished, as ln: 0.3 % on a layout that is looked after (chosen from what course reports
 /// complain about). What a single train is followed past may be more, because nothing else is there to explain it.
 pub(super) const LOG_CHANCE_OF_SILENCE: f64 = -5.809;
 /// Hops that a way to a place may take: more than a lap of any layout in use.
@@ -22,14 +22,14 @@ const CONTACT_PLACE_M: f64 = 0.005;
 
 /// A way to a contact, past contacts that stayed silent, as a train feels it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FeltReach {
+pub(super) struct PathReach {
     /// Its length (m).
     pub(super) length: Gaussian,
     /// Contacts on the way that did not report.
     pub(super) missed: usize,
 }
 
-impl FeltReach {
+impl PathReach {
     /// ln of the chance that those contacts stay silent.
     pub(super) fn log_chance(&self) -> f64 {
         LOG_MISSED * self.missed as f64
@@ -37,27 +37,27 @@ impl FeltReach {
 }
 
 /// A hop as a train feels it (m).
-pub(super) fn felt_reach(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
+pub(super) fn hop_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
     let [length, uncertainty] = model.length(context.sections, hop).map(Length::as_m);
     Gaussian { mean: length, variance: uncertainty * uncertainty }
 }
 
-fn felt(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: &Reach) -> FeltReach {
+fn felt(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: &Reach) -> PathReach {
     let hops = reach.hops().iter().filter_map(|hop| layout.hop(*hop));
-    let length = hops.map(|hop| felt_reach(context, model, &hop)).fold(
+    let length = hops.map(|hop| hop_length(context, model, &hop)).fold(
         Gaussian { mean: 0.0, variance: 0.0 },
         |sum, hop| Gaussian { mean: sum.mean + hop.mean, variance: sum.variance + hop.variance },
     );
-    FeltReach { length, missed: reach.missed() }
+    PathReach { length, missed: reach.missed() }
 }
 
 /// Every way from a node to a sensor that is open as far as the turnouts are known.
-pub(super) fn felt_reaches<'g>(
+pub(super) fn path_reaches<'g>(
     context: TrackContext<'g>,
     model: &'g MotionModel,
     from: NodeId,
     sensor: SensorId,
-) -> impl Iterator<Item = FeltReach> + 'g {
+) -> impl Iterator<Item = PathReach> + 'g {
     context
         .layout
         .reaches(from, context.turnouts, BELIEVED_MISSED)
@@ -91,7 +91,7 @@ pub fn way_to(context: TrackContext<'_>, model: &MotionModel, from: NodeId, to: 
 /// of where contacts close, the train to what it feels longer or shorter of curves and slopes. Both count by how well they
 /// know it, and the train mostly knows better.
 pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
-    let felt = felt_reach(context, model, hop);
+    let felt = hop_length(context, model, hop);
     let surveyed = hop.length.as_m();
     let survey =
         context.sections.section(hop.id).map_or(0.0, |section| context.sections.survey_variance(section))
@@ -123,7 +123,7 @@ pub fn way_to_landmark(
     }
     let (mut way, mut left) = (base, to.offset);
     for hop in context.hops_ahead(to.node).take(MOST_HOPS) {
-        let felt = felt_reach(context, model, &hop).mean;
+        let felt = hop_length(context, model, &hop).mean;
         let taped = taped_length(context, model, &hop).mean;
         if left.as_m() <= taped {
             return Some(way + left * if taped > 0.0 { felt / taped } else { 1.0 });
@@ -148,7 +148,7 @@ fn way_to_node(
         if count > 0 && hop.from == from {
             return None;
         }
-        let felt = felt_reach(context, model, &hop).mean;
+        let felt = hop_length(context, model, &hop).mean;
         way += felt;
         if hop.to == to {
             let taped = taped_length(context, model, &hop).mean;
@@ -178,7 +178,7 @@ fn taped(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> [Landm
     let mut from = at.node;
     let mut left = at.way.as_m();
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
-        let felt = felt_reach(context, model, &hop).mean;
+        let felt = hop_length(context, model, &hop).mean;
         if left > felt && hop.sensor.is_some() {
             left -= felt;
             from = hop.to;

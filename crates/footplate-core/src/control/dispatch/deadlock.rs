@@ -11,15 +11,15 @@ use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position};
 
-use super::course::{Room, standing};
 use super::dispatched_train::{DispatchedTrain, Purpose};
 use super::dispatcher::Dispatcher;
-use super::footprint::Footprint;
 use super::granting::{Proposal, Start};
+use super::movement_authority::{ClearanceEnvelope, standing};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
+use super::occupied_path::OccupiedPath;
 use super::parking::{OFF, PARKED};
-use super::trail::Trail;
+use super::reservation::Reservation;
 
 /// How much is tried before a search gives up until something else has changed.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ const THINKS_AGAIN: TimeSpan = TimeSpan::from_s(15.0);
 struct Stander {
     id: TrainId,
     place: Position,
-    held: Footprint,
+    held: Reservation,
 }
 
 /// What it counts in seconds that a train stands on a turnout.
@@ -84,7 +84,7 @@ impl Dispatcher {
         if self.trains.get(&id).is_none_or(|train| now < train.no_room_until) {
             return;
         }
-        if !self.untangle(now, id, targets, wish, USUAL)
+        if !self.resolve_deadlock(now, id, targets, wish, USUAL)
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.no_room_until = now + IN_VAIN;
@@ -92,7 +92,7 @@ impl Dispatcher {
     }
 
     /// Looks for moves after which a train has a free way, and begins with the first; whether there are any.
-    fn untangle(
+    fn resolve_deadlock(
         &mut self,
         now: Timestamp,
         id: TrainId,
@@ -100,7 +100,7 @@ impl Dispatcher {
         wish: &Proposal,
         effort: Effort,
     ) -> bool {
-        let found = self.untangled(now, id, targets, wish, effort).and_then(|moves| {
+        let found = self.resolved_deadlock(now, id, targets, wish, effort).and_then(|moves| {
             let (first, place) = moves.first().copied()?;
             let start = self.start(now, first)?;
             let proposal = self.propose(&start, &self.both_ways(place), &self.obstacles_of_others(first))?;
@@ -136,7 +136,7 @@ impl Dispatcher {
             && let Some(wish) = self.wish(id, &start, &targets)
         {
             self.shuffled += 1;
-            if self.untangle(now, id, &targets, &wish, THOROUGH) {
+            if self.resolve_deadlock(now, id, &targets, &wish, THOROUGH) {
                 return;
             }
             self.thought = Some(now);
@@ -207,7 +207,7 @@ impl Dispatcher {
     }
 
     /// Moves after which a train has a free way.
-    fn untangled(
+    fn resolved_deadlock(
         &self,
         now: Timestamp,
         id: TrainId,
@@ -224,7 +224,7 @@ impl Dispatcher {
         let is_placed = |train: &DispatchedTrain| self.driver.position(train.id, now).is_some();
         let moving = || self.trains.values().filter(|train| !train.rests() || !is_placed(train));
         moving().for_each(|train| fixed.add(&train.held, f64::INFINITY));
-        let is_fixed_free = |taken: &Footprint| moving().all(|train| !train.held.meets(taken));
+        let is_fixed_free = |taken: &Reservation| moving().all(|train| !train.held.meets(taken));
         let mut tried = 0;
         let mut scenes = alloc::vec![Scene { standers: standers.collect(), moves: Vec::new(), seconds: 0.0 }];
         for _ in 0..effort.moves {
@@ -281,7 +281,7 @@ impl Dispatcher {
         fixed: &Obstacles,
         wish: &Proposal,
         effort: Effort,
-    ) -> Vec<(Position, Footprint, f64)> {
+    ) -> Vec<(Position, Reservation, f64)> {
         let Some(mover) = scene.standers.get(nth) else { return Vec::new() };
         let Some(start) = self.hypothetical(now, mover) else { return Vec::new() };
         let mut obstacles = fixed.clone();
@@ -290,16 +290,21 @@ impl Dispatcher {
         let reached = self.search(&start, &obstacles).from(Some(start.place), self.turned(&start));
         let layout = self.driver.layout();
         let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
-        let room = Room::of(train.lengths, PARKED, start.room.overrun);
-        let room = Room { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
+        let room = ClearanceEnvelope::of(train.lengths, PARKED, start.room.overrun);
+        let room = ClearanceEnvelope { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
         // Out of the way first, then off the turnouts, then the soonest.
-        let mut places: Vec<(bool, Position, Footprint, f64)> = Vec::new();
+        let mut places: Vec<(bool, Position, Reservation, f64)> = Vec::new();
         for (place, is_clear) in train.parking.iter().copied() {
             let ways = self.both_ways(place);
             let soonest = ways.iter().filter_map(|place| reached.seconds_to(*place)).reduce(f64::min);
             let Some(seconds) = soonest else { continue };
-            let held =
-                self.reserved(standing(layout, self.driver.turnouts(), place, &Trail::default(), room));
+            let held = self.reserved(standing(
+                layout,
+                self.driver.turnouts(),
+                place,
+                &OccupiedPath::default(),
+                room,
+            ));
             // A little further on may be out of the way already, at the end of a siding; otherwise it would be no move.
             let gets_out = wish.meets(&mover.held) && !wish.meets(&held);
             if gets_out || effort.near || !held.meets(&mover.held) {
@@ -309,7 +314,7 @@ impl Dispatcher {
         }
         places.sort_by(|one, other| one.0.cmp(&other.0).then(one.3.total_cmp(&other.3)));
         // Where it comes to stand it needs the turnout whose leg that is on: its place is counted over that.
-        let can_go = |(_, place, mut held, seconds): (bool, Position, Footprint, f64)| {
+        let can_go = |(_, place, mut held, seconds): (bool, Position, Reservation, f64)| {
             let itinerary = reached.to(&self.both_ways(place)).into_iter().next()?;
             let proposal = self.proposal(&start, itinerary)?;
             let stop = proposal.itinerary.runs.last()?.stop;
@@ -344,14 +349,14 @@ impl Dispatcher {
             return Some(start);
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
-        let room = Room::of(lengths, PARKED, start.room.overrun);
+        let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
         let turned = self.driver.turned_place_at(stander.place);
         Some(Start {
             place: stander.place,
             room,
             frozen: Vec::new(),
             turned,
-            came: Trail::default(),
+            came: OccupiedPath::default(),
             ..start
         })
     }

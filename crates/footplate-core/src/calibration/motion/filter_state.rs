@@ -17,7 +17,7 @@
 
 use super::apart::Apart;
 use super::model::MotionModel;
-pub(crate) use super::segment::Told;
+pub(crate) use super::segment::SpeedCommand;
 use super::segment::{Pace, Segment};
 
 pub(super) const B: usize = 0;
@@ -33,13 +33,13 @@ const STEPS_KEPT: usize = 6;
 pub(crate) const N: usize = STEPS + STEPS_KEPT;
 
 /// Commands that can wait for their effect one by one. A start takes up to half a second to take effect, in which a quick
-/// line carries more: see [`Course::tell`].
+/// line carries more: see [`FilterState::tell`].
 const MOST_PENDING: usize = 6;
 
 /// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Course {
+pub(crate) struct FilterState {
     pub(super) segment: Segment,
     /// What the segment is an answer to.
     pub(super) step: u8,
@@ -56,13 +56,13 @@ pub(crate) struct Course {
     /// The letter of the change under way, and its `Δ` (m/s); none of a start or a stop.
     later: usize,
     slower: f64,
-    pending: [Option<Told>; MOST_PENDING],
+    pending: [Option<SpeedCommand>; MOST_PENDING],
     /// What forecasts keep apart; nothing for a train that is driven.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub(super) apart: Option<Apart>,
 }
 
-impl Course {
+impl FilterState {
     /// At rest at a place.
     pub(super) fn at_rest(time: f64, place: f64) -> Self {
         Self {
@@ -87,27 +87,27 @@ impl Course {
         Self { segment: Segment::steady(time, speed), step, ..Self::at_rest(time, place) }
     }
 
-    /// The step told last, whether it has taken effect or not.
+    /// The step commanded last, whether it has taken effect or not.
     pub(crate) fn step(&self) -> u8 {
-        self.pending.iter().flatten().last().map_or(self.step, |told| told.to)
+        self.pending.iter().flatten().last().map_or(self.step, |commanded| commanded.to)
     }
 
     /// A command leaves the line; all that took effect before has been taken in.
-    pub(crate) fn tell(&mut self, sent: f64, step: u8) {
+    pub(crate) fn command(&mut self, sent: f64, step: u8) {
         let from = self.step();
         if from == step {
             return;
         }
         let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
         if let Some(free) = self.pending.iter_mut().find(|slot| slot.is_none()) {
-            *free = Some(Told { sent, from, to: step, at_rest });
+            *free = Some(SpeedCommand { sent, from, to: step, at_rest });
         } else if let Some(last) = self.pending.last_mut() {
             // The decoder obeys the newest command; the one before it, sent moments ago, has no effect of its own.
-            *last = last.filter(|last| last.from != step).map(|last| Told { sent, to: step, ..last });
+            *last = last.filter(|last| last.from != step).map(|last| SpeedCommand { sent, to: step, ..last });
         }
     }
 
-    /// Whether a train that was told to stop stands by a time.
+    /// Whether a train that was commanded to stop stands by a time.
     pub(crate) fn rests_at(&self, time: f64) -> bool {
         self.step == 0 && time >= self.rest_time()
     }
@@ -117,42 +117,48 @@ impl Course {
     }
 
     /// What takes effect next, and when; `None` if nothing waits.
-    pub(super) fn next_effect(&self, model: &MotionModel) -> Option<(Told, f64)> {
-        let told = self.pending[0]?;
-        Some((told, told.effect(&model.answers()).max(self.segment.begins)))
+    pub(super) fn next_effect(&self, model: &MotionModel) -> Option<(SpeedCommand, f64)> {
+        let commanded = self.pending[0]?;
+        Some((commanded, commanded.effect(&model.answers()).max(self.segment.begins)))
     }
 
     /// Takes all that has taken effect by a time into the state.
     pub(crate) fn settle(&mut self, model: &MotionModel, time: f64) {
-        while let Some((told, begins)) = self.next_effect(model).filter(|(_, begins)| *begins <= time) {
-            let until = if told.at_rest { f64::INFINITY } else { begins };
+        while let Some((commanded, begins)) = self.next_effect(model).filter(|(_, begins)| *begins <= time) {
+            let until = if commanded.at_rest { f64::INFINITY } else { begins };
             let (way, _) = self.way_and_slope(until);
-            self.begin(model, told, begins, way);
+            self.begin(model, commanded, begins, way);
         }
     }
 
     /// The next segment begins, from a place: the way so far becomes its origin. Returns how fast it was there.
-    pub(super) fn begin(&mut self, model: &MotionModel, told: Told, begins: f64, way: f64) -> f64 {
+    pub(super) fn begin(
+        &mut self,
+        model: &MotionModel,
+        commanded: SpeedCommand,
+        begins: f64,
+        way: f64,
+    ) -> f64 {
         self.pending.rotate_left(1);
         self.pending[MOST_PENDING - 1] = None;
-        let pace = if told.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
+        let pace = if commanded.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
         self.x[B] = way;
-        let apart = self.apart.map(|apart| apart.next(self, &told, begins));
-        self.segment = Segment::of(&told, &model.answers(), pace);
+        let apart = self.apart.map(|apart| apart.next(self, &commanded, begins));
+        self.segment = Segment::of(&commanded, &model.answers(), pace);
         self.segment.begins = begins;
-        (self.step, self.is_above) = (told.to, told.above());
+        (self.step, self.is_above) = (commanded.to, commanded.above());
         for letter in [H, Z] {
             self.x[letter] = 0.0;
         }
-        if told.at_rest {
+        if commanded.at_rest {
             self.x[E] = 0.0;
         }
-        self.later = LATER + usize::from(told.above());
-        self.slower = if self.repeats(&told) { pace.speed - self.segment.to } else { 0.0 };
-        if told.to != 0 {
-            let is_met = self.repeats(&told) || apart.is_some();
+        self.later = LATER + usize::from(commanded.above());
+        self.slower = if self.repeats(&commanded) { pace.speed - self.segment.to } else { 0.0 };
+        if commanded.to != 0 {
+            let is_met = self.repeats(&commanded) || apart.is_some();
             let busy = apart.map_or([0; 2], |apart| apart.letters());
-            self.speed = is_met.then(|| self.meet(told.to, told.above(), busy));
+            self.speed = is_met.then(|| self.meet(commanded.to, commanded.above(), busy));
         }
         self.apart = apart;
         self.linearise(model);
@@ -160,8 +166,8 @@ impl Course {
     }
 
     /// Whether a command is one of many that are alike.
-    const fn repeats(&self, told: &Told) -> bool {
-        self.is_repeating && told.to != 0 && !told.at_rest
+    const fn repeats(&self, commanded: &SpeedCommand) -> bool {
+        self.is_repeating && commanded.to != 0 && !commanded.at_rest
     }
 
     /// Whether it will do the same again and again from now on; what it learnt of that before is forgotten.
@@ -294,9 +300,9 @@ mod tests {
         let begins: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
         let (mut pushed, mut at_once) = (begins, begins);
         for (nth, step) in [1, 2, 3, 4, 5, 6, 7, 8, 9, 8].into_iter().enumerate() {
-            pushed.tell(&model, 0.02 * nth as f64, step);
+            pushed.command(&model, 0.02 * nth as f64, step);
         }
-        at_once.tell(&model, 0.0, 8);
+        at_once.command(&model, 0.0, 8);
         // the train runs at the last step, as fast as one that was commanded to it at once.
         assert_eq!(pushed.step(), 8);
         let [speed, wanted] =

@@ -9,14 +9,14 @@ const CONVINCING_PULSES: f64 = 3.0;
 
 /// Minds what one sensor says.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ToldWay {
+pub struct ReportedDirection {
     /// 1 the way in which distance grows, −1 the other, 0 if it says nothing.
     way: f64,
     age: f64,
     pulses: f64,
 }
 
-impl ToldWay {
+impl ReportedDirection {
     /// Takes in a reading, `t` seconds after the last one, of a sensor whose sense of direction is `wiring` (1 or −1) and
     /// that counted so many signed pulses before.
     pub fn hear(&mut self, reading: &WheelReading, wiring: f64, counted: f64, t: f64) {
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_shaken_tooth_says_a_way_and_does_not_convince() {
-        let mut told = ToldWay::default();
+        let mut told = ReportedDirection::default();
         let reading = |direction| WheelReading { direction, ..WheelReading::pulses(1) };
         for direction in [Direction::Forward, Direction::Backward, Direction::Forward] {
             told.hear(&reading(direction), 1.0, 0.0, 0.05);

@@ -34,12 +34,12 @@ impl Span {
 
 /// Rails and turnouts that somebody holds, or wants.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Footprint {
+pub struct Reservation {
     spans: BTreeMap<StretchId, Vec<Span>>,
     turnouts: BTreeSet<TurnoutId>,
 }
 
-impl Footprint {
+impl Reservation {
     /// Nothing is taken.
     #[must_use]
     pub const fn empty() -> Self {

@@ -5,11 +5,11 @@ use alloc::vec::Vec;
 use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
-use super::footprint::Footprint;
 use super::granting::Start;
 use super::itinerary::{Itinerary, Run};
 use super::journey::TrainLengths;
-use super::trail::Trail;
+use super::occupied_path::OccupiedPath;
+use super::reservation::Reservation;
 use super::way::Way;
 
 /// How much more of the track is taken than a train is believed to need: contacts are off their places by 5 mm, edges
@@ -18,7 +18,7 @@ pub(super) const SLACK: Length = Length::from_mm(20.0);
 
 /// What a train needs around the leading end of its pickup.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Room {
+pub(super) struct ClearanceEnvelope {
     /// With what is not known of its place now.
     pub(super) ahead: Length,
     pub(super) behind: Length,
@@ -29,7 +29,7 @@ pub(super) struct Room {
     pub(super) overrun: Length,
 }
 
-impl Room {
+impl ClearanceEnvelope {
     /// A train with these lengths, of which one standard deviation of the place is this.
     pub(super) fn of(lengths: TrainLengths, uncertainty: Length, overrun: Length) -> Self {
         let (front, rear) = (lengths.ahead() + SLACK, lengths.behind() + SLACK);
@@ -44,7 +44,7 @@ const CERTAIN: f64 = 3.3;
 
 /// One run of a course.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct GrantedRun {
+pub(super) struct MovementAuthority {
     pub(super) turns: bool,
     /// From behind the train's rear end to beyond its front end when it has come to rest.
     pub(super) way: Way,
@@ -59,13 +59,13 @@ pub(super) struct GrantedRun {
     pub(super) limit: Length,
     pub(super) end: Length,
     pub(super) needs: Vec<TurnoutNeed>,
-    pub(super) taken: Footprint,
+    pub(super) taken: Reservation,
 }
 
-impl GrantedRun {
+impl MovementAuthority {
     /// What it takes from a point on, where its rear end is.
-    pub(super) fn takes_beyond(&self, layout: &Layout, from: Length) -> Footprint {
-        self.way.footprint(layout, from, self.end)
+    pub(super) fn takes_beyond(&self, layout: &Layout, from: Length) -> Reservation {
+        self.way.reservation(layout, from, self.end)
     }
 }
 
@@ -75,9 +75,9 @@ pub(super) fn granted(
     turnouts: &TurnoutStates,
     itinerary: &Itinerary,
     begins: &Start,
-) -> Option<Vec<GrantedRun>> {
+) -> Option<Vec<MovementAuthority>> {
     let room = begins.room;
-    let mut runs: Vec<GrantedRun> = Vec::new();
+    let mut runs: Vec<MovementAuthority> = Vec::new();
     for run in &itinerary.runs {
         let before = runs.last();
         let (way, start) = way_of(layout, turnouts, run, before, begins)?;
@@ -92,9 +92,19 @@ pub(super) fn granted(
         let needs = way.needs(layout, if run.turns { begin } else { start }, end);
         // What it stands on it holds already; another may hold what a doubt that has grown since would add to that.
         let taken_from = if runs.is_empty() { start } else { begin };
-        let taken = way.footprint(layout, taken_from, end);
-        let mut granted =
-            GrantedRun { turns: run.turns, way, start, stop, begin, taken_from, limit, end, needs, taken };
+        let taken = way.reservation(layout, taken_from, end);
+        let mut granted = MovementAuthority {
+            turns: run.turns,
+            way,
+            start,
+            stop,
+            begin,
+            taken_from,
+            limit,
+            end,
+            needs,
+            taken,
+        };
         // Its place is counted from the node behind it once it has turned around.
         if run.turns {
             let edge = run.start.edge;
@@ -144,7 +154,7 @@ fn way_of(
     layout: &Layout,
     turnouts: &TurnoutStates,
     run: &Run,
-    before: Option<&GrantedRun>,
+    before: Option<&MovementAuthority>,
     begins: &Start,
 ) -> Option<(Way, Length)> {
     let room = begins.room;
@@ -186,9 +196,9 @@ pub(super) fn standing(
     layout: &Layout,
     turnouts: &TurnoutStates,
     place: Position,
-    came: &Trail,
-    room: Room,
-) -> Footprint {
+    came: &OccupiedPath,
+    room: ClearanceEnvelope,
+) -> Reservation {
     let (way, at) = Way::around(layout, turnouts, place, came, room.behind, room.ahead);
-    way.footprint(layout, at - room.behind, at + room.ahead)
+    way.reservation(layout, at - room.behind, at + room.ahead)
 }

@@ -10,7 +10,7 @@ use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 use super::instruction::Instruction;
 
 /// Knows the names of things.
-pub(in crate::commands) struct Tongue<'d> {
+pub(in crate::commands) struct NoticeFormatter<'d> {
     pub(in crate::commands) driver: &'d Driver,
     pub(in crate::commands) began: Timestamp,
 }
@@ -38,7 +38,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
     }
 }
 
-impl Tongue<'_> {
+impl NoticeFormatter<'_> {
     pub(super) fn sensor(&self, sensor: SensorId) -> &str {
         self.driver.layout().sensor_name(sensor)
     }

@@ -10,11 +10,11 @@ const MOST_EDGES: usize = 16;
 
 /// Edges in the order of travel; the leading end of the pickup is on the last one.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Trail {
+pub(super) struct OccupiedPath {
     edges: Vec<EdgeId>,
 }
 
-impl Trail {
+impl OccupiedPath {
     /// Takes note of where the leading end of the pickup is now: further on, on its way back, or somewhere else.
     pub(super) fn follow(&mut self, layout: &Layout, place: Position) {
         let Some(last) = self.edges.last().copied() else {
