@@ -92,7 +92,7 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
     };
     match words.rest.first() {
         None => Ok(Some(instruction)),
-        Some(word) => Err(word.mistake("is one word too many: remove it: remove it")),
+        Some(word) => Err(word.mistake("is one word too many: remove it")),
     }
 }
 
@@ -260,10 +260,10 @@ mod tests {
         let wrong: Vec<String> = [
             ("stopp 24 at C13", "column 1: `stopp` is not a command: did you mean `stop`?"),
             ("stop 25 at C13", "column 6: `25` is not a train of this session: 24, 58"),
-            ("stop 24 at C1 3", "column 15: `3` says nothing here"),
+            ("stop 24 at C1 3", "column 15: `3` is not allowed here: write `at step 8`"),
             ("stop 24 at C133", "column 12: track-a has no place `C133`"),
             ("stop 24 at C133", "did you mean `C13`?"),
-            ("stop 24 at C13+120", "column 12: `+120` is no offset: write millimetres"),
+            ("stop 24 at C13+120", "column 12: `+120` is not an offset: write millimetres"),
             (
                 "stop 24 at C13 not-beyond 60%",
                 "column 27: `60%` should be a share of stops from 0.0001% to 50%",
