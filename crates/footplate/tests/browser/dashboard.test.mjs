@@ -46,7 +46,7 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.waitForSelector(".train");
   await page.fill("#line", "turnout all straight");
   await page.click("#order button");
-  await page.waitForFunction(() => /turnout 156 told/.test(document.querySelector("#said").textContent), null, { timeout: PATIENCE });
+  await page.waitForFunction(() => /turnout 156 set/.test(document.querySelector("#said").textContent), null, { timeout: PATIENCE });
   await page.fill("#step-24", "8");
   await page.locator(".train button", { hasText: "Set" }).first().click();
   const card = page.locator(".train").first();
@@ -71,11 +71,11 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.waitForFunction(() => /step 6/.test(document.querySelectorAll(".train dd")[1].textContent), null, { timeout: PATIENCE });
   await page.locator("h1").click();
   await page.keyboard.press("Space");
-  await page.waitForFunction(() => /told to stand/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
+  await page.waitForFunction(() => /commanded to stop/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
   const { trains } = await picture();
   assert.equal(trains[0].step, 0);
   // The station was told, and is heard; that it did what it was told is never claimed.
-  await page.waitForFunction(() => /NOT CONFIRMED, see that the trains stand/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
+  await page.waitForFunction(() => /NOT CONFIRMED, check that all trains have stopped/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
   await page.fill("#line", "power on");
   await page.click("#order button");
   await page.waitForFunction(() => document.querySelector("#halted").hidden, null, { timeout: PATIENCE });

@@ -70,7 +70,7 @@ test("a slide is watched live: both wheels leave the train, the bounds hold, and
   assert.equal(inside, of);
   const { score } = scored("S2", 7);
   const expected = score.overall.presets.recommended.speed_rms_m_s;
-  const [, rms] = /off by ([\d.]+) m\/s/.exec(await text(page, "#slide-score"));
+  const [, rms] = /Speed error: ([\d.]+) m\/s/.exec(await text(page, "#slide-score"));
   assert.ok(Math.abs(Number(rms) - expected) < 0.0006, `${rms} beside ${expected}`);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "slide.png"), fullPage: true });

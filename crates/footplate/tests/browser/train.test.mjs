@@ -38,7 +38,7 @@ test("a train runs at the step of its slider, and its curves show what contacts 
   assert.match(await text(page, "#at"), /^\S+ ± \d+ mm$/);
   assert.match(await text(page, "#speed"), /^\d+ ± \d+ mm\/s$/);
   assert.match(await text(page, "#due"), /^\S+ in [\d.]+ s ± \d+ ms$/);
-  assert.match(await text(page, "#if-stopped"), /^rests \d+ ± \d+ mm further, at \S+, in [\d.]+ s$/);
+  assert.match(await text(page, "#if-stopped"), /^stops \d+ ± \d+ mm ahead, at \S+, in [\d.]+ s$/);
   const drawn = await colours(page);
   assert.equal(drawn.length, 5);
   for (const [place, count] of drawn.entries()) assert.ok(count > 5, `chart ${place}: ${count} colours`);
@@ -95,7 +95,7 @@ test("on a phone, in the dark and in German nothing is wider than the page", asy
   for (const count of await colours(page)) assert.ok(count > 1);
   await page.screenshot({ path: join(AT, "train-phone.png"), fullPage: true });
   await page.goto(`${running.url}#/train/7`);
-  await until(page, () => /Zug 7 wird hier nicht gefahren/.test(document.querySelector("#unknown").textContent));
+  await until(page, () => /Zug 7 gehört nicht zu dieser Sitzung/.test(document.querySelector("#unknown").textContent));
   assert.deepEqual(complaints.filter((complaint) => !/404/.test(complaint)), []);
   await page.close();
 });

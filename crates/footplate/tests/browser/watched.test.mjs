@@ -67,7 +67,7 @@ test("a calibration says what it tries and why, and its table is what the progra
   await agree(page, () => text(page, "#about"), async () => (await get(program, "api/picture")).calibration.experiment);
   await agree(page, async () => Number((await text(page, "#left")).split(" ")[0]), async () => Math.round((await get(program, "api/picture")).calibration.left_s));
   // The next experiment is one of those that take most doubt away, and that reason is shown with what it takes.
-  await until(page, () => /most doubt away for its time: [\d.]+ scatters squared in \d+ s/.test(document.querySelector("#because").textContent));
+  await until(page, () => /most informative experiment per second \(expected information [\d.]+ in \d+ s\)/.test(document.querySelector("#because").textContent));
   await until(page, () => /at step \d+: stops within \d+ mm, speed within [\d.]+ %/.test(document.querySelector("#expected").textContent));
   await until(page, () => document.querySelectorAll("#steps tr").length > 8);
   // While it runs: what the page says of each step is the model that the program answers.
@@ -127,7 +127,7 @@ test("a calibration fits a phone in the dark and in German, takes no orders, and
   await page.screenshot({ path: join(AT, "calibrating-phone.png"), fullPage: true });
   const refused = await fetch(`${program.url}api/orders`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ line: "speed 24 8" }) });
   assert.equal(refused.status, 422);
-  assert.match((await refused.json()).error, /drives by itself/);
+  assert.match((await refused.json()).error, /a calibration runs by itself/);
   await page.click("#halt");
   await until(page, () => /allen Zügen ist Halt befohlen/.test(document.querySelector("#halted").textContent));
   await program.over;
@@ -144,7 +144,7 @@ test("a demonstration is watched from its first contact to its last stop, and sa
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "demo.png"), fullPage: true });
   // A stop is shown while it is under way: where it leads to, and within which millimetres it will end.
-  await until(page, () => /^stop \d+ at \S+ from step \d+ \(will rest [+−]?\d+ … [+−]?\d+ mm\)$/.test(document.querySelectorAll(".train dd")[2]?.textContent));
+  await until(page, () => /^stop \d+ at \S+ from step \d+ \(predicted [+−]?\d+ … [+−]?\d+ mm\)$/.test(document.querySelectorAll(".train dd")[2]?.textContent));
   await page.waitForSelector("#track .target", { state: "attached" });
   await page.screenshot({ path: join(AT, "demo-stopping.png"), fullPage: true });
   await until(page, () => document.querySelectorAll("#said li").length >= 5);
@@ -162,7 +162,7 @@ test("a demonstration is watched from its first contact to its last stop, and sa
   assert.ok(stops.length >= 9, `${stops.length} stops`);
   for (const { train, target, error_mm: error } of stops.slice(0, 9)) {
     const mm = Math.round(Math.abs(error));
-    const expected = new RegExp(`train ${train} stands ${mm} mm ${error < -0.5 ? "short of" : "(beyond|short of)"} ${target.replace("+", "\\+")},`);
+    const expected = new RegExp(`train ${train} stopped ${mm} mm ${error < -0.5 ? "short of" : "(beyond|short of)"} ${target.replace("+", "\\+")},`);
     assert.ok(said.some((line) => expected.test(line)), `${expected} in ${said.join(" | ")}`);
   }
   assert.deepEqual(complaints.filter((complaint) => !GONE.test(complaint) && !/422/.test(complaint)), []);
@@ -187,7 +187,7 @@ test("what is not as it should be is said on every page in the reader's language
   await say(program, "speed 24 8");
   await until(page, () => !document.querySelector("#alarmed").hidden);
   const alarm = await text(page, "#alarmed");
-  assert.match(alarm, /hat geschlossen, und kein Zug kann dort gewesen sein|aufgetaucht, wohin er nicht gefahren sein kann|hätte .* erreichen sollen|verloren/);
+  assert.match(alarm, /hat gemeldet, aber dort kann kein Zug sein|wohin er nicht gefahren sein kann|überfällig|verloren/);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "alarmed.png") });
   await page.click("#alarmed a");
