@@ -1,6 +1,7 @@
 // What is asked of the server.
 
-const token = new URLSearchParams(location.search).get("token");
+// A plus that a person pasted means a plus: no token has spaces.
+const token = new URLSearchParams(location.search).get("token")?.replaceAll(" ", "+");
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 
 /** An address that cannot be sent headers of its own. */

@@ -77,7 +77,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
     /// Show trains live in a browser, and take orders from there: at a port of this machine (8417 unless named, 0 for any
-    /// that is free), or at an address. Beyond this machine a token has to be set in the environment as FOOTPLATE_TOKEN.
+    /// that is free), or at an address. Beyond this machine a token is needed: the one in the environment as FOOTPLATE_TOKEN
+    /// (at least 16 characters), or one that is generated and printed.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
     serve: Option<ServedAt>,
     /// Lines of text instead of the live view, at a terminal, too.

@@ -14,7 +14,7 @@ use footplate_store::parse_layout;
 use super::Outcome;
 use super::drive;
 use super::written_layout::WrittenLayout;
-use crate::dashboard::{Dashboard, ServedAt};
+use crate::dashboard::{Dashboard, ServedAt, Token};
 
 pub(crate) use archive::archive_routes;
 pub(crate) use odometry_desk::odometry_routes;
@@ -28,10 +28,10 @@ pub(crate) use slides::slide_routes;
 #[command(after_help = "\
 Examples:
   footplate serve --link sim:track-a?seed=7 --train 24 --store railway.db
-  FOOTPLATE_TOKEN=secret footplate serve 0.0.0.0:8417 --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db")]
+  footplate serve 0.0.0.0:8417 --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db")]
 pub(crate) struct Arguments {
-    /// A port of this machine (0 for any that is free), or an address. Beyond this machine a token has to be set in the
-    /// environment as FOOTPLATE_TOKEN.
+    /// A port of this machine (0 for any that is free), or an address. Beyond this machine a token is needed: the one
+    /// in the environment as FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
     #[arg(value_name = "ADDRESS", default_value = "")]
     at: ServedAt,
     #[command(flatten)]
@@ -47,7 +47,8 @@ pub(super) fn open_dashboard(
     written: &WrittenLayout,
     store: Option<PathBuf>,
 ) -> anyhow::Result<Dashboard> {
-    let token = std::env::var("FOOTPLATE_TOKEN").ok();
+    let chosen = std::env::var("FOOTPLATE_TOKEN").ok().filter(|text| !text.is_empty());
+    let token = chosen.as_deref().map(Token::chosen).transpose()?;
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
     let more = archive_routes(store, &written.layout).and(odometry_routes()).and(slide_routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;

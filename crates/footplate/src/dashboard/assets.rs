@@ -53,7 +53,6 @@ impl IntoResponse for Asset {
         let headers = [
             (header::CONTENT_TYPE, self.kind),
             (header::CONTENT_SECURITY_POLICY, POLICY),
-            (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
             (header::CACHE_CONTROL, "no-cache"),
         ];
         (headers, self.text).into_response()

@@ -44,11 +44,19 @@ pub(crate) enum Answer {
     Refused(String),
 }
 
-/// An order that waits for the loop.
+/// What somebody asks of the control loop.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Request {
+    /// All trains stop and the track power goes off. It goes before everything else and always finds room.
+    EmergencyStop,
+    /// A line as the prompt understands it.
+    Line(String),
+}
+
+/// A request that waits for the loop.
 #[derive(Debug)]
 pub(crate) struct Asked {
-    /// As the prompt understands it.
-    pub(crate) line: String,
+    pub(crate) request: Request,
     answer: oneshot::Sender<Answer>,
 }
 
@@ -158,16 +166,14 @@ impl Board {
         lock(&self.waiting).pop_front()
     }
 
-    /// Asks for something. What is urgent goes before everything else and always finds room.
-    pub(crate) fn ask(&self, line: String, is_urgent: bool) -> Result<oneshot::Receiver<Answer>, TooMany> {
+    /// Asks for something.
+    pub(crate) fn ask(&self, request: Request) -> Result<oneshot::Receiver<Answer>, TooMany> {
         let (answer, answered) = oneshot::channel();
         let mut waiting = lock(&self.waiting);
-        if is_urgent {
-            waiting.push_front(Asked { line, answer });
-        } else if waiting.len() < MOST_WAITING {
-            waiting.push_back(Asked { line, answer });
-        } else {
-            return Err(TooMany);
+        match request {
+            Request::EmergencyStop => waiting.push_front(Asked { request, answer }),
+            Request::Line(_) if waiting.len() < MOST_WAITING => waiting.push_back(Asked { request, answer }),
+            Request::Line(_) => return Err(TooMany),
         }
         Ok(answered)
     }
@@ -268,15 +274,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_urgent_goes_first_however_many_wait() {
+    fn an_emergency_stop_goes_first_however_many_wait() {
         let board = Board::new(7);
         for _ in 0..MOST_WAITING {
-            drop(board.ask("where".into(), false).expect("room"));
+            drop(board.ask(Request::Line("where".into())).expect("room"));
         }
-        assert!(board.ask("where".into(), false).is_err());
-        let mut answered = board.ask("halt".into(), true).expect("always");
+        assert!(board.ask(Request::Line("where".into())).is_err());
+        let mut answered = board.ask(Request::EmergencyStop).expect("always");
         let first = board.next_asked().expect("one waits");
-        assert_eq!(first.line, "halt");
+        assert_eq!(first.request, Request::EmergencyStop);
         first.answer(Answer::Taken);
         assert_eq!(answered.try_recv(), Ok(Answer::Taken));
     }

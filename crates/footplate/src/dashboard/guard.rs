@@ -8,11 +8,16 @@ use std::net::SocketAddr;
 
 use axum::http::{HeaderMap, Method, StatusCode, header};
 
+use super::token::Token;
+
+/// Where the page that asks comes from, as the browser says.
+const FETCH_SITE: header::HeaderName = header::HeaderName::from_static("sec-fetch-site");
+
 /// What is checked of every request.
 #[derive(Debug, Clone)]
 pub(super) struct Guard {
     bound: SocketAddr,
-    token: Option<String>,
+    token: Option<Token>,
 }
 
 /// Why a request is turned away.
@@ -20,7 +25,7 @@ pub(super) struct Guard {
 pub(super) enum Denied {
     /// The name in `Host` is none of this server's.
     Host,
-    /// The page comes from elsewhere.
+    /// The page that asks comes from elsewhere.
     Origin,
     /// No token, or another one.
     Token,
@@ -54,7 +59,7 @@ impl Denied {
 
 impl Guard {
     /// A guard of a server bound to an address.
-    pub(super) const fn new(bound: SocketAddr, token: Option<String>) -> Self {
+    pub(super) const fn new(bound: SocketAddr, token: Option<Token>) -> Self {
         Self { bound, token }
     }
 
@@ -78,10 +83,18 @@ impl Guard {
         {
             return Err(Denied::Origin);
         }
+        // A link from elsewhere may open a page, which asks for the rest by itself. Programs send no such header.
+        let site = text(FETCH_SITE);
+        if !is_page && site.is_some_and(|site| !matches!(site, "same-origin" | "none")) {
+            return Err(Denied::Origin);
+        }
         if let Some(wanted) = self.token.as_ref().filter(|_| !is_page) {
             let bearer = text(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
-            let shown = bearer.or(token).unwrap_or_default();
-            if !same(shown.as_bytes(), wanted.as_bytes()) {
+            let is_known = match bearer {
+                Some(shown) => wanted.is(shown),
+                None => token.is_some_and(|shown| wanted.is_decoded(shown)),
+            };
+            if !is_known {
                 return Err(Denied::Token);
             }
         }
@@ -100,11 +113,6 @@ impl Guard {
             })
         })
     }
-}
-
-/// Compares without telling by its time how much was right.
-fn same(one: &[u8], other: &[u8]) -> bool {
-    one.len() == other.len() && one.iter().zip(other).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }
 
 #[cfg(test)]
@@ -138,17 +146,29 @@ mod tests {
         assert_eq!(post("http://localhost:8417", "application/json"), Ok(()));
         assert_eq!(post("http://evil.example", "application/json"), Err(Denied::Origin));
         assert_eq!(post("null", "application/json"), Err(Denied::Origin));
+        let get = |site, is_page| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::HOST, HeaderValue::from_static("localhost:8417"));
+            headers.insert(FETCH_SITE, HeaderValue::from_static(site));
+            guard.check(&Method::GET, &headers, None, is_page)
+        };
+        assert_eq!(get("same-origin", false), Ok(()));
+        assert_eq!(get("none", false), Ok(()), "written into the address line");
+        assert_eq!(get("cross-site", false), Err(Denied::Origin));
+        assert_eq!(get("same-site", false), Err(Denied::Origin), "another port of this machine");
+        assert_eq!(get("cross-site", true), Ok(()), "a link to the page");
         assert_eq!(post("http://localhost:8417", "text/plain"), Err(Denied::NotJson));
     }
 
     #[test]
     fn beyond_loopback_the_token_is_asked_for() {
-        let guard = Guard::new("0.0.0.0:8417".parse().expect("an address"), Some("s3cret".into()));
+        let token = Token::chosen("0123456789abcdef").expect("16 characters");
+        let guard = Guard::new("0.0.0.0:8417".parse().expect("an address"), Some(token));
         let get = |bearer: &str| {
             check(&guard, &Method::GET, &[(header::HOST, "club:8417"), (header::AUTHORIZATION, bearer)])
         };
-        assert_eq!(get("Bearer s3cret"), Ok(()));
-        assert_eq!(get("Bearer s3cre"), Err(Denied::Token));
+        assert_eq!(get("Bearer 0123456789abcdef"), Ok(()));
+        assert_eq!(get("Bearer 0123456789abcde"), Err(Denied::Token));
         assert_eq!(get(""), Err(Denied::Token));
     }
 }

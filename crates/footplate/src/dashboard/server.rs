@@ -19,9 +19,9 @@ use std::sync::{Arc, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -34,12 +34,14 @@ use serde_json::json;
 use tokio::net::TcpListener;
 
 use super::assets::asset;
-use super::board::{Answer, Board};
-use super::guard::Guard;
+use super::board::{self, Answer, Board};
+use super::connections::{LastRequest, Limits, serve};
+use super::guard::{Denied, Guard};
 use super::model_picture::ModelPicture;
 use super::picture::LayoutPicture;
 use super::routes::Routes;
 use super::stream::events;
+use super::token::Token;
 use crate::clock::now;
 use crate::link::{LineTallies, SharedTallies};
 
@@ -55,8 +57,8 @@ const USUAL_PORT: u16 = 8417;
 /// What can be asked for, as programs read it.
 const OPENAPI: &str = include_str!("../../assets/dashboard/openapi.json");
 
-/// What the prompt calls an emergency stop.
-const HALT: &str = "halt";
+/// Who guesses tokens makes two attempts a second on a connection.
+const WRONG_TOKEN_WAITS: Duration = Duration::from_millis(500);
 
 /// Where to serve.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -112,20 +114,15 @@ impl Dashboard {
     /// Begins to serve, with more routes than those of driving.
     ///
     /// # Errors
-    /// The address is taken, or is open to others and no token was given.
+    /// The address is taken, or the token is too short.
     pub(crate) fn open(
         at: &ServedAt,
-        token: Option<String>,
+        token: Option<Token>,
         layout: &LayoutFile,
         more: Routes,
     ) -> anyhow::Result<Self> {
-        if !at.0.ip().is_loopback() && token.as_deref().unwrap_or_default().is_empty() {
-            bail!(
-                "{} can be reached from other machines: set a token in the environment as FOOTPLATE_TOKEN, or serve \
-                 at 127.0.0.1",
-                at.0
-            );
-        }
+        // One that somebody chose is known already, and stays out of what is printed.
+        let generated = (token.is_none() && !at.0.ip().is_loopback()).then(Token::generated).transpose()?;
         let listener = std::net::TcpListener::bind(at.0)
             .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", at.0))?;
         listener.set_nonblocking(true)?;
@@ -133,16 +130,17 @@ impl Dashboard {
         let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
         // Nobody else has begun at the same moment at the same port.
         let board = Board::new(now().as_ns());
-        let url = format!("http://{bound}/");
+        let shown = generated.as_ref().map(|token| format!("?token={}", token.text()));
+        let url = format!("http://{bound}/{}", shown.unwrap_or_default());
         let line = SharedTallies::default();
-        let guard = Guard::new(bound, token);
+        let guard = Guard::new(bound, token.or(generated));
         let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line), guard };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
         thread::Builder::new().name("dashboard".to_owned()).spawn(move || {
             runtime.block_on(async move {
                 match TcpListener::from_std(listener) {
                     Ok(listener) => {
-                        let _ = axum::serve(listener, router(shared, more)).await;
+                        serve(listener, router(shared, more), Limits::USUAL).await;
                     }
                     Err(error) => eprintln!("the dashboard is not served: {error}"),
                 }
@@ -192,10 +190,25 @@ async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Re
     let query = request.uri().query().unwrap_or_default();
     let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
     let is_page = !request.uri().path().starts_with("/api/");
-    match guard.check(request.method(), request.headers(), token, is_page) {
-        Ok(()) => next.run(request).await,
-        Err(denied) => (denied.status(), Json(json!({ "error": denied.says() }))).into_response(),
-    }
+    let mut response = match guard.check(request.method(), request.headers(), token, is_page) {
+        Ok(()) => {
+            if let Some(last) = request.extensions().get::<LastRequest>().filter(|_| !is_page) {
+                last.is_now();
+            }
+            next.run(request).await
+        }
+        Err(denied) => {
+            if denied == Denied::Token {
+                tokio::time::sleep(WRONG_TOKEN_WAITS).await;
+            }
+            (denied.status(), Json(json!({ "error": denied.says() }))).into_response()
+        }
+    };
+    // An answer is what it says it is, and addresses with a token are told to nobody.
+    let headers = response.headers_mut();
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    response
 }
 
 async fn page(Path(file): Path<String>) -> Response {
@@ -272,7 +285,7 @@ async fn order(
     body: Result<Json<OrderLine>, axum::extract::rejection::JsonRejection>,
 ) -> Response {
     match body {
-        Ok(Json(OrderLine { line })) => ask(&shared.board, line, false).await,
+        Ok(Json(OrderLine { line })) => ask(&shared.board, board::Request::Line(line)).await,
         Err(wrong) => {
             let says = format!("{}; write {{\"line\": \"stop 24 at C13\"}}", wrong.body_text());
             (wrong.status(), Json(json!({ "error": says }))).into_response()
@@ -281,12 +294,12 @@ async fn order(
 }
 
 async fn emergency_stop(State(shared): State<Shared>) -> Response {
-    ask(&shared.board, HALT.to_owned(), true).await
+    ask(&shared.board, board::Request::EmergencyStop).await
 }
 
-async fn ask(board: &Board, line: String, is_urgent: bool) -> Response {
+async fn ask(board: &Board, request: board::Request) -> Response {
     let answer = |status: StatusCode, error: &str| (status, Json(json!({ "error": error }))).into_response();
-    let Ok(answered) = board.ask(line, is_urgent) else {
+    let Ok(answered) = board.ask(request) else {
         return answer(StatusCode::TOO_MANY_REQUESTS, "too many orders wait: ask again in a moment");
     };
     match tokio::time::timeout(ANSWERED_WITHIN, answered).await {

@@ -10,7 +10,7 @@ use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 
 use super::alarm::Alarm;
-use super::board::{Answer, Board};
+use super::board::{Answer, Board, Request};
 use super::painter::{Painter, TrainPassed};
 use super::picture::TrainTask;
 use super::server::Dashboard;
@@ -47,7 +47,10 @@ impl Showing {
     pub(crate) fn is_halted(&self, why: &str) -> bool {
         let mut is_halted = false;
         while let Some(asked) = self.board.next_asked() {
-            let halts = asked.line.trim() == "halt";
+            let halts = match &asked.request {
+                Request::EmergencyStop => true,
+                Request::Line(line) => line.trim() == "halt",
+            };
             is_halted |= halts;
             asked.answer(if halts { Answer::Taken } else { Answer::Refused(why.to_owned()) });
         }

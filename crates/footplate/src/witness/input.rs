@@ -17,6 +17,8 @@ pub(crate) enum Input {
     Timeout,
     /// Somebody wrote a line.
     Line(String),
+    /// Somebody stops all trains and switches the track power off.
+    EmergencyStop,
     /// No more lines will come.
     NoMoreLines,
     /// A program gave an order.
@@ -63,6 +65,7 @@ impl Input {
             Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
+            Self::EmergencyStop => ("emergency-stop", String::new()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
             Self::End => ("end", String::new()),
         }
@@ -90,6 +93,7 @@ impl Input {
             },
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
+            "emergency-stop" => Self::EmergencyStop,
             "no-more-lines" => Self::NoMoreLines,
             "end" => Self::End,
             _ => return Err(InputError::Unknown { kind: kind.to_owned() }),
@@ -133,6 +137,7 @@ mod tests {
         inputs.extend([
             Input::Timeout,
             Input::Line("stop 24 at C13+120mm  # näher".to_owned()),
+            Input::EmergencyStop,
             Input::NoMoreLines,
             Input::Link(LinkNews::Silent),
             Input::Link(LinkNews::Answers),

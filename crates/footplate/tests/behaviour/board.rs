@@ -32,7 +32,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 /// A folder with the store of a train that was calibrated for five minutes behind the simulated board of a seed.
-fn calibrated(name: &str, seed: u64) -> PathBuf {
+pub(crate) fn calibrated(name: &str, seed: u64) -> PathBuf {
     let folder = folder(name);
     let (link, store) = (format!("{LINK}{seed}"), folder.join("railway.db").display().to_string());
     let over = ["--link", &link, "--layout", "track-a", "--store", &store];

@@ -9,6 +9,7 @@ mod demo;
 #[path = "../../../footplate-store/tests/behaviour/drawn_moments.rs"]
 mod drawn_moments;
 mod drive;
+mod emergency_stop;
 mod forecasts_hold;
 mod inertial_slides;
 mod killed;

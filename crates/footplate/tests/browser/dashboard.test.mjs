@@ -98,14 +98,19 @@ test("pages from elsewhere, other names and forms are turned away, and mistakes 
 });
 
 test("beyond this machine the token is asked for, and the page works with it", async () => {
-  const refused = await serve(store, "0.0.0.0:0").catch((error) => error);
-  assert.match(String(refused), /FOOTPLATE_TOKEN/);
-  const open = await serve(store, "0.0.0.0:0", { token: "s3cret" });
+  const refused = await serve(store, "0.0.0.0:0", { token: "s3cret" }).catch((error) => error);
+  assert.match(String(refused), /FOOTPLATE_TOKEN has 6 characters/);
+  const generated = await serve(store, "0.0.0.0:0");
+  assert.match(generated.url, /\?token=[0-9a-f]{32}$/);
+  await end(generated);
+  // As Base64 writes it, with all of its signs.
+  const token = "c2VjcmV0IHRva2Vu+/8=";
+  const open = await serve(store, "0.0.0.0:0", { token });
   const url = `http://127.0.0.1:${open.port}/`;
   assert.equal((await fetch(`${url}api/picture`)).status, 401);
-  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: "Bearer s3cre" } })).status, 401);
-  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: "Bearer s3cret" } })).status, 200);
-  const { page, complaints } = await openQuietly(browser, `${url}?token=s3cret`);
+  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: `Bearer ${token.slice(1)}` } })).status, 401);
+  assert.equal((await fetch(`${url}api/picture`, { headers: { Authorization: `Bearer ${token}` } })).status, 200);
+  const { page, complaints } = await openQuietly(browser, `${url}?token=${token}`);
   await page.waitForSelector(".train");
   await page.fill("#line", "where");
   await page.click("#order button");

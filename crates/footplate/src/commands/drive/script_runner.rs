@@ -407,6 +407,7 @@ impl Listener for ScriptRunner {
     fn handle_word(&mut self, now: Timestamp, word: &Input) {
         match word {
             Input::Line(line) => self.hear(now, line),
+            Input::EmergencyStop => self.halt(now),
             Input::NoMoreLines => self.complete(),
             Input::Link(news) => {
                 self.dispatcher.handle_link(now, *news);

@@ -13,7 +13,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::script_runner::ScriptRunner;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
-use crate::dashboard::{Alarm, Answer, Board, Painter};
+use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
 use crate::link::news_of;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
@@ -59,11 +59,20 @@ struct Watched {
 impl Watched {
     fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
         while let Some(asked) = self.board.next_asked() {
-            let mistake = script_runner.machine().mistake(&asked.line);
-            if mistake.is_none() {
-                script_runner.handle_word(now, &Input::Line(asked.line.clone()));
-            }
-            asked.answer(mistake.map_or(Answer::Taken, Answer::Refused));
+            let answer = match &asked.request {
+                Request::EmergencyStop => {
+                    script_runner.handle_word(now, &Input::EmergencyStop);
+                    Answer::Taken
+                }
+                Request::Line(line) => match script_runner.machine().mistake(line) {
+                    Some(mistake) => Answer::Refused(mistake),
+                    None => {
+                        script_runner.handle_word(now, &Input::Line(line.clone()));
+                        Answer::Taken
+                    }
+                },
+            };
+            asked.answer(answer);
         }
         let elapsed = self.stopwatch.elapsed();
         if elapsed >= self.painted + BETWEEN_PICTURES {

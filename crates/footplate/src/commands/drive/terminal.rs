@@ -17,7 +17,7 @@ use tokio::sync::oneshot;
 
 use self::prompt::Prompt;
 use self::seen::Seen;
-use crate::dashboard::{Answer, Board, LayoutPicture};
+use crate::dashboard::{Answer, Board, LayoutPicture, Request};
 
 /// Fifteen frames a second look smooth, and a line of 9600 baud can carry what changes.
 const FRAME: Duration = Duration::from_millis(66);
@@ -89,12 +89,12 @@ impl Sitting {
     fn press(&mut self, key: KeyEvent) {
         let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
-            KeyCode::Char('c' | 'd') if with_control => self.ask("quit".to_owned(), false),
-            KeyCode::Char(' ') if self.prompt.text().is_empty() => self.ask("halt".to_owned(), true),
+            KeyCode::Char('c' | 'd') if with_control => self.ask(Request::Line("quit".to_owned())),
+            KeyCode::Char(' ') if self.prompt.text().is_empty() => self.ask(Request::EmergencyStop),
             KeyCode::Char(letter) if !with_control => self.prompt.insert(letter),
             KeyCode::Enter => {
                 if let Some(line) = self.prompt.take() {
-                    self.ask(line, false);
+                    self.ask(Request::Line(line));
                 }
             }
             KeyCode::PageUp => self.seen.scroll(1),
@@ -103,9 +103,12 @@ impl Sitting {
         }
     }
 
-    fn ask(&mut self, line: String, is_urgent: bool) {
-        self.seen.say(format!("> {line}"));
-        match self.board.ask(line, is_urgent) {
+    fn ask(&mut self, request: Request) {
+        self.seen.say(match &request {
+            Request::EmergencyStop => "> emergency stop".to_owned(),
+            Request::Line(line) => format!("> {line}"),
+        });
+        match self.board.ask(request) {
             Ok(answer) => self.asked.push(answer),
             Err(_) => self.seen.say("! too many commands are waiting: enter it again in a moment".to_owned()),
         }

@@ -1,0 +1,250 @@
+//! An emergency stop reaches the line however many connections there are, whatever they do.
+//!
+//! `cargo nextest run -E 'test(emergency_stop_under_full_load)' --run-ignored all --no-capture` measures how soon.
+
+#![expect(clippy::disallowed_methods, reason = "how long a stop takes is measured")]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::{self, sleep};
+use std::time::{Duration, Instant};
+
+use crate::board::calibrated;
+use crate::station::Standing;
+
+/// The command that takes the power from the track, which the stop sends.
+const POWER_OFF: &[u8] = b"<0>";
+/// Between two bytes of a slow one.
+const SLOW: Duration = Duration::from_millis(100);
+/// Nothing here takes longer.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What hostile or broken programs do at the same time.
+#[derive(Clone, Copy)]
+struct Load {
+    /// Connections that say nothing.
+    idle: usize,
+    /// Connections that send a header byte by byte.
+    slow: usize,
+    /// Threads that give one order after another.
+    orders: usize,
+}
+
+/// Passes bytes between the program and a board, and knows when the power was commanded off.
+struct Tap {
+    place: String,
+    off: Arc<Mutex<Vec<Instant>>>,
+}
+
+impl Tap {
+    fn before(board: &str) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let place = listener.local_addr().expect("an address").to_string();
+        let (board, off) = (board.to_owned(), Arc::default());
+        let seen: Arc<Mutex<Vec<Instant>>> = Arc::clone(&off);
+        thread::spawn(move || {
+            let (mut program, _) = listener.accept().expect("the program");
+            let mut station = TcpStream::connect(board).expect("the board");
+            for stream in [&program, &station] {
+                stream.set_nodelay(true).expect("an option of sockets");
+            }
+            let (mut answers, mut back) =
+                (station.try_clone().expect("a handle"), program.try_clone().expect("a handle"));
+            thread::spawn(move || std::io::copy(&mut answers, &mut back));
+            let mut bytes = [0; 4096];
+            let mut last = Vec::new();
+            while let Ok(count @ 1..) = program.read(&mut bytes) {
+                last.extend_from_slice(&bytes[..count]);
+                if last.windows(POWER_OFF.len()).any(|part| part == POWER_OFF) {
+                    seen.lock().expect("no panic").push(Instant::now());
+                    last.clear();
+                }
+                last.drain(..last.len().saturating_sub(POWER_OFF.len() - 1));
+                if station.write_all(&bytes[..count]).is_err() {
+                    break;
+                }
+            }
+            let _ = station.shutdown(Shutdown::Both);
+        });
+        Self { place, off }
+    }
+
+    fn times(&self) -> Vec<Instant> {
+        self.off.lock().expect("no panic").clone()
+    }
+}
+
+/// `footplate serve`, until it is dropped.
+struct Served {
+    child: Child,
+    address: String,
+}
+
+impl Served {
+    fn with(store: &Path, link: &str) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
+            .args(["serve", "0", "--layout", "track-a", "--train", "24", "--link", link, "--store"])
+            .arg(store)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut errors = BufReader::new(child.stderr.take().expect("its errors")).lines();
+        let line =
+            errors.find_map(|line| line.ok()?.strip_prefix("the dashboard is at http://").map(str::to_owned));
+        let address = line.expect("an address").trim_end_matches('/').to_owned();
+        // It goes on writing, and must not wait for a reader.
+        thread::spawn(move || errors.for_each(drop));
+        Self { child, address }
+    }
+
+    fn post(&self, path: &str, body: &str) -> String {
+        let mut stream = TcpStream::connect(&self.address).expect("a connection");
+        send(&mut stream, &self.address, path, body).expect("an answer")
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The first line of the answer to one request.
+fn send(stream: &mut TcpStream, host: &str, path: &str, body: &str) -> std::io::Result<String> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    let length = body.len();
+    let header = format!(
+        "POST {path} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n"
+    );
+    stream.write_all((header + body).as_bytes())?;
+    let mut bytes = [0; 2048];
+    let count = stream.read(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes[..count]).lines().next().unwrap_or_default().to_owned())
+}
+
+fn opened(host: &str, count: usize) -> Vec<TcpStream> {
+    (0..count).filter_map(|_| TcpStream::connect(host).ok()).collect()
+}
+
+/// Slow connections and orders in threads, until they are told to end. Counts the orders.
+fn loaded(load: Load, host: &str, ends: &Arc<AtomicBool>, answered: &Arc<AtomicUsize>) {
+    let (place, over) = (host.to_owned(), Arc::clone(ends));
+    thread::spawn(move || {
+        let mut slow = opened(&place, load.slow);
+        while !over.load(Ordering::Relaxed) {
+            for stream in &mut slow {
+                if stream.write_all(b"G").is_err() {
+                    // It was cut off: another one takes its place.
+                    if let Ok(next) = TcpStream::connect(&place) {
+                        *stream = next;
+                    }
+                }
+            }
+            sleep(SLOW);
+        }
+    });
+    for _ in 0..load.orders {
+        let (place, over, answered) = (host.to_owned(), Arc::clone(ends), Arc::clone(answered));
+        thread::spawn(move || {
+            let mut stream = None;
+            while !over.load(Ordering::Relaxed) {
+                let open = stream.take().or_else(|| TcpStream::connect(&place).ok());
+                stream = open.and_then(|mut open| {
+                    let answer = send(&mut open, &place, "/api/orders", "{\"line\": \"where\"}").ok()?;
+                    answered.fetch_add(usize::from(!answer.is_empty()), Ordering::Relaxed);
+                    (!answer.is_empty()).then_some(open)
+                });
+            }
+        });
+    }
+}
+
+/// How soon each of some emergency stops under a load was on the line.
+fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
+    let folder = calibrated(name, 7);
+    let board = Standing::with("tcp:127.0.0.1:0", "1", &["--protocol", "dcc-ex", "--seed", "7"]);
+    let of_board = board.address.strip_prefix("dcc-ex:tcp://").expect(&board.address);
+    let (at, more) = of_board.split_once('?').unwrap_or((of_board, ""));
+    let tap = Tap::before(at);
+    let served = Served::with(&folder.join("railway.db"), &format!("dcc-ex:tcp://{}?{more}", tap.place));
+    let (ends, answered) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
+    let idle = opened(&served.address, load.idle);
+    assert_eq!(idle.len(), load.idle, "raise the limit of descriptors: ulimit -n");
+    loaded(load, &served.address, &ends, &answered);
+    // The idle ones are cut off after a while, and come again.
+    let (place, over) = (served.address.clone(), Arc::clone(&ends));
+    let coming = thread::spawn(move || {
+        let mut idle = idle;
+        let count = idle.len();
+        let mut next = 0;
+        while !over.load(Ordering::Relaxed) {
+            if let Ok(stream) = TcpStream::connect(&place) {
+                idle[next % count] = stream;
+            }
+            next += 1;
+            sleep(Duration::from_millis(1));
+        }
+    });
+    sleep(Duration::from_secs(1));
+    let mut took = Vec::new();
+    for _ in 0..count {
+        assert!(retried(|| served.post("/api/orders", "{\"line\": \"power on\"}")).contains("202"));
+        sleep(Duration::from_millis(300));
+        let (before, began) = (tap.times().len(), Instant::now());
+        let answer = served.post("/api/emergency-stop", "{}");
+        assert!(answer.contains("202"), "{answer}");
+        while tap.times().len() == before && began.elapsed() < PATIENCE {
+            sleep(Duration::from_micros(200));
+        }
+        took.push(*tap.times().get(before).expect("the power is commanded off") - began);
+    }
+    ends.store(true, Ordering::Relaxed);
+    coming.join().expect("no panic");
+    assert!(answered.load(Ordering::Relaxed) > 0 || load.orders == 0, "orders were answered meanwhile");
+    took.sort_unstable();
+    took
+}
+
+/// The order of a person among thousands: asked again while too many wait.
+fn retried(ask: impl Fn() -> String) -> String {
+    let began = Instant::now();
+    loop {
+        let answer = ask();
+        if !answer.contains("429") || began.elapsed() > PATIENCE {
+            return answer;
+        }
+    }
+}
+
+#[test]
+fn an_emergency_stop_is_on_the_line_though_a_thousand_connections_say_nothing() {
+    let load = Load { idle: 1_200, slow: 50, orders: 4 };
+    assert_eq!(stops_under(load, "emergency-stop", 2).len(), 2);
+}
+
+#[test]
+#[ignore = "a measurement: needs 12 000 descriptors and a machine of its own"]
+fn emergency_stop_under_full_load() {
+    for load in [Load { idle: 1, slow: 0, orders: 0 }, Load { idle: 5_000, slow: 500, orders: 100 }] {
+        let took = stops_under(load, "emergency-stop-full", 40);
+        let of = |part: usize| took[(took.len() - 1) * part / 100].as_secs_f64() * 1e3;
+        println!(
+            "{} idle, {} slow, {} threads of orders: first byte on the line after {:.1} ms (median), {:.1} ms (95 %), \
+             {:.1} ms (longest of {})",
+            load.idle,
+            load.slow,
+            load.orders,
+            of(50),
+            of(95),
+            of(100),
+            took.len()
+        );
+    }
+}
