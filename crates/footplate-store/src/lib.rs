@@ -69,7 +69,7 @@ pub use session_check::{SessionCheck, SessionFigure, standardised};
 pub use store::{
     Calibration, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind, NewCalibration,
     NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store, StoreError, StoredEvent,
-    StoredMachine, StoredRecording, StoredRun, Traced, salvage,
+    StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

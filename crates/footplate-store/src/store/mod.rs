@@ -13,6 +13,7 @@
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
 //! replays       how far a replay of all sessions came, so that the next one goes on from there
+//! unfinished    the session that was running when the program died
 //! salvage       what can still be read of a damaged file, into a new one
 //! ```
 
@@ -27,6 +28,7 @@ mod recordings;
 mod replays;
 mod row;
 mod salvage;
+mod unfinished;
 
 pub use calibrations::{Calibration, NewCalibration};
 pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};
@@ -38,3 +40,4 @@ pub use marks::{Mark, MarkKind};
 pub use recordings::{EventKey, Import, RecordingKey, RunKey};
 pub(crate) use replays::KeptReplay;
 pub use salvage::{Salvaged, SalvagedTable, salvage};
+pub use unfinished::UnfinishedSession;

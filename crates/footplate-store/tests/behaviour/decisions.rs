@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use footplate_core::{Event, EventKind, Timestamp, TrainId};
+use footplate_core::{Event, EventKind, SpeedStep, Timestamp, TrainId};
 use footplate_store::{Journal, JournalEntry, MachineKey, NewMachine, Side, Store, Traced, salvage};
 
 use crate::stores::{Shelf, minute};
@@ -77,4 +77,24 @@ fn a_beginning_that_was_changed_from_outside_is_noticed() {
     let other = rusqlite::Connection::open(shelf.path()).unwrap();
     other.execute_batch("DROP TRIGGER machines_are_not_changed; UPDATE machines SET body = '{}'").unwrap();
     assert!(!shelf.store().machines().unwrap()[0].is_whole);
+}
+
+#[test]
+fn a_session_without_an_end_is_unfinished_with_the_trains_that_were_commanded_to_run() {
+    let shelf = Shelf::new();
+    assert_eq!(shelf.store().unfinished_session().unwrap(), None);
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    for (train, step) in [(58, 4), (24, 8), (24, 0), (63, 0)] {
+        let (train, step) = (TrainId(train), SpeedStep::new(step).unwrap());
+        let event = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
+        journal.append(&[event], minute(0)).unwrap();
+    }
+    let unfinished = shelf.store().unfinished_session().unwrap().unwrap();
+    assert_eq!(unfinished.name, "evening");
+    assert_eq!(unfinished.trains, [TrainId(24), TrainId(58)]);
+    // It was told the end after all.
+    let end = Traced { kind: Cow::Borrowed("end"), ..traced(0) };
+    journal.append_all(&[JournalEntry::Traced(end)], minute(1)).unwrap();
+    assert_eq!(journal.end().unfinished_session().unwrap(), None);
 }

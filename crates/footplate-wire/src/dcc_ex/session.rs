@@ -51,6 +51,8 @@ pub struct Client {
     /// The time of the last entry of the recording: entries stay in order.
     last_entry: Timestamp,
     farewell: Farewell,
+    /// Whether all locomotives of the board are to be stopped next, those that cannot be commanded yet among them.
+    stops_all: bool,
     output: VecDeque<Transmit>,
 }
 
@@ -92,6 +94,7 @@ impl Client {
             blind_since: None,
             last_entry: now,
             farewell: Farewell::default(),
+            stops_all: false,
             output: VecDeque::new(),
         };
         client.go_on(now);
@@ -121,6 +124,9 @@ impl Client {
         if self.opening.awaits_banner() && !self.farewell.has_begun() {
             return None;
         }
+        if core::mem::take(&mut self.stops_all) {
+            return Some(Outgoing { request: Request::StopAll, awaited: None, command: None, tries: 1 });
+        }
         let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
         let may_stop = |command: &Command| {
             train_of(command).is_none_or(|train| {
@@ -133,6 +139,9 @@ impl Client {
         }
         if let Some(repeat) = self.next_repeat(now, true) {
             return Some(repeat);
+        }
+        if let Some(train) = self.without_direction_at_end() {
+            return Some(query(train));
         }
         if self.switch_off_is_due(now) {
             return Some(self.outgoing(Command::PowerOff));
@@ -378,6 +387,7 @@ impl Session for Client {
     fn close(&mut self, now: Timestamp) {
         if !self.farewell.has_begun() {
             self.farewell.begin(now);
+            self.keep_stops();
             self.waiting.clear();
             self.outstanding.clear();
             self.stop_driven();

@@ -347,6 +347,19 @@ fn the_end_is_confirmed_by_the_board() {
 }
 
 #[test]
+fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commanded() {
+    let mut desk = Desk::new(Settings::default());
+    desk.command(speed(T24, 0));
+    desk.client.close(desk.now);
+    desk.run_for(500);
+    let texts = desk.texts();
+    let end = texts.iter().position(|text| *text == "<!>").expect("all locomotives are stopped");
+    assert_eq!(texts[end..], ["<!>", "<t 24>", "<t 24 0 0>", "<0>"]);
+    let closing = desk.client.closing();
+    assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
+}
+
+#[test]
 fn what_was_not_confirmed_at_the_end_is_named() {
     let mut desk = Desk::opened();
     for command in [speed(T24, 8), speed(T58, 9)] {

@@ -41,6 +41,7 @@ use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{Beginnings, Referee};
 use super::Outcome;
+use super::left_running::stop_left_running;
 use super::predict::turnout_state;
 use super::serve::open_dashboard;
 use super::written_layout::WrittenLayout;
@@ -130,7 +131,12 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let written = self.layout()?;
         let layout = &written.layout;
+        // A person at the prompt lives in real time; a script need not.
+        let is_watched = self.script.is_none() || self.serve.is_some();
+        let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
+        let stop = |store: &Store| stop_left_running(&self.railway.link, layout, store, pace);
+        let opened = store.as_ref().map(stop).transpose()?.flatten();
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
         if let Some(simulated) = self.railway.link.simulated() {
             named.extend(&simulated.trains);
@@ -141,9 +147,6 @@ impl Arguments {
         )?;
         drop(store);
         let beginning = self.beginning(&written, known)?;
-        // A person at the prompt lives in real time; a script need not.
-        let is_watched = self.script.is_none() || self.serve.is_some();
-        let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let dashboard = self.dashboard(&written)?;
         match &self.railway.link {
             Address::Simulated(simulated) => {
@@ -153,7 +156,7 @@ impl Arguments {
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
             Address::Serial(_) | Address::Board(_) => {
-                let link = open(&self.railway.link, layout, pace)?;
+                let link = opened.map_or_else(|| open(&self.railway.link, layout, pace), Ok)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
         }

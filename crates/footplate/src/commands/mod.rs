@@ -13,6 +13,7 @@ mod demo;
 mod doctor;
 mod drive;
 mod layout;
+mod left_running;
 mod log_file;
 mod measure;
 mod odometry;

@@ -72,3 +72,24 @@ impl<L: Link + ?Sized> Link for Box<L> {
         (**self).reopen()
     }
 }
+
+impl<L: Link + ?Sized> Link for &mut L {
+    fn now(&self) -> Timestamp {
+        (**self).now()
+    }
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        (**self).write(bytes)
+    }
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        (**self).wait(until)
+    }
+    fn cts(&self) -> Option<bool> {
+        (**self).cts()
+    }
+    fn patience(&self) -> TimeSpan {
+        (**self).patience()
+    }
+    fn reopen(&mut self) -> Result<(), Lost> {
+        (**self).reopen()
+    }
+}

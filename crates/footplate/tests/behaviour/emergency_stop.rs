@@ -34,18 +34,21 @@ struct Load {
     orders: usize,
 }
 
-/// Passes bytes between the program and a board, and knows when the power was commanded off.
-struct Tap {
-    place: String,
+/// Passes bytes between the program and a board, and knows what was said, and when the power was commanded off.
+pub(crate) struct Tap {
+    pub(crate) place: String,
+    said: Arc<Mutex<String>>,
     off: Arc<Mutex<Vec<Instant>>>,
 }
 
 impl Tap {
-    fn before(board: &str) -> Self {
+    pub(crate) fn before(board: &str) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let place = listener.local_addr().expect("an address").to_string();
         let (board, off) = (board.to_owned(), Arc::default());
         let seen: Arc<Mutex<Vec<Instant>>> = Arc::clone(&off);
+        let said = Arc::<Mutex<String>>::default();
+        let text = Arc::clone(&said);
         thread::spawn(move || {
             let (mut program, _) = listener.accept().expect("the program");
             let mut station = TcpStream::connect(board).expect("the board");
@@ -59,6 +62,7 @@ impl Tap {
             let mut last = Vec::new();
             while let Ok(count @ 1..) = program.read(&mut bytes) {
                 last.extend_from_slice(&bytes[..count]);
+                text.lock().expect("no panic").push_str(&String::from_utf8_lossy(&bytes[..count]));
                 if last.windows(POWER_OFF.len()).any(|part| part == POWER_OFF) {
                     seen.lock().expect("no panic").push(Instant::now());
                     last.clear();
@@ -70,7 +74,12 @@ impl Tap {
             }
             let _ = station.shutdown(Shutdown::Both);
         });
-        Self { place, off }
+        Self { place, said, off }
+    }
+
+    /// All that the program said.
+    pub(crate) fn said(&self) -> String {
+        self.said.lock().expect("no panic").clone()
     }
 
     fn times(&self) -> Vec<Instant> {
@@ -79,13 +88,13 @@ impl Tap {
 }
 
 /// `footplate serve`, until it is dropped.
-struct Served {
+pub(crate) struct Served {
     child: Child,
     address: String,
 }
 
 impl Served {
-    fn with(store: &Path, link: &str) -> Self {
+    pub(crate) fn with(store: &Path, link: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
             .args(["serve", "0", "--layout", "track-a", "--train", "24", "--link", link, "--store"])
             .arg(store)
@@ -103,7 +112,7 @@ impl Served {
         Self { child, address }
     }
 
-    fn post(&self, path: &str, body: &str) -> String {
+    pub(crate) fn post(&self, path: &str, body: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).expect("a connection");
         send(&mut stream, &self.address, path, body).expect("an answer")
     }

@@ -14,6 +14,7 @@ mod forecasts_hold;
 mod inertial_slides;
 mod killed;
 mod layout;
+mod left_running;
 mod measure;
 mod odometer_on_scenarios;
 mod odometry;

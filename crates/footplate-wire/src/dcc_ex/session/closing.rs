@@ -1,6 +1,6 @@
 //! The end of a session: every train is stopped, then the power goes off, and the board has to confirm both.
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp};
+use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::Client;
 use crate::session::{Closing, Confirmation, LinkNotice};
@@ -43,6 +43,22 @@ impl Farewell {
 }
 
 impl Client {
+    /// Stops that wait are not dropped at the end. A train that was never driven here, as one that an earlier session left running,
+    /// cannot be commanded before the board has said how it faces: it is stopped with all others first.
+    pub(super) fn keep_stops(&mut self) {
+        let stop = |command: &Command| match command {
+            Command::Speed { train, step: SpeedStep::STAND } => Some(*train),
+            _ => None,
+        };
+        for train in self.waiting.iter().filter_map(stop) {
+            self.locomotives.know(train);
+            self.stops_all |= !self.locomotives.has_direction(train);
+            if let Some(locomotive) = self.locomotives.get_mut(train) {
+                locomotive.is_driven = true;
+            }
+        }
+    }
+
     /// Stops every train that ever had a speed.
     pub(super) fn stop_driven(&mut self) {
         for locomotive in self.locomotives.iter_mut().filter(|locomotive| locomotive.is_driven) {
@@ -53,6 +69,15 @@ impl Client {
         if let Farewell::SwitchingOff { .. } = self.farewell {
             self.farewell.begin(self.now);
         }
+    }
+
+    /// At the end, a train to be stopped of which the board has not said yet how it faces, and was not asked.
+    pub(super) fn without_direction_at_end(&self) -> Option<TrainId> {
+        let is_unasked = |train: &TrainId| {
+            !self.locomotives.has_direction(*train) && self.outstanding.blocks(*train, false).is_none()
+        };
+        let waits = matches!(self.farewell, Farewell::Stopping { .. });
+        self.locomotives.driven(false).into_iter().filter(|_| waits).find(is_unasked)
     }
 
     /// Whether it is time to switch the power off at the end; true once.

@@ -27,6 +27,7 @@ use self::watcher::Watcher;
 use super::picture;
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
@@ -118,7 +119,12 @@ impl Session<'_> {
                 self.drive(&written, link, output)
             }
             Address::Serial(_) | Address::Board(_) => {
-                self.drive(&written, open(self.link, &real, pace)?, output)
+                let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
+                let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
+                let opened = store.as_ref().map(stop).transpose()?.flatten();
+                drop(store);
+                let link = opened.map_or_else(|| open(self.link, &real, pace), Ok)?;
+                self.drive(&written, link, output)
             }
         }
     }

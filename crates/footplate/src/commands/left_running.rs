@@ -1,0 +1,50 @@
+//! Before a session begins: trains that an earlier one left running are stopped.
+//!
+//! A program that is killed stops nobody, and a station goes on sending what it was told last. The store knows such a session:
+//! it has no end.
+
+use footplate_core::track::Layout;
+use footplate_core::{Command, SpeedStep};
+use footplate_store::{Store, UnfinishedSession};
+use footplate_wire::Session;
+
+use crate::link::{Address, Link, Speed, open, open_session};
+use crate::runtime::Runtime;
+
+/// Opens the link and stops all trains if the newest session of the store has not ended. Gives back the link, which the session that
+/// begins goes on with; `None` where there is nothing to stop. A simulated railway is new each time.
+///
+/// # Errors
+/// The store cannot be read, or the link cannot be opened.
+pub(crate) fn stop_left_running<'l>(
+    address: &Address,
+    layout: &'l Layout,
+    store: &Store,
+    pace: Speed,
+) -> anyhow::Result<Option<Box<dyn Link + 'l>>> {
+    let Some(unfinished) = store.unfinished_session()?.filter(|_| address.simulated().is_none()) else {
+        return Ok(None);
+    };
+    eprintln!("{}", said(&unfinished));
+    let mut link = open(address, layout, pace)?;
+    let mut session = open_session(address, &link, layout)?;
+    for train in unfinished.trains {
+        let stop = Command::Speed { train, step: SpeedStep::STAND };
+        // Power off stops a train, too, that this station has no address for.
+        if let Err(error) = session.handle_command(link.now(), stop) {
+            eprintln!("train {train}: {error}");
+        }
+    }
+    let closing = Runtime::new(&mut link, session, None, None).close();
+    eprintln!("{closing}");
+    Ok(Some(link))
+}
+
+fn said(unfinished: &UnfinishedSession) -> String {
+    let UnfinishedSession { name, trains } = unfinished;
+    let trains = trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let which = if trains.is_empty() { String::new() } else { format!(" (trains {trains})") };
+    format!(
+        "the session `{name}` has not ended, so its trains may be running: stopping all trains{which} first"
+    )
+}
