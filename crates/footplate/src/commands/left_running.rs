@@ -43,8 +43,6 @@ pub(crate) fn stop_left_running<'l>(
 fn said(unfinished: &UnfinishedSession) -> String {
     let UnfinishedSession { name, trains } = unfinished;
     let trains = trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let which = if trains.is_empty() { String::new() } else { format!(" (trains {trains})") };
-    format!(
-        "the session `{name}` has not ended, so its trains may be running: stopping all trains{which} first"
-    )
+    let which = if trains.is_empty() { String::new() } else { format!("; commanded to run in it: {trains}") };
+    format!("the session `{name}` has not ended, so its trains may be running: all are stopped first{which}")
 }
