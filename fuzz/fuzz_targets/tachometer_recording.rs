@@ -4,7 +4,7 @@
 
 use std::io::{self, Read};
 
-use footplate_core::wheels::Period;
+use footplate_core::odometry::wheels::Period;
 use footplate_store::{TachometerBlock, TachometerReader};
 use libfuzzer_sys::fuzz_target;
 

@@ -14,8 +14,8 @@ mod nalgebra_peer;
 mod rounds;
 
 use footplate_core::TimeSpan;
-use footplate_core::estimation::odometry::{MotionEstimate, Odometer, OdometrySettings};
-use footplate_core::wheels::Period;
+use footplate_core::odometry::wheels::Period;
+use footplate_core::odometry::{MotionEstimate, Odometer, OdometrySettings};
 
 use crate::operation::Operation;
 pub use rounds::{Load, PERIOD_S, Round};

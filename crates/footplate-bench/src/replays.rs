@@ -7,8 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
-use footplate_core::estimation::{Hit, Predictor};
 use footplate_core::track::Layout;
+use footplate_core::tracking::{Hit, Predictor};
 use footplate_store::score::LEVELS;
 use footplate_store::{LogContext, Run, built_in, read_sensor_log};
 

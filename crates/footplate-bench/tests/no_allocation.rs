@@ -1,7 +1,7 @@
 //! Once it is made, an odometer allocates nothing, whatever the wheelsets do.
 
 use footplate_bench::odometry::{Load, Round, Run};
-use footplate_core::estimation::odometry::OdometrySettings;
+use footplate_core::odometry::OdometrySettings;
 
 #[test]
 fn a_period_of_odometry_allocates_nothing() {

@@ -1,7 +1,7 @@
 //! What is timed as rolling, sliding and correcting is that.
 
 use footplate_bench::odometry::{Load, Round, Run};
-use footplate_core::estimation::odometry::{Mode, OdometrySettings};
+use footplate_core::odometry::{Mode, OdometrySettings};
 
 /// Parts of a round, the second one, that the odometer spends in a mode.
 fn part(load: Load, mode: Mode) -> f64 {

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use footplate_core::calibration::ShortMoveFit;
+use footplate_core::model::report::ShortMoveFit;
 use footplate_core::{Length, TimeSpan};
 
 /// How far the train got (mm) when the stop was commanded after 0.25 s, 0.5 s and so on.

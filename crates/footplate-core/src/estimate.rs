@@ -1,6 +1,6 @@
 //! A number with its uncertainty: the type in which numbers travel.
 //!
-//! It stands in the lowest layer, not in `estimation`, because calibration, kinematics and the files below
+//! It stands in the lowest layer, not in `tracking`, because the model, kinematics and the files below
 //! the filters all pass it on.
 
 use crate::time::Timestamp;

@@ -5,10 +5,10 @@
 //! or from its own folder (checked by `tests/architecture/`):
 //!
 //! ```text
-//! control        when to tell the trains what: calibration that plans itself, exact stops
-//! estimation     what the next report will be, learnt from the last
-//! calibration    speeds, laws of speed change, stops, edge lengths: numbers with uncertainty
-//! kinematics  latency  track  wheels
+//! control        drives trains: plans stops, dispatches, supervises, learns
+//! tracking  odometry
+//! model          how one train answers its commands, with uncertainty, and how that is learnt
+//! kinematics  link  track
 //! event
 //! units  time  ids  linalg  estimate
 //! ```
@@ -20,19 +20,19 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
-pub mod calibration;
 pub mod control;
 mod estimate;
-pub mod estimation;
 mod event;
 mod ids;
 pub mod kinematics;
-pub mod latency;
 pub mod linalg;
+pub mod link;
+pub mod model;
+pub mod odometry;
 mod time;
 pub mod track;
+pub mod tracking;
 mod units;
-pub mod wheels;
 
 pub use estimate::{Estimate, HALF_95};
 pub use event::{Approach, Command, Event, EventKind, Report};

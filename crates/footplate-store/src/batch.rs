@@ -1,7 +1,8 @@
 //! Recordings in, motion models out: gathers the runs of recordings, or of a store at a date, and fits every train.
 
-use footplate_core::calibration::{Review, RunPassages, SectionIndex};
-use footplate_core::latency::{PollTiming, PollTimingEstimator};
+use footplate_core::link::{PollTiming, PollTimingEstimator};
+use footplate_core::model::report::{Review, RunPassages};
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::Layout;
 use footplate_core::{Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 

@@ -12,9 +12,10 @@ mod fingerprint;
 mod run_reader;
 
 use fingerprint::Fingerprint;
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, StepUse};
-use footplate_core::latency::PollTimingEstimator;
+use footplate_core::link::PollTimingEstimator;
+use footplate_core::model::MotionFit;
+use footplate_core::model::StepUse;
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use run_reader::RunReader;

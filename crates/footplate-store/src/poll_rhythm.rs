@@ -1,6 +1,6 @@
 //! The rhythm of the link of a recording, found in all its reports.
 
-use footplate_core::latency::PollTimingEstimator;
+use footplate_core::link::PollTimingEstimator;
 use footplate_core::{Event, EventKind, Timestamp};
 
 /// Learns the rhythm in which a link was polled from the runs of its recording.

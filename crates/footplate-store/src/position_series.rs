@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use footplate_core::calibration::motion::{PositionPoint, SeriesError, SeriesFit};
+use footplate_core::model::report::{PositionPoint, SeriesError, SeriesFit};
 use footplate_core::{Length, TimeSpan};
 
 use crate::decimal::scaled;

@@ -4,7 +4,7 @@
 //! ([`MotionModel::for_later_session`]); the other's own uncertainty comes on top. If both are stated truly, differences in
 //! these standard deviations have a root mean square of one.
 
-use footplate_core::calibration::motion::MotionModel;
+use footplate_core::model::MotionModel;
 use footplate_core::{Approach, SpeedStep, TrainId};
 
 use crate::batch::{Batch, BatchTrain};

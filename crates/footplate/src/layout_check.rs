@@ -1,7 +1,7 @@
 //! Recordings beside the layout that a person says they are of: refused if they are of another one.
 
 use anyhow::bail;
-use footplate_core::calibration::{LayoutTest, SectionIndex, SurveyTest};
+use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
 use footplate_core::{Event, Length, SensorId};
 use footplate_store::{BUILT_IN, Run, built_in};

@@ -1,6 +1,6 @@
 //! The federated filter of the odometer alone, fed with the two speeds and their mean.
 
-use footplate_core::estimation::odometry::{FederatedFilter, Fusion, MeasuredSpeed, MotionStep};
+use footplate_core::odometry::paper::{FederatedFilter, Fusion, MeasuredSpeed, MotionStep};
 
 use super::PERIOD_S;
 use crate::operation::Operation;

@@ -3,7 +3,7 @@
 
 use core::f64::consts::PI;
 
-use footplate_core::wheels::{Axle, Count, Period, Vehicle, WheelReading, Wheelset};
+use footplate_core::odometry::wheels::{Axle, Count, Period, Vehicle, WheelReading, Wheelset};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 
 /// Length of an odometry period (s).

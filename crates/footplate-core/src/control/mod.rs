@@ -7,17 +7,17 @@
 //! - [`Dispatcher`] sends trains where they are asked to go, and keeps them apart.
 //! - [`Watchdog`] watches over that, and begins from the beginning when the future is no longer like the past.
 
-pub mod calibrate;
 mod dispatch;
 mod drive;
+pub mod learn;
 mod machine;
-mod watch;
+mod supervise;
 
-pub use calibrate::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Journey, Reservation, Span, TrainLengths};
 pub use drive::{
     Achieved, Aim, ArrivalProfile, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine,
     PlannedArrival, PlannedStop, Promise, Refusal, StopOrder,
 };
+pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use machine::{Machine, Output};
-pub use watch::{Alarm, LinkNews, Outcome, Watchdog, WatchdogNotice};
+pub use supervise::{Alarm, LinkNews, Outcome, Watchdog, WatchdogNotice};

@@ -12,9 +12,9 @@ const SIMULATOR: &str = "crates/footplate-sim/src/";
 /// From top to bottom, as in the documentation of core's `lib.rs`.
 const ROWS: [&[&str]; 6] = [
     &["control"],
-    &["estimation"],
-    &["calibration"],
-    &["kinematics", "latency", "track", "wheels"],
+    &["tracking", "odometry"],
+    &["model"],
+    &["kinematics", "link", "track"],
     &["event"],
     &["units", "time", "ids", "linalg", "estimate"],
 ];

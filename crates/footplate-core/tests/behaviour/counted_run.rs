@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use footplate_core::estimation::odometry::LocalFilter;
+use footplate_core::odometry::paper::LocalFilter;
 
 use crate::draw::Draw;
 

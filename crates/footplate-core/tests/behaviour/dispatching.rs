@@ -3,13 +3,13 @@
 
 use std::sync::OnceLock;
 
-use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
     DispatchNotice, Dispatcher, Driver, Journey, LinkNews, Machine, Order, Output, Refusal, Reservation,
     TrainLengths, WatchdogNotice,
 };
-use footplate_core::estimation::WayPoint;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position};
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};

@@ -3,7 +3,7 @@
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
-use footplate_core::estimation::WayPoint;
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Command, Length, Ratio, SensorId, TrainId, TurnoutId};
 
 use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};

@@ -3,10 +3,10 @@
 
 use std::sync::OnceLock;
 
-use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{Aim, DriveNotice, Driver, Machine, Order, Output, Refusal, StopOrder};
-use footplate_core::estimation::WayPoint;
+use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
+use footplate_core::tracking::WayPoint;
 use footplate_core::{
     Command, Event, EventKind, Length, NodeId, Ratio, Report, SensorId, Speed, SpeedStep, TimeSpan,
     Timestamp, TrainId, TurnoutId,

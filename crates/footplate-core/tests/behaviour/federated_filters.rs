@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use footplate_core::estimation::odometry::{
+use footplate_core::odometry::paper::{
     FederatedFilter, Fusion, Manoeuvre, ManoeuvreSettings, MeasuredSpeed, Sharing,
 };
 

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use footplate_core::estimation::odometry::inertial::{
+use footplate_core::odometry::inertial::{
     AccelerationBlock, BlockAverage, DriftLimits, InertialBounds, InertialFilter, InertialLimits,
     InertialNoise, Standing, StandstillDetector, TripRecorder,
 };

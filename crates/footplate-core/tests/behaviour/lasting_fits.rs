@@ -1,7 +1,7 @@
 //! A model that learns for long stays true: surprises cost what they are worth, and old trips become a prior.
 
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::MotionFit;
+use footplate_core::model::MotionFit;
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::{Approach, Command, EdgeId, Event, EventKind, Length, SpeedStep, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, step, straight};

@@ -1,7 +1,7 @@
 //! The adaptive motion model follows a train by the counts of one wheel: what the published recipe makes of the
 //! moment when the train begins to accelerate, and what its repairs make of it.
 
-use footplate_core::estimation::odometry::{
+use footplate_core::odometry::paper::{
     ErrorGrowth, Liveliness, LocalFilter, Manoeuvre, ManoeuvreSettings, MeasuredSpeed,
 };
 

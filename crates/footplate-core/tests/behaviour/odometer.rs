@@ -2,8 +2,8 @@
 
 #![expect(clippy::expect_used, reason = "the vehicle of a test is one")]
 
-use footplate_core::estimation::odometry::{Mode, MotionEstimate, Odometer, OdometrySettings, WheelState};
-use footplate_core::wheels::{Axle, Count, Direction, Period, Vehicle, WheelReading, Wheelset};
+use footplate_core::odometry::wheels::{Axle, Count, Direction, Period, Vehicle, WheelReading, Wheelset};
+use footplate_core::odometry::{Mode, MotionEstimate, Odometer, OdometrySettings, WheelState};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 use proptest::prelude::*;
 

@@ -239,7 +239,7 @@ fn a_limit_below_the_slowest_step_is_run_at_that() {
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(12) }).expect("a step");
     world.run(&mut driver, 5.0);
     let slowest = (1..=14).filter_map(SpeedStep::new).find(|step| {
-        driver.model(TRAIN).expect("known").uses(*step) == footplate_core::calibration::motion::StepUse::Moves
+        driver.model(TRAIN).expect("known").uses(*step) == footplate_core::model::StepUse::Moves
     });
     assert_eq!(Some(driver.commanded(TRAIN)), slowest);
 }

@@ -10,9 +10,10 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;
 
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Driver, Finished, Machine, Output};
+use footplate_core::model::MotionFit;
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{
     Layout, LayoutPlan, Leg, Place, Position, RailEnd, Stretch, Survey, TurnoutStates,
 };
@@ -399,7 +400,7 @@ pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, pla
     driver.add_train(MotionModel::from_numbers(&numbers).expect("the same numbers"));
     if let Some((node, mm)) = place {
         let node = world.layout.node_named(node).expect("a node");
-        let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(mm) };
+        let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
         driver.place(world.now, TrainId(train), at, Length::from_mm(2.0));
     }
 }
@@ -412,7 +413,7 @@ pub(crate) fn driver_of(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     let train = model.train();
     driver.add_train(model);
     let node = world.layout.node_named(node).expect("a node");
-    let at = footplate_core::estimation::WayPoint { node, way: Length::from_mm(mm) };
+    let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
     driver.place(world.now, train, at, Length::from_mm(2.0));
     driver
 }

@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::MotionModel;
-use footplate_core::estimation::{Locator, TrackContext, WayPoint};
-use footplate_core::latency::ContactWindow;
+use footplate_core::link::ContactWindow;
+use footplate_core::model::MotionModel;
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::tracking::{Locator, TrackContext, WayPoint};
 use footplate_core::{Approach, Command, EventKind, Length, Speed, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, known_model, step, straight};
@@ -86,7 +86,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
             }
             let located = locator.locate(context, model(), world.now).unwrap();
             // The toy's contacts are where the layout says, so that its ways are the layout's.
-            let here = footplate_core::estimation::place_of(context, model(), located.at).unwrap();
+            let here = footplate_core::tracking::place_of(context, model(), located.at).unwrap();
             let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
             let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
             let off = ahead.min(behind);
@@ -148,7 +148,7 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
         }
         let error = |locator: &Locator| {
             let located = locator.locate(context, model(), world.now).unwrap();
-            let here = footplate_core::estimation::place_of(context, model(), located.at).unwrap();
+            let here = footplate_core::tracking::place_of(context, model(), located.at).unwrap();
             let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
             let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
             let inside = ahead.min(behind) < 1.96 * located.uncertainty;

@@ -1,7 +1,7 @@
 //! Wheel diameters are learnt from balises, the truth never leaves its interval, and a wrong balise harms nothing.
 
-use footplate_core::calibration::{BaliseAccuracy, PairVerdict, WheelDiameters, WheelScale};
-use footplate_core::wheels::{Axle, Wheelset};
+use footplate_core::odometry::diameter::{BaliseAccuracy, PairVerdict, WheelDiameters, WheelScale};
+use footplate_core::odometry::wheels::{Axle, Wheelset};
 use footplate_core::{Length, Timestamp};
 use proptest::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Whether thresholds hold on days that they were not chosen by: they are fitted on all days but one and scored on that one.
 
-use footplate_core::estimation::odometry::inertial::StandstillThresholds;
+use footplate_core::odometry::inertial::StandstillThresholds;
 
 use super::recording::AccelerometerRecording;
 use super::ride::AccelerometerRide;

@@ -3,7 +3,7 @@
 //! Twice: the first time with the axis that changes most, to see departures, from which follows which direction is forward; the
 //! second time along that.
 
-use footplate_core::estimation::odometry::inertial::{
+use footplate_core::odometry::inertial::{
     AxisAlignment, BlockAverage, DriftLimits, ForwardAxis, HighPassRestorer, Standing, StandstillDetector,
     StandstillThresholds, Trip, TripRecorder,
 };
@@ -105,7 +105,7 @@ fn drift(form: SensorForm) -> DriftLimits {
 fn along(
     recording: &AccelerometerRecording,
     axis: ForwardAxis,
-    mut take: impl FnMut(footplate_core::estimation::odometry::inertial::AccelerationBlock),
+    mut take: impl FnMut(footplate_core::odometry::inertial::AccelerationBlock),
 ) {
     let forgets = if recording.form == SensorForm::WithoutGravity { FORGETS_WITHIN_S } else { 0.0 };
     let mut restorer = HighPassRestorer::new(TimeSpan::from_s(forgets));

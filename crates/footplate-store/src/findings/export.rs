@@ -1,10 +1,10 @@
 //! From a batch to its report.
 
 use footplate_core::TimeSpan;
-use footplate_core::calibration::{
+use footplate_core::kinematics::SpeedLaw;
+use footplate_core::model::report::{
     Constant, Direction, FittedLaw, LawComparison, LawKind, SettledPassage, TapedStop,
 };
-use footplate_core::kinematics::SpeedLaw;
 use footplate_core::track::Layout;
 
 use super::form::{

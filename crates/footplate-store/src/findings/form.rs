@@ -1,6 +1,6 @@
 //! What stands in the report of a batch.
 
-use footplate_core::calibration::{Direction, LawKind};
+use footplate_core::model::report::{Direction, LawKind};
 use footplate_core::{SpeedStep, TrainId};
 use serde::Serialize;
 

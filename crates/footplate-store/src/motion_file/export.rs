@@ -1,7 +1,7 @@
 //! From a motion model to its file, and back.
 
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionModel, MotionNumbers, NumbersError, StepUse};
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MotionModel, MotionNumbers, NumbersError, StepUse};
 use footplate_core::track::{Hop, Layout};
 use footplate_core::{Approach, Length, SpeedStep, Timestamp};
 

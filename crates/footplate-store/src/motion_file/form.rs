@@ -36,7 +36,7 @@ pub struct MotionFile {
     pub exact: ExactForm,
 }
 
-/// The numbers of a model to the last bit ([`MotionNumbers`](footplate_core::calibration::motion::MotionNumbers)); what
+/// The numbers of a model to the last bit ([`MotionNumbers`](footplate_core::model::MotionNumbers)); what
 /// stands above follows from them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExactForm {

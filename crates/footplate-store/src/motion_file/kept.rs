@@ -1,6 +1,6 @@
 //! The motion model that a store holds of a train, if this program can use it.
 
-use footplate_core::calibration::motion::MotionModel;
+use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 

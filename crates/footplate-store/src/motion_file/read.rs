@@ -167,7 +167,7 @@ impl MotionFile {
 #[cfg(test)]
 mod tests {
     use footplate_core::SpeedStep;
-    use footplate_core::calibration::motion::MotionModel;
+    use footplate_core::model::MotionModel;
 
     use super::*;
 

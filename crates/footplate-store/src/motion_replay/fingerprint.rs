@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use footplate_core::latency::PollTiming;
+use footplate_core::link::PollTiming;
 use footplate_core::track::Layout;
 use footplate_core::{SpeedStep, TrainId};
 

@@ -1,8 +1,8 @@
 //! From the raw events of a run to what a fit is given of one train: its commands, and the contacts it passed with the
 //! interval in which each closed.
 
-use footplate_core::calibration::STALE_WITHIN;
-use footplate_core::latency::{ContactWindow, PollTiming};
+use footplate_core::link::{ContactWindow, PollTiming};
+use footplate_core::model::STALE_WITHIN;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 /// A train that runs and is told one step more when no contact and no command has been for so long was pushed: it had not come

@@ -1,6 +1,6 @@
 //! What the counts of one period say by themselves: how far each wheel has rolled, and how long that took.
 
-use footplate_core::wheels::{Count, Direction, Period, Vehicle, WheelReading};
+use footplate_core::odometry::wheels::{Count, Direction, Period, Vehicle, WheelReading};
 use footplate_core::{Length, TimeSpan, Timestamp};
 
 /// Widths of running counters (bits), from the narrowest that is built.

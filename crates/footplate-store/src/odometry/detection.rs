@@ -3,7 +3,7 @@
 //! The truth is the speed of the wheel, where the recording has it; otherwise what the wheel counted, over enough
 //! periods for a pulse to weigh little, against how fast the train really ran.
 
-use footplate_core::estimation::odometry::WheelState;
+use footplate_core::odometry::WheelState;
 use footplate_core::{Length, Speed, TimeSpan, Timestamp};
 
 use super::counted_way::CountedWay;

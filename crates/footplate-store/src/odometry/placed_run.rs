@@ -1,10 +1,8 @@
 //! The distance of a run by places of stated accuracy, and the wheel scales that follow.
 
 use footplate_core::Length;
-use footplate_core::estimation::odometry::{
-    Mode, MotionBounds, MotionEstimate, PlacedValue, StatedPlaces, WheelState,
-};
-use footplate_core::wheels::{Period, Vehicle};
+use footplate_core::odometry::wheels::{Period, Vehicle};
+use footplate_core::odometry::{Mode, MotionBounds, MotionEstimate, PlacedValue, StatedPlaces, WheelState};
 
 use super::counted_way::WayCounter;
 

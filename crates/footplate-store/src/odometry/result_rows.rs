@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_core::estimation::odometry::{Mode, MotionEstimate, WheelState};
+use footplate_core::odometry::{Mode, MotionEstimate, WheelState};
 
 use crate::written_table::{Cell, CsvTable, Kind, TableForm, TableWriter};
 
@@ -147,7 +147,7 @@ const fn mode_word(mode: Mode) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use footplate_core::estimation::odometry::MotionBounds;
+    use footplate_core::odometry::MotionBounds;
     use footplate_core::{Acceleration, Length, Speed, Timestamp};
 
     use super::*;

@@ -1,6 +1,6 @@
 //! What others make of the same counts, to hold our estimates against.
 
-use footplate_core::wheels::Vehicle;
+use footplate_core::odometry::wheels::Vehicle;
 use footplate_core::{Length, Speed, TimeSpan};
 
 use super::counted_way::CountedWay;
@@ -94,7 +94,7 @@ impl RivalOdometer {
 #[cfg(test)]
 mod tests {
     use footplate_core::Timestamp;
-    use footplate_core::wheels::Period;
+    use footplate_core::odometry::wheels::Period;
 
     use super::super::counted_way::WayCounter;
     use super::*;

@@ -1,11 +1,9 @@
 //! One run of a train through the odometer.
 
 use footplate_core::Estimate;
-use footplate_core::calibration::WheelScale;
-use footplate_core::estimation::odometry::{
-    DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue,
-};
-use footplate_core::wheels::{Period, Vehicle, VehicleError};
+use footplate_core::odometry::diameter::WheelScale;
+use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError};
+use footplate_core::odometry::{DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
 
 use super::counted_way::WayCounter;
 use super::detection::{FlagWatch, SlipWatch};

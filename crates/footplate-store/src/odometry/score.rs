@@ -1,6 +1,6 @@
 //! How good an odometer was, measured against the truth.
 
-use footplate_core::estimation::odometry::{distance_tolerance, speed_tolerance};
+use footplate_core::odometry::{distance_tolerance, speed_tolerance};
 use footplate_core::{Length, Speed};
 
 use crate::tachometer::Truth;

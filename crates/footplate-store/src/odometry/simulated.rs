@@ -1,6 +1,6 @@
 //! Simulated runs as odometers and recordings know them: what is believed of the train, what was read, and the truth.
 
-use footplate_core::wheels::{
+use footplate_core::odometry::wheels::{
     Axle, BrakeCommand, Count, Direction, Period, Vehicle, VehicleError, WheelReading, Wheelset,
 };
 use footplate_sim::line::{

@@ -1,6 +1,6 @@
 //! What a run comes to, without any truth.
 
-use footplate_core::estimation::odometry::{Mode, MotionEstimate, WheelState};
+use footplate_core::odometry::{Mode, MotionEstimate, WheelState};
 use footplate_core::{Speed, TimeSpan, Timestamp};
 use serde::Serialize;
 

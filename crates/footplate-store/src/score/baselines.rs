@@ -8,9 +8,9 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::calibration::ShiftAverage;
-use footplate_core::estimation::{Hit, Phase, Verdict};
+use super::shift_average::ShiftAverage;
 use footplate_core::track::{HopId, Reach};
+use footplate_core::tracking::{Hit, Phase, Verdict};
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::rival::BASELINES;

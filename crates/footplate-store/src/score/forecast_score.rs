@@ -100,9 +100,9 @@ fn quantile(sorted: &[f64], part: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use footplate_core::calibration::{Drive, Passage};
-    use footplate_core::estimation::{Forecast, Hit, Phase, Verdict};
-    use footplate_core::latency::{ContactWindow, UniformNormal};
+    use footplate_core::link::{ContactWindow, UniformNormal};
+    use footplate_core::model::{Drive, Passage};
+    use footplate_core::tracking::{Forecast, Hit, Phase, Verdict};
     use footplate_core::{NodeId, RunId, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
     use super::*;

@@ -15,6 +15,7 @@ mod replay;
 mod rival;
 mod scored_hit;
 mod scorer;
+mod shift_average;
 
 pub use baselines::Baselines;
 pub use comparison::{Comparison, RivalScore};

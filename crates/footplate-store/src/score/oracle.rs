@@ -11,10 +11,11 @@
 //! Both are fitted to the very hits that they forecast, so short recordings flatter them: a run of ten hits has
 //! one speed and a part of ten lengths of its own.
 
-use footplate_core::calibration::motion::MotionModel;
-use footplate_core::calibration::{Drive, SectionIndex};
-use footplate_core::estimation::{Hit, Phase, Predictor, TrainForecaster};
+use footplate_core::model::Drive;
+use footplate_core::model::MotionModel;
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::Layout;
+use footplate_core::tracking::{Hit, Phase, Predictor, TrainForecaster};
 use footplate_core::{Length, Speed, SpeedStep, TimeSpan, Timestamp};
 
 use super::replay::{ReplayContext, ReplayError, replay_run};

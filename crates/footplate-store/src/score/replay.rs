@@ -1,7 +1,7 @@
 //! Walking a recorded run through the estimator, entry by entry.
 
-use footplate_core::estimation::{Hit, Predictor};
 use footplate_core::track::{Layout, Leg};
+use footplate_core::tracking::{Hit, Predictor};
 use footplate_core::{Event, EventKind, RunId, Timestamp, TrainId, TurnoutId};
 
 use crate::recording::{RawEvent, Run};

@@ -1,6 +1,6 @@
 //! One passage of a contact, with everything that was forecast of it.
 
-use footplate_core::estimation::{Hit, Phase};
+use footplate_core::tracking::{Hit, Phase};
 use footplate_core::{RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::rival::Rival;

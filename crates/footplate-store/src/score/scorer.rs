@@ -1,8 +1,8 @@
 //! Walks a recording once with everybody side by side.
 
 use footplate_core::TrainId;
-use footplate_core::estimation::{Predictor, TrainForecaster};
 use footplate_core::track::Layout;
+use footplate_core::tracking::{Predictor, TrainForecaster};
 
 use super::baselines::Baselines;
 use super::comparison::Comparison;

@@ -1,6 +1,6 @@
 //! Some rows of a recording, column by column.
 
-use footplate_core::wheels::{Count, Direction, Period, WheelReading};
+use footplate_core::odometry::wheels::{Count, Direction, Period, WheelReading};
 use footplate_core::{Acceleration, Length, Speed, Timestamp};
 
 use super::columns::{Quantity, TachometerColumns};

@@ -6,7 +6,7 @@
 
 use super::block::MISSING;
 use super::run_names::RunNames;
-use footplate_core::wheels::Direction;
+use footplate_core::odometry::wheels::Direction;
 
 const DECIMALS_OF_NS: usize = 9;
 const POWERS_OF_TEN: [u64; DECIMALS_OF_NS + 1] =

@@ -2,7 +2,7 @@
 //! would be right.
 
 use footplate_core::Timestamp;
-use footplate_core::wheels::Direction;
+use footplate_core::odometry::wheels::Direction;
 
 use super::block::{MISSING, TachometerBlock};
 use super::columns::{Quantity, Slot, TachometerColumns};

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use footplate_core::wheels::Direction;
+use footplate_core::odometry::wheels::Direction;
 use footplate_core::{TimeSpan, Timestamp};
 use parquet::basic::{LogicalType, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};

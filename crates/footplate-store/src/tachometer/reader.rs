@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use footplate_core::wheels::Vehicle;
+use footplate_core::odometry::wheels::Vehicle;
 
 use super::block::TachometerBlock;
 use super::columns::TachometerColumns;

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_core::wheels::{Count, Direction, Period, WheelReading};
+use footplate_core::odometry::wheels::{Count, Direction, Period, WheelReading};
 use footplate_core::{Acceleration, Length, Speed};
 
 use super::block::Truth;

@@ -17,7 +17,7 @@ pub fn default_vehicle() -> Result<VehicleFile, VehicleFileError> {
 #[cfg(test)]
 mod tests {
     use footplate_core::Acceleration;
-    use footplate_core::wheels::{Axle, BrakeCommand};
+    use footplate_core::odometry::wheels::{Axle, BrakeCommand};
 
     use super::*;
 

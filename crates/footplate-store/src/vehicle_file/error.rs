@@ -2,7 +2,7 @@
 
 use std::io;
 
-use footplate_core::wheels::VehicleError;
+use footplate_core::odometry::wheels::VehicleError;
 
 use crate::layout_file::TextPlace;
 

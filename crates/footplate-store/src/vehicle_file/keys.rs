@@ -1,6 +1,6 @@
 //! The optional keys of a vehicle file, and where each of them stands in the vehicle.
 
-use footplate_core::wheels::{BrakeCommand, SlideProtection, Thresholds};
+use footplate_core::odometry::wheels::{BrakeCommand, SlideProtection, Thresholds};
 use footplate_core::{Acceleration, Speed, TimeSpan};
 
 /// One key of a table of numbers.

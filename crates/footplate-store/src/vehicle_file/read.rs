@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use footplate_core::wheels::{Axle, SlideProtection, Vehicle, VehicleError, Wheelset};
+use footplate_core::odometry::wheels::{Axle, SlideProtection, Vehicle, VehicleError, Wheelset};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use footplate_core::Acceleration;
-use footplate_core::wheels::{Axle, BrakeCommand, Thresholds};
+use footplate_core::odometry::wheels::{Axle, BrakeCommand, Thresholds};
 
 use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
 use super::read::VehicleFile;
@@ -75,7 +75,7 @@ mod tests {
     use super::super::{VehicleFile, default_vehicle};
     use super::*;
     use footplate_core::TimeSpan;
-    use footplate_core::wheels::SlideProtection;
+    use footplate_core::odometry::wheels::SlideProtection;
 
     #[test]
     fn what_is_written_reads_back_as_the_same_vehicle() {

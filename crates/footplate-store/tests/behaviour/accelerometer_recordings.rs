@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use footplate_core::estimation::odometry::inertial::StandstillThresholds;
+use footplate_core::odometry::inertial::StandstillThresholds;
 use footplate_store::accelerometer::{
     AccelerometerRecording, AccelerometerRide, SensorForm, StandingScore, StopMarks, leave_one_out,
 };

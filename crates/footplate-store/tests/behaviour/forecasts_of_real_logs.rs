@@ -1,6 +1,6 @@
 //! How near forecasts come on the recordings of real trains: true numbers, not that two walks agree.
 
-use footplate_core::estimation::Phase;
+use footplate_core::tracking::Phase;
 use footplate_store::built_in;
 use footplate_store::score::{
     Comparison, Knowledge, ReplayContext, Rival, ScoredHit, ScoredRecording, score_recording,

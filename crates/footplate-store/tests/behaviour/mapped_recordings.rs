@@ -1,6 +1,6 @@
 //! Recordings of other programs are read by a mapping of their columns, and refused with what would be right.
 
-use footplate_core::wheels::{Count, Direction, Vehicle};
+use footplate_core::odometry::wheels::{Count, Direction, Vehicle};
 use footplate_core::{Length, Speed};
 use footplate_store::{
     ColumnMapping, TachometerBlock, TachometerError, TachometerOddity, TachometerReader, default_vehicle,

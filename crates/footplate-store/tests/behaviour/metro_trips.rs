@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use footplate_core::estimation::odometry::inertial::{
+use footplate_core::odometry::inertial::{
     AccelerationBlock, AxisAlignment, BlockAverage, DriftLimits, ForwardAxis, HighPassRestorer, Standing,
     StandstillDetector, Trip, TripRecorder,
 };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use footplate_core::estimation::Verdict;
+use footplate_core::tracking::Verdict;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::score::{Knowledge, ReplayContext, ReplayError, Rival, ScoredHit, score_recording};
 use footplate_store::{LogContext, Recording, parse_layout, parse_sensor_log};

@@ -3,7 +3,7 @@
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use footplate_core::wheels::{Count, Direction, Period, WheelReading};
+use footplate_core::odometry::wheels::{Count, Direction, Period, WheelReading};
 use footplate_core::{Acceleration, Length, Speed, Timestamp};
 use footplate_store::{
     RowPlace, TachometerBlock, TachometerError, TachometerNote, TachometerOddity, TachometerReader, Truth,

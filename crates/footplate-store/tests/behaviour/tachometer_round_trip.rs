@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
-use footplate_core::estimation::odometry::MotionEstimate;
-use footplate_core::wheels::{Count, Direction, Period, WheelReading};
+use footplate_core::odometry::MotionEstimate;
+use footplate_core::odometry::wheels::{Count, Direction, Period, WheelReading};
 use footplate_core::{Acceleration, Length, Speed, Timestamp};
 use footplate_store::odometry::{OdometryRun, Preset, RunContext};
 use footplate_store::{

@@ -1,6 +1,6 @@
 //! A vehicle file that is wrong is refused with line, column, value and what would be right; none makes us panic.
 
-use footplate_core::wheels::{Axle, Thresholds};
+use footplate_core::odometry::wheels::{Axle, Thresholds};
 use footplate_core::{Acceleration, TimeSpan};
 use footplate_store::{DEFAULT_VEHICLE, parse_vehicle, write_vehicle};
 use proptest::prelude::{any, prop, prop_assert, prop_assert_eq, proptest};

@@ -1,9 +1,9 @@
 //! What is not as it should be, with which of the sentences of the pages says it.
 
-use footplate_core::calibration::Drift;
-use footplate_core::control::calibrate::Mishap;
+use footplate_core::control::learn::Mishap;
 use footplate_core::control::{Alarm as Noticed, DispatchNotice, DriveNotice, WatchdogNotice};
 use footplate_core::track::Layout;
+use footplate_core::tracking::Drift;
 use footplate_core::{HALF_95, Length, TrainId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use footplate_core::TrainId;
-use footplate_core::calibration::motion::MotionModel;
+use footplate_core::model::MotionModel;
 use serde::Serialize;
 use serde_json::json;
 use tokio::sync::{oneshot, watch};

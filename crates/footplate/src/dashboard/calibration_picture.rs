@@ -1,7 +1,7 @@
 //! What a calibration is about: the experiment and why it, the time that is left, and how well stops are known by now.
 
 use footplate_core::Approach;
-use footplate_core::control::calibrate::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
+use footplate_core::control::learn::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
 use serde::Serialize;
 
 use super::picture::tenths;

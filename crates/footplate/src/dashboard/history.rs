@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use footplate_core::estimation::Located;
+use footplate_core::tracking::Located;
 use footplate_core::{HALF_95, Length, SpeedStep};
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! How a train moves, as far as is known, for a chart of its speeds and one of its stops.
 
-use footplate_core::calibration::motion::{MotionModel, StepUse, StopForecast};
+use footplate_core::model::{MotionModel, StepUse, StopForecast};
 use footplate_core::{Approach, HALF_95, SpeedStep};
 use serde::Serialize;
 

@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use footplate_core::calibration::DriftTest;
-use footplate_core::calibration::motion::MotionModel;
-use footplate_core::control::calibrate::CalibrationNotice;
+use footplate_core::control::learn::CalibrationNotice;
 use footplate_core::control::{Dispatcher, Driver};
-use footplate_core::estimation::{DueContact, PassedContact, WayPoint};
+use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
+use footplate_core::tracking::DriftTest;
+use footplate_core::tracking::{DueContact, PassedContact, WayPoint};
 use footplate_core::{HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 

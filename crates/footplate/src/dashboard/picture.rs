@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
-use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, NodeKind};
+use footplate_core::tracking::WayPoint;
 use footplate_core::{HALF_95, Length, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;

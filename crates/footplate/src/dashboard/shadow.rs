@@ -1,7 +1,7 @@
 //! A driver that drives nothing: it shows where the train of a calibration is.
 
 use footplate_core::control::Driver;
-use footplate_core::control::calibrate::Calibrator;
+use footplate_core::control::learn::Calibrator;
 use footplate_core::track::{Layout, TurnoutStates};
 
 /// Follows a calibration.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use footplate_core::control::Driver;
-use footplate_core::control::calibrate::{CalibrationNotice, Calibrator};
+use footplate_core::control::learn::{CalibrationNotice, Calibrator};
 use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 

@@ -1,7 +1,7 @@
 //! How far a train has come since it was found: places along its way as one growing number, for a curve over time.
 
-use footplate_core::estimation::WayPoint;
 use footplate_core::track::Layout;
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, Speed, TimeSpan, Timestamp};
 
 /// The way of one train, from contact to contact by the survey and between them as it is believed.

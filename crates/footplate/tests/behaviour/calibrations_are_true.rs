@@ -1,8 +1,8 @@
 //! What a calibration says is true of the simulated train behind the reports.
 
 use footplate_core::Approach;
-use footplate_core::calibration::{Constant, Direction, LawKind};
 use footplate_core::kinematics::SpeedLaw;
+use footplate_core::model::report::{Constant, Direction, LawKind};
 use footplate_core::{SpeedStep, TimeSpan};
 use footplate_sim::{LawFamily, SimulatedRecording};
 use footplate_store::layout_named;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::estimation::{Phase, Predictor};
+use footplate_core::tracking::{Phase, Predictor};
 use footplate_store::layout_named;
 
 use crate::simulated::{TRAIN, for_each};

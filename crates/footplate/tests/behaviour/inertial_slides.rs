@@ -1,10 +1,8 @@
 //! An accelerometer carries simulated trains through slides of both wheelsets: the pieces by themselves, with the truth
 //! saying when wheels roll, so that nothing but the inertial channel is on trial.
 
-use footplate_core::estimation::odometry::inertial::{
-    InertialBounds, InertialFilter, InertialLimits, InertialNoise,
-};
-use footplate_core::estimation::odometry::{distance_tolerance, speed_tolerance};
+use footplate_core::odometry::inertial::{InertialBounds, InertialFilter, InertialLimits, InertialNoise};
+use footplate_core::odometry::{distance_tolerance, speed_tolerance};
 use footplate_core::{Speed, TimeSpan};
 use footplate_sim::line::{LineConditions, LineRun, LineScenario, WheelTruth};
 

@@ -4,7 +4,7 @@
 //! The truth is only looked at here. The full table, on a hundred seeds a family, is `docs/tables/odometry.md`.
 
 use footplate_core::TimeSpan;
-use footplate_core::estimation::odometry::{
+use footplate_core::odometry::{
     MotionEstimate, Odometer, OdometrySettings, WheelState, distance_tolerance, speed_tolerance,
 };
 use footplate_sim::line::{LineConditions, LineRun, LineScenario, WheelTruth};

@@ -2,9 +2,9 @@
 //! truth says when wheels roll, so that nothing but the learning is on trial.
 
 use footplate_core::Length;
-use footplate_core::calibration::{BaliseAccuracy, PairVerdict, WheelDiameters};
-use footplate_core::estimation::odometry::{BaliseLink, BaliseVerdict, DistanceInterval};
-use footplate_core::wheels::{Axle, Wheelset};
+use footplate_core::odometry::diameter::{BaliseAccuracy, PairVerdict, WheelDiameters};
+use footplate_core::odometry::wheels::{Axle, Wheelset};
+use footplate_core::odometry::{BaliseLink, BaliseVerdict, DistanceInterval};
 use footplate_sim::line::{LineConditions, LineRun, LineScenario, WheelTruth};
 
 /// Commands below this are little effort.

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::control::watch::WatchdogNotice;
+use crate::control::supervise::WatchdogNotice;
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;

@@ -3,15 +3,15 @@
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
-use crate::calibration::motion::MotionModel;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
-use crate::control::watch::{LinkNews, Watchdog, WatchdogNotice};
+use crate::control::supervise::{LinkNews, Watchdog, WatchdogNotice};
 use crate::control::{Machine, Output};
-use crate::estimation::WayPoint;
 use crate::event::Event;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
+use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
+use crate::tracking::WayPoint;
 use crate::units::Length;
 
 use super::blocks::Blocks;

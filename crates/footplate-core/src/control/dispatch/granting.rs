@@ -3,10 +3,10 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use crate::calibration::motion::{MotionModel, StepUse};
 use crate::control::drive::Refusal;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TrainId};
+use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::{Length, Speed};

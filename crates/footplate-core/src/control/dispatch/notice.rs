@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::control::drive::{DriveNotice, OrderId, Refusal};
-use crate::control::watch::WatchdogNotice;
+use crate::control::supervise::WatchdogNotice;
 use crate::ids::TrainId;
 use crate::time::TimeSpan;
 use crate::track::Landmark;

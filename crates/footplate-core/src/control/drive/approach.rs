@@ -2,11 +2,11 @@
 
 use alloc::vec::Vec;
 
-use crate::calibration::motion::StepUse;
-use crate::estimation::{Located, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
+use crate::model::StepUse;
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{Located, TrackContext, WayPoint};
 use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};

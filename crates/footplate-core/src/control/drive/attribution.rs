@@ -9,10 +9,10 @@ use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::TrackContext;
 use crate::event::Event;
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
+use crate::tracking::TrackContext;
 
 use super::contact_conduct::ContactConduct;
 use super::doubt::{Branch, Doubt};

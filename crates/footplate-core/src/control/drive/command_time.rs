@@ -1,8 +1,8 @@
 //! When a command has to leave so that its outcome meets a target, by the outcome of any other time.
 
-use crate::estimation::Rest;
-use crate::latency::UniformNormal;
+use crate::link::UniformNormal;
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::Rest;
 use crate::units::Length;
 
 use super::order::Aim;

@@ -3,10 +3,10 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::{Locator, PassedContact, TrackContext};
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutStates};
+use crate::tracking::{Locator, PassedContact, TrackContext};
 
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Closure, Explanation, Hypothesis, hypotheses};

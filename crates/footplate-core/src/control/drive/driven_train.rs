@@ -1,10 +1,10 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
-use crate::calibration::motion::{MotionModel, StepUse};
-use crate::estimation::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::units::Length;
 
 use super::expectation::Expectation;

@@ -3,14 +3,14 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::calibration::motion::{MotionModel, StepUse};
 use crate::control::{Machine, Output};
-use crate::estimation::{Located, Locator, WayPoint, landmark_of};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
-use crate::latency::ContactWindow;
+use crate::link::ContactWindow;
+use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
+use crate::tracking::{Located, Locator, WayPoint, landmark_of};
 use crate::units::Length;
 
 use super::attribution::{Attribution, Decided, Verdict};

@@ -1,8 +1,8 @@
 //! What should happen next to a train that runs, and what follows when it does not.
 
-use crate::estimation::{DueContact, TrackContext, WayPoint};
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{DueContact, TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};

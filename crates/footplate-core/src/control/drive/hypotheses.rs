@@ -4,12 +4,12 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::estimation::TrackContext;
 use crate::event::Approach;
 use crate::ids::{SensorId, TrainId, TurnoutId};
-use crate::latency::ContactWindow;
+use crate::link::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutStates};
+use crate::tracking::TrackContext;
 
 use super::driven_train::DrivenTrain;
 
@@ -17,7 +17,7 @@ use super::driven_train::DrivenTrain;
 const HOPS_LOOKED_AT: usize = 2;
 /// A turnout does not lie as it was told in 0.3 % of cases (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
 ///
-/// [`LOG_CHANCE_OF_SILENCE`]: crate::estimation::Locator::claim
+/// [`LOG_CHANCE_OF_SILENCE`]: crate::tracking::Locator::claim
 const LOG_TURNOUT_FAILS: f64 = -5.809;
 /// Where a way by the turnouts as they lie is as likely as this (ln 1/s), no other is looked for: half a second's doubt.
 const CONVINCING: f64 = 0.0;

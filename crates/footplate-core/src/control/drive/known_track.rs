@@ -1,8 +1,8 @@
 //! The layout as it lies, owned by who drives on it.
 
-use crate::calibration::SectionIndex;
-use crate::estimation::TrackContext;
+use crate::model::survey::SectionIndex;
 use crate::track::{Layout, TurnoutStates};
+use crate::tracking::TrackContext;
 
 /// What [`TrackContext`] points to.
 #[derive(Debug, Clone)]

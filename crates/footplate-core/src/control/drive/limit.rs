@@ -2,10 +2,10 @@
 
 use alloc::collections::BTreeSet;
 
-use crate::estimation::{Rest, TrackContext, WayPoint, place_of, way_to};
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::Position;
+use crate::tracking::{Rest, TrackContext, WayPoint, place_of, way_to};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;

@@ -2,11 +2,11 @@
 
 use alloc::string::String;
 
-use crate::estimation::{DueContact, PassedContact};
 use crate::event::Command;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
+use crate::tracking::{DueContact, PassedContact};
 use crate::units::{Length, Speed};
 
 use super::order::OrderId;

@@ -1,9 +1,9 @@
 //! Ways along the hops as the turnouts lie, in lengths as a train feels them.
 
-use crate::calibration::motion::MotionModel;
-use crate::estimation::{TrackContext, WayPoint};
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
+use crate::model::MotionModel;
 use crate::track::{Hop, NodeKind};
+use crate::tracking::{TrackContext, WayPoint};
 use crate::units::Length;
 
 /// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after

@@ -2,10 +2,10 @@
 
 use alloc::vec::Vec;
 
-use crate::calibration::motion::MotionModel;
-use crate::estimation::TrackContext;
 use crate::ids::NodeId;
+use crate::model::MotionModel;
 use crate::track::{Hop, Zone};
+use crate::tracking::TrackContext;
 
 /// Hops looked at in either direction: more than a lap of any layout in use.
 const MOST_HOPS: usize = 200;

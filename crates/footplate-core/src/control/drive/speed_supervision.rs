@@ -12,11 +12,11 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::estimation::{ReachableSet, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Zone;
+use crate::tracking::{ReachableSet, TrackContext, WayPoint};
 use crate::units::{Length, Ratio, Speed};
 
 use super::driven_train::DrivenTrain;

@@ -3,9 +3,9 @@
 use alloc::string::{String, ToString};
 
 use crate::estimate::HALF_95;
-use crate::estimation::{Located, Rest, TrackContext, WayPoint, landmark_of, way_to_landmark};
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{Located, Rest, TrackContext, WayPoint, landmark_of, way_to_landmark};
 use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};

@@ -1,9 +1,9 @@
 //! What a train is busy with, and how far it is with it.
 
-use crate::estimation::WayPoint;
 use crate::ids::{SensorId, SpeedStep};
 use crate::time::Timestamp;
 use crate::track::Landmark;
+use crate::tracking::WayPoint;
 
 use super::notice::Promise;
 use super::order::{Aim, OrderId};

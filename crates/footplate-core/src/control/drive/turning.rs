@@ -1,8 +1,8 @@
 //! Where a train is once it has turned around: its shoe's other end leads.
 
-use crate::calibration::motion::MotionModel;
-use crate::estimation::{Located, TrackContext, WayPoint, place_of, way_to};
+use crate::model::MotionModel;
 use crate::track::Position;
+use crate::tracking::{Located, TrackContext, WayPoint, place_of, way_to};
 use crate::units::Length;
 
 /// The length of a pickup shoe along the track, which nobody has measured for this train. Shoes for three-rail track

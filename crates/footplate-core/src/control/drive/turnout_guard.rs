@@ -3,10 +3,10 @@
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use crate::estimation::{TrackContext, place_of};
 use crate::ids::{NodeId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{NodeKind, Position};
+use crate::tracking::{TrackContext, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;

@@ -1,9 +1,9 @@
 //! What somebody who watches over a driver asks of it.
 
-use crate::calibration::motion::MotionFit;
-use crate::estimation::{PassedContact, TrackContext};
 use crate::ids::{NodeId, SensorId, TrainId};
+use crate::model::MotionFit;
 use crate::time::Timestamp;
+use crate::tracking::{PassedContact, TrackContext};
 use crate::units::Length;
 
 use super::driver::Driver;

@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use footplate_core::Timestamp;
-use footplate_core::wheels::Vehicle;
+use footplate_core::odometry::wheels::Vehicle;
 
 use super::clock::Clock;
 use super::column_mapping::ColumnMapping;

@@ -4,7 +4,7 @@
 //! lost over a run: what is left of a pulse is counted in the next period.
 
 use footplate_core::Timestamp;
-use footplate_core::wheels::Direction;
+use footplate_core::odometry::wheels::Direction;
 
 use crate::tachometer::block::MISSING;
 

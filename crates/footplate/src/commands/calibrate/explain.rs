@@ -4,7 +4,7 @@ use std::io::Write;
 use std::str::FromStr;
 
 use anyhow::bail;
-use footplate_core::calibration::{Direction, SettledPassage};
+use footplate_core::model::report::{Direction, SettledPassage};
 use footplate_core::track::{Hop, Layout};
 use footplate_core::{Approach, SpeedStep, TimeSpan};
 use footplate_store::{Batch, BatchTrain};

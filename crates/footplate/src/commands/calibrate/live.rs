@@ -14,8 +14,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use footplate_core::calibration::motion::{MotionFit, StepUse};
-use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
+use footplate_core::control::learn::{Calibrator, CalibratorSettings};
+use footplate_core::model::MotionFit;
+use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};

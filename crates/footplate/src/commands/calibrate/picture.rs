@@ -1,7 +1,7 @@
 //! What is known of a train, step by step, as a picture: speeds and ways to rest with what is not known of them.
 
 use anyhow::bail;
-use footplate_core::control::calibrate::StepAccuracy;
+use footplate_core::control::learn::StepAccuracy;
 use footplate_core::{Approach, HALF_95, TrainId};
 use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
 

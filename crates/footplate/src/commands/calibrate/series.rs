@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use footplate_core::calibration::motion::{SeriesChange, SeriesFit};
+use footplate_core::model::report::{SeriesChange, SeriesFit};
 use footplate_core::{Acceleration, Estimate, TimeSpan};
 use footplate_store::PositionSeries;
 use serde_json::{Value, json};

@@ -4,8 +4,8 @@
 use std::io::Write;
 
 use anyhow::bail;
-use footplate_core::calibration::ShortMoveFit;
-use footplate_core::calibration::motion::{MotionModel, ShortMoveForecast, StepUse};
+use footplate_core::model::report::ShortMoveFit;
+use footplate_core::model::{MotionModel, ShortMoveForecast, StepUse};
 use footplate_core::{Acceleration, Length, Speed, SpeedStep, TimeSpan, TrainId};
 use footplate_store::{Batch, TapedMoves};
 use serde_json::{Value, json};

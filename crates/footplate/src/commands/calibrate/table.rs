@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use footplate_core::Approach;
-use footplate_core::calibration::Direction;
+use footplate_core::model::report::Direction;
 use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
 
 /// How many other laws are told beside the best.

@@ -3,9 +3,9 @@
 use std::io::Write;
 
 use anyhow::bail;
-use footplate_core::calibration::motion::MotionModel;
-use footplate_core::calibration::{TwoSensorChange, TwoSensorMean};
 use footplate_core::kinematics::TwoSensorVerdict;
+use footplate_core::model::MotionModel;
+use footplate_core::model::report::{TwoSensorChange, TwoSensorMean};
 use footplate_core::track::Layout;
 use footplate_core::{Acceleration, Estimate, TrainId};
 use footplate_store::Batch;

@@ -1,9 +1,9 @@
 //! How the driving half of a turn begins, as it is kept: all that its driver is made of.
 
-use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::Driver;
-use footplate_core::estimation::Locator;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg};
+use footplate_core::tracking::Locator;
 use footplate_core::{Timestamp, TurnoutId};
 use serde::{Deserialize, Serialize};
 

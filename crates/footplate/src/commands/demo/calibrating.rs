@@ -1,11 +1,12 @@
 //! The first half: a train that nobody has measured teaches how it moves.
 
-use footplate_core::calibration::motion::{MotionFit, StepUse};
-use footplate_core::control::calibrate::{
+use footplate_core::control::learn::{
     CalibrationNotice, CalibratorSettings, Ending, Mishap, Phase, Progress, StepAccuracy,
 };
-use footplate_core::estimation::Locator;
+use footplate_core::model::MotionFit;
+use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::tracking::Locator;
 use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 
 use super::outcome::{Learnt, LearntStep, minutes};

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::calibration::SectionIndex;
 use footplate_core::control::{
     DriveNotice, Driver, Finished, Order, OrderId, PlannedStop, Refusal, StopOrder,
 };
-use footplate_core::estimation::{DueContact, PassedContact, TrackContext};
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::{Landmark, Layout};
+use footplate_core::tracking::{DueContact, PassedContact, TrackContext};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::beginning::TourBeginning;

@@ -1,7 +1,7 @@
 //! Where the demo asks trains to stop: anywhere on their way, drawn from the seed.
 
-use footplate_core::estimation::TrackContext;
 use footplate_core::track::Landmark;
+use footplate_core::tracking::TrackContext;
 use footplate_core::{Length, NodeId, SpeedStep};
 
 /// So far past a contact at least, and so far before the next one: nearer nobody would name a place by it.
@@ -83,7 +83,7 @@ pub(super) fn steps_to_stop_from(dice: &mut Dice, usable: &[SpeedStep], count: u
 
 #[cfg(test)]
 mod tests {
-    use footplate_core::calibration::SectionIndex;
+    use footplate_core::model::survey::SectionIndex;
     use footplate_core::track::{Leg, TurnoutStates};
 
     use super::*;

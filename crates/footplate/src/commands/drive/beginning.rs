@@ -1,8 +1,9 @@
 //! How a session of driving begins, as it is kept: all that its script runner is made of.
 
 use anyhow::Context;
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::Driver;
+use footplate_core::model::MotionFit;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Leg, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
 use serde::{Deserialize, Serialize};

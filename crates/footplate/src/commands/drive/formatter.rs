@@ -3,8 +3,8 @@
 use footplate_core::control::{
     DispatchNotice, DriveNotice, Driver, Finished, Order, PlannedArrival, PlannedStop, Refusal,
 };
-use footplate_core::estimation::{DueContact, PassedContact};
 use footplate_core::track::Landmark;
+use footplate_core::tracking::{DueContact, PassedContact};
 use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, MotionModel, Refit};
 use footplate_core::control::Driver;
-use footplate_core::estimation::PassedContact;
+use footplate_core::model::MotionModel;
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MotionFit, Refit};
 use footplate_core::track::Layout;
+use footplate_core::tracking::PassedContact;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
 
 /// Fits that go on from what was known at the beginning.

@@ -6,12 +6,13 @@ mod waiting;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::{
     Dispatcher, Driver, Finished, Journey, Machine, Order, OrderId, Output, Promise, Refusal,
 };
-use footplate_core::estimation::WayPoint;
+use footplate_core::model::MotionFit;
+use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
@@ -80,11 +81,8 @@ pub(crate) struct ScriptRunner {
 
 impl ScriptRunner {
     pub(super) fn new(driver: Driver, learning: Learning, giver: Giver, steps: Vec<Step>) -> Self {
-        let highest = |train| {
-            driver
-                .model(train)
-                .map_or(SpeedStep::STAND, footplate_core::calibration::motion::MotionModel::highest)
-        };
+        let highest =
+            |train| driver.model(train).map_or(SpeedStep::STAND, footplate_core::model::MotionModel::highest);
         let trains = driver.trains().map(|train| (train, highest(train))).collect();
         Self {
             dispatcher: Dispatcher::watched(Timestamp::ZERO, driver),

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, MotionModel, StepUse};
+use footplate_core::model::MotionFit;
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId};
 use footplate_store::{KeptModel, MotionFile, MotionReplay, Store};

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use footplate_core::calibration::motion::MotionModel;
-use footplate_core::calibration::{SectionIndex, TrackSurvey};
+use footplate_core::model::MotionModel;
+use footplate_core::model::survey::{SectionIndex, TrackSurvey};
 use footplate_core::track::{Hop, Layout, Survey};
 use footplate_core::{HALF_95, Length, SpeedStep, TrainId};
 use footplate_store::{LayoutFile, MotionReplay, Store, layout_named, write_layout, write_whole};

@@ -6,8 +6,8 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use footplate_core::calibration::TapedStop;
-use footplate_core::calibration::motion::StopForecast;
+use footplate_core::model::StopForecast;
+use footplate_core::model::report::TapedStop;
 use footplate_core::track::Layout;
 use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 use footplate_store::{Batch, EventKey, RecordingKey, Store, layout_named};

@@ -1,8 +1,9 @@
 //! The run at whose end a train stands now, and whether a tape laid there can be right.
 
 use anyhow::{Context, bail};
-use footplate_core::calibration::{MeasuredStop, Passage, RunPassages};
-use footplate_core::latency::PollTimingEstimator;
+use footplate_core::link::PollTimingEstimator;
+use footplate_core::model::Passage;
+use footplate_core::model::report::{MeasuredStop, RunPassages};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Event, EventKind, Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{RecordingKey, Run, Store, StoredRecording, StoredRun};

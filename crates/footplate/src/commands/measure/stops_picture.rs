@@ -1,7 +1,7 @@
 //! All stops that were measured of a train, as a picture.
 
 use anyhow::bail;
-use footplate_core::calibration::TapedStop;
+use footplate_core::model::report::TapedStop;
 use footplate_core::track::Layout;
 use footplate_core::{Approach, HALF_95, SpeedStep, TrainId};
 use footplate_store::{Batch, BatchTrain, Store};

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use footplate_core::estimation::odometry::inertial::{StandstillThresholds, Trip};
+use footplate_core::odometry::inertial::{StandstillThresholds, Trip};
 use footplate_store::accelerometer::{
     AccelerometerRecording, AccelerometerRide, LeftOutScore, SensorForm, StandingScore, StopMarks,
     leave_one_out,

@@ -1,6 +1,6 @@
 //! What recordings come to, for machines.
 
-use footplate_core::estimation::odometry::PlacedValue;
+use footplate_core::odometry::PlacedValue;
 use footplate_store::odometry::{OdometryScore, Preset, RunScores};
 use serde_json::{Map, Value, json};
 

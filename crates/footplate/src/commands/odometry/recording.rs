@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use anyhow::bail;
-use footplate_core::wheels::Vehicle;
+use footplate_core::odometry::wheels::Vehicle;
 use footplate_store::odometry::{OdometryRun, RunContext};
 use footplate_store::{ColumnMapping, TachometerBlock, TachometerNote, TachometerReader, TimeFaults};
 

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::Context;
-use footplate_core::estimation::odometry::MotionEstimate;
+use footplate_core::odometry::MotionEstimate;
 use footplate_store::odometry::{LiveResult, ResultWriter};
 use footplate_store::{TableForm, WholeFile};
 

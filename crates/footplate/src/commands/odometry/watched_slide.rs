@@ -3,8 +3,8 @@
 //!
 //! The truth comes from the simulator and is drawn and scored; the odometer never sees it.
 
-use footplate_core::estimation::odometry::{Mode, MotionEstimate, WheelState};
-use footplate_core::wheels::Period;
+use footplate_core::odometry::wheels::Period;
+use footplate_core::odometry::{Mode, MotionEstimate, WheelState};
 use footplate_core::{Length, Speed, TimeSpan, Timestamp};
 use footplate_sim::line::{LineConditions, LineScenario};
 use footplate_store::Truth;

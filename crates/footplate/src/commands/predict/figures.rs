@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::estimation::Phase;
+use footplate_core::tracking::Phase;
 use footplate_core::{SpeedStep, TrainId};
 use footplate_store::score::{Comparison, ScoredHit};
 

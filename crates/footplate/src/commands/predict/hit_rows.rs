@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-use footplate_core::estimation::Verdict;
 use footplate_core::track::Layout;
+use footplate_core::tracking::Verdict;
 use footplate_store::score::ScoredHit;
 use footplate_store::score::ScoredRecording;
 

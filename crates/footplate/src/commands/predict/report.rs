@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use footplate_core::TrainId;
-use footplate_core::estimation::Phase;
 use footplate_core::track::Layout;
+use footplate_core::tracking::Phase;
 use footplate_store::score::{
     BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, Rival, RivalScore,
     ScoredHit, ScoredRecording,

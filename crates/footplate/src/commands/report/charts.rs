@@ -1,6 +1,6 @@
 //! Curves for charts: changes of speed under their law, and stopping distance by speed.
 
-use footplate_core::calibration::Transient;
+use footplate_core::model::report::Transient;
 use footplate_core::{Approach, SpeedStep, TimeSpan};
 use footplate_store::{Batch, BatchTrain, TrainFindings};
 

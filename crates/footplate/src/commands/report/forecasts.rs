@@ -1,9 +1,9 @@
 //! The forecasts of one train along its recordings, each walked from nothing known and never looking ahead.
 
 use footplate_core::TrainId;
-use footplate_core::calibration::Passage;
-use footplate_core::estimation::{Phase, Predictor};
+use footplate_core::model::Passage;
 use footplate_core::track::Layout;
+use footplate_core::tracking::{Phase, Predictor};
 use footplate_store::score::{ReplayContext, replay_run};
 
 use super::Session;

@@ -1,7 +1,7 @@
 //! What laws of speed change are called in German; their English names come with them.
 
-use footplate_core::calibration::{Constant, LawKind};
 use footplate_core::kinematics::SpeedLaw;
+use footplate_core::model::report::{Constant, LawKind};
 
 pub(super) fn german_law(kind: LawKind) -> String {
     let LawKind::Family(family) = kind else { return "linear in der Stufe (Massensimulation)".to_owned() };

@@ -1,7 +1,7 @@
 //! The numbers of a train as tables, for those who print the page or run no scripts.
 
 use footplate_core::Approach;
-use footplate_core::calibration::Direction;
+use footplate_core::model::report::Direction;
 use footplate_store::{PollingForm, Quantity, TrainFindings};
 
 use super::data::{Check, Health, State};

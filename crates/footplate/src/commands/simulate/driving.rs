@@ -12,9 +12,9 @@ use std::num::NonZeroUsize;
 
 use clap::Args;
 use footplate_core::TimeSpan;
-use footplate_core::calibration::SectionIndex;
-use footplate_core::estimation::TrackContext;
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::Layout;
+use footplate_core::tracking::TrackContext;
 use footplate_sim::LawFamily;
 use footplate_store::layout_named;
 

@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use footplate_core::calibration::{SectionIndex, TrackSurvey};
+use footplate_core::model::survey::{SectionIndex, TrackSurvey};
 use footplate_core::track::{Hop, Layout, StretchLength, Survey};
 use footplate_core::{HALF_95, Length, StretchId, TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;

@@ -9,11 +9,11 @@
 use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::estimation::{TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::kinematics::{MinimumJerk, Motion, SpeedLaw, Transit};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Speed};
 
 use super::zoned_transit::{SlowPart, ZonedTransit};

@@ -4,7 +4,6 @@ use alloc::boxed::Box;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use crate::calibration::motion::MotionModel;
 use crate::control::drive::command_time::{CommandTime, spread};
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::notice::{DriveNotice, PlannedArrival};
@@ -14,11 +13,12 @@ use crate::control::drive::path_length::{counted_from, lap};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
-use crate::estimation::{Located, TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
+use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
+use crate::tracking::{Located, TrackContext, WayPoint};
 use crate::units::{Length, Speed};
 
 use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, CREEPING, Means};

@@ -11,7 +11,6 @@
 
 use alloc::collections::BTreeMap;
 
-use crate::calibration::motion::INTERRUPTED;
 use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::driver::Driver;
@@ -21,10 +20,11 @@ use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path_length::way_between;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
-use crate::estimation::{TrackContext, WayPoint};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::INTERRUPTED;
+use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio, Speed};
 
 use super::command_budget::seconds;

@@ -6,10 +6,10 @@ use crate::control::drive::order::OrderId;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
-use crate::estimation::TrackContext;
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::TrackContext;
 use crate::units::{Length, Speed};
 
 use super::ideal_line::IdealLine;

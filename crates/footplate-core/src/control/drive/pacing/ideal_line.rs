@@ -1,8 +1,8 @@
 //! The straight line of a train that runs at one speed.
 
-use crate::estimation::TrackContext;
 use crate::ids::NodeId;
 use crate::time::Timestamp;
+use crate::tracking::TrackContext;
 use crate::units::{Length, Speed};
 
 use super::surveyed_way::surveyed_between;

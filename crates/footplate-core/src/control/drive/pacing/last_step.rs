@@ -5,14 +5,14 @@
 //! to where the stop begins sooner or later, and its own stop takes as long as it takes. Each step about the one that it runs
 //! at is looked at as a whole, up to the standstill.
 
-use crate::calibration::motion::StandingTimes;
 use crate::control::drive::command_time::{CommandTime, command_time, spread};
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
-use crate::estimation::{Rest, TrackContext};
 use crate::ids::SpeedStep;
+use crate::model::StandingTimes;
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{Rest, TrackContext};
 
 use super::command_budget::seconds;
 use super::task::POLL_WAIT;

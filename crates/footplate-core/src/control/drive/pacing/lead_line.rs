@@ -6,11 +6,11 @@
 
 use alloc::vec::Vec;
 
-use crate::calibration::motion::MotionModel;
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::estimation::{Rollout, TrackContext};
 use crate::ids::NodeId;
+use crate::model::MotionModel;
 use crate::time::Timestamp;
+use crate::tracking::{Rollout, TrackContext};
 use crate::units::Length;
 
 use super::surveyed_way::{SurveyedWay, surveyed_between};

@@ -14,10 +14,10 @@
 use super::command_budget::CommandBudget;
 use super::reference::{GRID, LOOKS, Reference};
 use super::surveyed_way::SurveyedWay;
-use crate::calibration::motion::MotionModel;
-use crate::estimation::Rollout;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
+use crate::model::MotionModel;
+use crate::tracking::Rollout;
 
 /// Commands in one plan: what the budget leaves for its time, and few enough to look at all of them.
 const MOST_COMMANDS: usize = 3;

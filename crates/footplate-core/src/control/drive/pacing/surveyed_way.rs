@@ -1,8 +1,8 @@
 //! The way ahead of a train as the survey has it, beside the way as the train feels it.
 
-use crate::calibration::motion::MotionModel;
-use crate::estimation::TrackContext;
 use crate::ids::NodeId;
+use crate::model::MotionModel;
+use crate::tracking::TrackContext;
 use crate::units::Length;
 
 /// Contact-to-contact hops looked at: 3 m of the densest known track.

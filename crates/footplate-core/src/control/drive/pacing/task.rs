@@ -6,10 +6,10 @@ use alloc::vec::Vec;
 use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal};
-use crate::estimation::TrackContext;
 use crate::ids::{NodeId, SensorId, SpeedStep};
-use crate::latency::ContactWindow;
+use crate::link::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::TrackContext;
 
 use super::arrive::Arriving;
 use super::command_budget::{CommandBudget, SPACING, seconds};

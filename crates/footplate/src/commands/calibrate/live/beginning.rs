@@ -1,7 +1,7 @@
 //! How a calibration begins, as it is kept: all that its machine is made of.
 
-use footplate_core::calibration::motion::MotionFit;
-use footplate_core::control::calibrate::{Calibrator, CalibratorSettings};
+use footplate_core::control::learn::{Calibrator, CalibratorSettings};
+use footplate_core::model::MotionFit;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Length, StretchId, TimeSpan, TurnoutId};
 use serde::{Deserialize, Serialize};

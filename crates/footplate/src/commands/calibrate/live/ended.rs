@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Formatter, Result as FmtResult};
 
-use footplate_core::control::calibrate::Ending;
+use footplate_core::control::learn::Ending;
 
 use crate::commands::Outcome;
 

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_core::control::calibrate::StepAccuracy;
+use footplate_core::control::learn::StepAccuracy;
 use footplate_core::track::Layout;
 use footplate_core::{Approach, TimeSpan, TrainId};
 use serde_json::{Value, json};

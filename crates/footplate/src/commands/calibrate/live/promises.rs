@@ -1,9 +1,9 @@
 //! What a calibration promises over the bytes of a simulated station, whatever the train is like and whatever goes wrong.
 
-use footplate_core::calibration::motion::MotionFit;
-use footplate_core::control::calibrate::{
+use footplate_core::control::learn::{
     CalibrationNotice, Calibrator, CalibratorSettings, Ending, Mishap, StepAccuracy,
 };
+use footplate_core::model::MotionFit;
 use footplate_core::track::Layout;
 use footplate_core::{Command, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, VirtualStation};

@@ -1,6 +1,6 @@
 //! What a calibration says, in words.
 
-use footplate_core::control::calibrate::{CalibrationNotice, Done, Experiment, Mishap, Phase, Progress, Why};
+use footplate_core::control::learn::{CalibrationNotice, Done, Experiment, Mishap, Phase, Progress, Why};
 use footplate_core::track::Layout;
 
 /// A line that is worth keeping; nothing for what only moves a bar.

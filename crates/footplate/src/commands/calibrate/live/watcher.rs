@@ -1,6 +1,6 @@
 //! Who watches a calibration: tells it to people, and notices when the layout is another one than they said.
 
-use footplate_core::control::calibrate::{CalibrationNotice, Calibrator, Mishap};
+use footplate_core::control::learn::{CalibrationNotice, Calibrator, Mishap};
 use footplate_core::track::Layout;
 use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
 use footplate_wire::{CommandError, LinkNotice};

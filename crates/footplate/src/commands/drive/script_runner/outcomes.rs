@@ -1,9 +1,9 @@
 //! What comes of instructions: refusals, notices of the driver and the dispatcher, orders that have ended, and what trains taught.
 
-use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{
     Achieved, DispatchNotice, DriveNotice, Finished, Machine, Order, Outcome, Output, Refusal, WatchdogNotice,
 };
+use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 

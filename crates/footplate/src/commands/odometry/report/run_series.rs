@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::estimation::odometry::{Mode, MotionEstimate, WheelState};
-use footplate_core::wheels::{Period, Vehicle};
+use footplate_core::odometry::wheels::{Period, Vehicle};
+use footplate_core::odometry::{Mode, MotionEstimate, WheelState};
 use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 use footplate_store::Truth;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! How fast each wheel turned by what it counted, calm enough for a chart.
 
-use footplate_core::wheels::{Count, Period, Vehicle};
+use footplate_core::odometry::wheels::{Count, Period, Vehicle};
 use footplate_core::{Length, TimeSpan};
 use footplate_store::odometry::WayCounter;
 
@@ -70,7 +70,7 @@ impl RecentWay {
 #[cfg(test)]
 mod tests {
     use footplate_core::Timestamp;
-    use footplate_core::wheels::WheelReading;
+    use footplate_core::odometry::wheels::WheelReading;
     use footplate_store::default_vehicle;
 
     use super::*;

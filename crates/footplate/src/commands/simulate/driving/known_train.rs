@@ -5,8 +5,8 @@
 //! scatter, and what the model's own form leaves over.
 
 use anyhow::{Context, anyhow};
-use footplate_core::calibration::motion::{MotionModel, StepUse};
-use footplate_core::estimation::{Locator, TrackContext, WayPoint};
+use footplate_core::model::{MotionModel, StepUse};
+use footplate_core::tracking::{Locator, TrackContext, WayPoint};
 use footplate_core::{Approach, Event, EventKind, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{Law, Train, Truth};
 
@@ -14,7 +14,7 @@ use footplate_sim::{Law, Train, Truth};
 const DOUBT: f64 = 1e-6;
 /// The same of a length, in metres.
 const DOUBT_OF_LENGTH_M: f64 = 0.5e-3;
-/// Places of the model's numbers, as in core's `calibration/motion/parameters.rs`.
+/// Places of the model's numbers, as in core's `model/parameters.rs`.
 const UP: usize = 1;
 const DOWN: usize = 5;
 const START_DELAY: usize = 9;
@@ -194,7 +194,7 @@ fn scatter_scale(engine: &Train, model: &MotionModel) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use footplate_core::calibration::SectionIndex;
+    use footplate_core::model::survey::SectionIndex;
     use footplate_core::track::TurnoutStates;
     use footplate_sim::LawFamily;
 

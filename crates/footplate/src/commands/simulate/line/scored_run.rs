@@ -1,6 +1,6 @@
 //! One simulated run through every odometer, and how good each of them was.
 
-use footplate_core::estimation::odometry::WheelState;
+use footplate_core::odometry::WheelState;
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_sim::line::{LineRun, WheelTruth};
 use footplate_store::odometry::{

@@ -1,11 +1,11 @@
 //! Trains commanded to run at a speed that none of their steps has, beside the step that comes nearest to it.
 
 use anyhow::Context;
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Order, PacedLine};
-use footplate_core::estimation::TrackContext;
+use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::Layout;
+use footplate_core::tracking::TrackContext;
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::counted::Counted;

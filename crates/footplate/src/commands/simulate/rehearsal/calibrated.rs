@@ -1,9 +1,10 @@
 //! A train calibrated from nothing, as a person would let it.
 
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
 use footplate_core::control::{Calibrator, CalibratorSettings, Machine};
-use footplate_core::estimation::Locator;
+use footplate_core::model::MotionFit;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::tracking::Locator;
 use footplate_core::{SpeedStep, TimeSpan, TrainId};
 
 use super::VirtualLine;

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use footplate_core::calibration::motion::MotionModel;
 use footplate_core::control::{Driver, Machine};
-use footplate_core::estimation::WayPoint;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 

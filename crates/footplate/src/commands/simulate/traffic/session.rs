@@ -6,8 +6,8 @@ use anyhow::bail;
 use footplate_core::control::{
     DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
 };
-use footplate_core::estimation::WayPoint;
 use footplate_core::track::{Landmark, Layout, Position};
+use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingSwitches, Mishap};
 

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use anyhow::Context;
-use footplate_core::calibration::SectionIndex;
-use footplate_core::calibration::motion::{MotionFit, MotionModel};
+use footplate_core::model::MotionFit;
+use footplate_core::model::MotionModel;
+use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::TurnoutStates;
 use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp};
 use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};

@@ -1,8 +1,8 @@
 //! One train that is told to do something over and over, on a layout with zones.
 
 use anyhow::Context;
-use footplate_core::calibration::motion::{MotionModel, StepUse};
 use footplate_core::control::{DriveNotice, Driver, Gap, Order, OrderId, Refusal, StopOrder};
+use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 

@@ -1,0 +1,275 @@
+//! Which reports are of the train, and what the others mean: one train runs, but contacts are missed, contacts report by
+//! themselves, turnouts fail, and people lift trains.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use crate::ids::{NodeId, SensorId, TurnoutId};
+use crate::link::ContactWindow;
+use crate::model::MotionModel;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, Leg, Reach, TurnoutStates};
+use crate::tracking::{Locator, TrackContext};
+use crate::units::{Length, Speed};
+
+/// Contacts in a row that a train is believed to have passed unseen. Beyond that it is somewhere else.
+const LOOK_PAST: usize = 2;
+
+/// Reports of a contact that follow each other within this are of one closure: a pickup over it, or a contact that hangs.
+const ONE_CLOSURE: TimeSpan = TimeSpan::from_ms(1_000);
+
+/// No train in the published tables runs faster.
+const FASTEST: Speed = Speed::from_mm_per_s(1_000.0);
+
+/// Reports that nothing explains, without as many that are explained between them, until the layout is not believed any
+/// more.
+const TOO_STRANGE: usize = 4;
+
+/// Less likely than once in this many seconds, a report is rather spurious: contacts report by themselves about as often.
+const LEAST_DENSITY: f64 = 1e-4;
+
+/// What a report means.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Verdict {
+    /// The first contact since nobody knew where the train is.
+    First(NodeId),
+    /// The train passed it on its way.
+    Passed(NodeId),
+    /// It passed it by another leg of a turnout than the one for which it was set.
+    ByOtherLeg {
+        node: NodeId,
+        turnout: TurnoutId,
+        /// The leg by which it went.
+        leg: Leg,
+    },
+    /// The same closure again.
+    Again,
+    /// Not of the train, or not of this layout.
+    Unexplained,
+    /// The train is somewhere else than it can have run to.
+    Moved { from: Option<NodeId>, to: NodeId },
+    /// Too much of this to go on.
+    WrongLayout { seen: Vec<SensorId>, expected: Vec<SensorId> },
+}
+
+/// Where the train was seen last, and what was seen that it does not explain.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tracker {
+    last: Option<(NodeId, Timestamp)>,
+    /// A contact that reported where the train cannot be, if it is not there after all.
+    elsewhere: Option<(NodeId, Timestamp)>,
+    closed: BTreeMap<SensorId, Timestamp>,
+    strange: Vec<SensorId>,
+    expected: Vec<SensorId>,
+}
+
+impl Tracker {
+    /// The contact passed last.
+    pub(super) fn last(&self) -> Option<NodeId> {
+        self.last.map(|(node, _)| node)
+    }
+
+    /// When that was reported.
+    pub(super) fn last_time(&self) -> Option<Timestamp> {
+        self.last.map(|(_, time)| time)
+    }
+
+    /// Nobody knows where the train is.
+    pub(super) fn lose(&mut self) {
+        self.last = None;
+        self.elsewhere = None;
+    }
+
+    /// Judges a report.
+    pub(super) fn judge(
+        &mut self,
+        context: TrackContext<'_>,
+        locator: &Locator,
+        model: &MotionModel,
+        sensor: SensorId,
+        window: ContactWindow,
+    ) -> Verdict {
+        let time = window.until;
+        let before = self.closed.insert(sensor, time);
+        if before.is_some_and(|before| time - before < ONE_CLOSURE) {
+            return Verdict::Again;
+        }
+        let Some(node) = context.node_of(sensor) else { return self.strange(context, sensor, None, time) };
+        let Some((last, _)) = self.last else {
+            self.take(node, time);
+            return Verdict::First(node);
+        };
+        let is_likely = locator.likelihood(context, model, sensor, window).map_or_else(
+            || locator.locate(context, model, time).is_none(),
+            |log| log > libm::log(LEAST_DENSITY),
+        );
+        // The very next contact is believed whenever a train can have got there: contacts that report by themselves do so
+        // anywhere, and forecasts of a train that is not known yet are poor.
+        let is_next = leads_to(context.layout, context.turnouts, last, node, 0)
+            && self.in_time(context.layout, self.last, node, time);
+        if is_next || is_likely && leads_to(context.layout, context.turnouts, last, node, LOOK_PAST) {
+            self.take(node, time);
+            return Verdict::Passed(node);
+        }
+        if let Some((turnout, leg)) = other_leg(context, last, node)
+            && self.in_time(context.layout, self.last, node, time)
+        {
+            self.take(node, time);
+            return Verdict::ByOtherLeg { node, turnout, leg };
+        }
+        if self.in_time(context.layout, self.elsewhere, node, time) {
+            self.strange.push(sensor);
+            self.take(node, time);
+            return Verdict::Moved { from: Some(last), to: node };
+        }
+        self.strange(context, sensor, Some(node), time)
+    }
+
+    /// The train was here: what was strange is a little less so.
+    fn take(&mut self, node: NodeId, time: Timestamp) {
+        self.strange.pop();
+        self.last = Some((node, time));
+        self.elsewhere = None;
+    }
+
+    fn strange(
+        &mut self,
+        context: TrackContext<'_>,
+        sensor: SensorId,
+        node: Option<NodeId>,
+        time: Timestamp,
+    ) -> Verdict {
+        if self.strange.is_empty() {
+            let from = self.last.map(|(last, _)| last);
+            let next = from.into_iter().flat_map(|last| context.layout.hops_from(last));
+            self.expected = next.filter_map(|hop| hop.sensor).collect();
+        }
+        if !self.strange.contains(&sensor) {
+            self.strange.push(sensor);
+        }
+        self.elsewhere = node.map(|node| (node, time));
+        if self.strange.len() < TOO_STRANGE {
+            return Verdict::Unexplained;
+        }
+        let seen = core::mem::take(&mut self.strange);
+        Verdict::WrongLayout { seen, expected: core::mem::take(&mut self.expected) }
+    }
+
+    /// Whether a train that was at a node then can be at another now, by any leg, past one silent contact.
+    fn in_time(
+        &self,
+        layout: &Layout,
+        was: Option<(NodeId, Timestamp)>,
+        node: NodeId,
+        now: Timestamp,
+    ) -> bool {
+        let Some((from, then)) = was else { return false };
+        let unknown = TurnoutStates::unknown();
+        let reach = (now - then) * FASTEST + Length::from_mm(50.0);
+        let shortest = |way: &Reach| -> Length {
+            way.hops().iter().filter_map(|id| layout.hop(*id)).map(|hop| layout.least_length(&hop)).sum()
+        };
+        layout.reaches(from, &unknown, 1).any(|way| way.to == node && shortest(&way) <= reach)
+    }
+}
+
+fn leads_to(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, to: NodeId, missed: usize) -> bool {
+    layout.reaches(from, turnouts, missed).any(|way| way.to == to)
+}
+
+/// The turnout that must have lain otherwise than it was told for a train to get from one node to another, the first on
+/// the way, and how it lay.
+fn other_leg(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<(TurnoutId, Leg)> {
+    let unknown = TurnoutStates::unknown();
+    // Without a silent contact between: two things at once that seldom happen are rather a spurious report.
+    let way = context.layout.reaches(from, &unknown, 0).find(|way| way.to == to)?;
+    let hops = way.hops().iter().filter_map(|id| context.layout.hop(*id));
+    let mut needs = hops.flat_map(|hop| hop.needs.iter());
+    needs.find(|need| !context.turnouts.allow(**need)).map(|need| (need.turnout, need.leg))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::{SpeedStep, TrainId};
+    use crate::model::survey::SectionIndex;
+    use crate::track::example::oval;
+    use std::vec;
+
+    struct Scene {
+        layout: Layout,
+        sections: SectionIndex,
+        turnouts: TurnoutStates,
+        tracker: Tracker,
+    }
+
+    fn scene() -> Scene {
+        let layout = oval();
+        let turnouts = [(TurnoutId(1), Leg::Straight), (TurnoutId(2), Leg::Straight)].into_iter().collect();
+        Scene { sections: SectionIndex::of(&layout), layout, turnouts, tracker: Tracker::default() }
+    }
+
+    impl Scene {
+        /// What the tracker says of contacts by name at seconds, with a locator that knows nothing.
+        fn judge(&mut self, seconds: f64, name: &str) -> Verdict {
+            let context =
+                TrackContext { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts };
+            let train = TrainId(24);
+            let until = Timestamp::from_s(seconds);
+            let window = ContactWindow { after: until - TimeSpan::from_ms(70), until };
+            let sensor = self.layout.sensor_named(name).unwrap();
+            let model = MotionModel::unknown(train, SpeedStep::new(14).unwrap());
+            self.tracker.judge(context, &Locator::new(train), &model, sensor, window)
+        }
+
+        fn node(&self, name: &str) -> NodeId {
+            self.layout.node_named(name).unwrap()
+        }
+    }
+
+    #[test]
+    fn a_train_is_followed_past_a_silent_contact_and_a_contact_that_hangs() {
+        let mut scene = scene();
+        let (a, b, a_again) = (scene.node("A1"), scene.node("B1"), scene.node("A1"));
+        assert_eq!(scene.judge(1.0, "A1"), Verdict::First(a));
+        assert_eq!(scene.judge(1.07, "A1"), Verdict::Again);
+        assert_eq!(scene.judge(3.0, "B1"), Verdict::Passed(b));
+        assert_eq!(scene.judge(8.0, "A1"), Verdict::Passed(a_again), "D1 was missed");
+    }
+
+    #[test]
+    fn a_turnout_that_did_not_move_is_noticed_on_the_other_leg() {
+        let mut scene = scene();
+        let c = scene.node("C1");
+        scene.judge(1.0, "A1");
+        let verdict = scene.judge(3.0, "C1");
+        assert_eq!(verdict, Verdict::ByOtherLeg { node: c, turnout: TurnoutId(1), leg: Leg::Curved });
+    }
+
+    #[test]
+    fn one_strange_report_moves_nobody_and_two_that_fit_each_other_do() {
+        let mut scene = scene();
+        let (a, d, b2) = (scene.node("A1"), scene.node("D1"), scene.node("B2"));
+        assert_eq!(scene.judge(1.0, "A1"), Verdict::First(a));
+        assert_eq!(scene.judge(2.0, "E1"), Verdict::Unexplained);
+        let b = scene.node("B1");
+        assert_eq!(scene.judge(3.0, "B1"), Verdict::Passed(b));
+        assert_eq!(scene.judge(5.0, "D1"), Verdict::Passed(d));
+        // Somebody turned it around by hand.
+        assert_eq!(scene.judge(9.0, "D2"), Verdict::Unexplained);
+        assert_eq!(scene.judge(11.0, "B2"), Verdict::Moved { from: Some(d), to: b2 });
+    }
+
+    #[test]
+    fn contacts_that_never_fit_are_another_layout() {
+        let mut scene = scene();
+        scene.judge(1.0, "A1");
+        for (at, name) in [(3.0, "E1"), (5.0, "C2"), (7.0, "E2")] {
+            assert_eq!(scene.judge(at, name), Verdict::Unexplained, "{name}");
+        }
+        let sensor = |name| scene.layout.sensor_named(name).unwrap();
+        let seen = vec![sensor("E1"), sensor("C2"), sensor("E2"), sensor("A2")];
+        let expected = vec![sensor("B1"), sensor("C1")];
+        assert_eq!(scene.judge(9.0, "A2"), Verdict::WrongLayout { seen, expected });
+    }
+}

@@ -1,0 +1,425 @@
+//! One train on its way back from danger: standing, crawling, being measured.
+
+use alloc::vec::Vec;
+
+use crate::control::drive::{Order, OrderId, Refusal};
+use crate::event::{Event, EventKind, Report};
+use crate::ids::{NodeId, SpeedStep, TrainId};
+use crate::model::MotionFit;
+use crate::model::{MeasuredRatio, MotionModel, Rescaling, StepUse};
+use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::PassedContact;
+use crate::units::Length;
+
+use super::alarm::Alarm;
+use super::notice::{Outcome, WatchdogNotice};
+use super::trials::{SpeedTrial, Steps};
+use super::watchdog::Watchdog;
+
+/// How far a train may be off its model in speed and stops until it has been measured again, as ln: engines differ by up to
+/// a half in the middle of their speeds, but at the step where one of them barely crawls another runs three times as fast.
+pub(super) const DOUBTED: f64 = 0.8;
+/// A train that is still believed to be about where it was may be this far off after an unforeseen stop.
+const ABOUT: Length = Length::from_mm(150.0);
+/// A crawl that meets no contact is pushed up a step after this: the longest known hop, 1.5 m, at 110 mm/s.
+const PUSH_AFTER: TimeSpan = TimeSpan::from_s(14.0);
+/// Each phase is over after this, and a person is asked for: standing, ...
+pub(super) const STANDS_WITHIN: TimeSpan = TimeSpan::from_s(30.0);
+/// ... being found, which may take two hops at a crawl and three pushes, ...
+const FOUND_WITHIN: TimeSpan = TimeSpan::from_s(75.0);
+/// ... and one speed, or one stop.
+pub(super) const MEASURED_WITHIN: TimeSpan = TimeSpan::from_s(45.0);
+/// A train that is lost this often while it is being found needs a person.
+const MOST_LOST: u8 = 3;
+/// Any train stands this long after it was told to (the longest of the published stops).
+const SURELY_STANDS: TimeSpan = TimeSpan::from_s(5.0);
+
+/// A train in danger.
+#[derive(Debug, Clone)]
+pub(super) struct Recovery {
+    pub(super) why: Alarm,
+    pub(super) interrupted: Option<(OrderId, Order)>,
+    pub(super) phase: Phase,
+    began: Timestamp,
+    pub(super) by: Timestamp,
+    /// As it was known before.
+    pub(super) base: MotionModel,
+    pub(super) steps: Steps,
+    fit: MotionFit,
+    pub(super) ratios: Vec<MeasuredRatio>,
+    pub(super) change: Rescaling,
+    pub(super) lesson: usize,
+    has_turned: bool,
+    lost: u8,
+}
+
+/// How far it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Phase {
+    /// It comes to rest.
+    Stopping,
+    /// It stands and waits for its turn, for power, for the station, and to be permitted to crawl.
+    Waiting { asked: bool },
+    /// It crawls; the contact it has passed.
+    Crawling { step: SpeedStep, pushed: Timestamp, seen: Option<NodeId> },
+    /// The way ahead has ended: it turns around to crawl the other way.
+    Turning { step: SpeedStep },
+    /// It runs at a speed that is measured.
+    Measuring { trial: SpeedTrial, from: SpeedStep },
+    /// It stops short of a contact by the new model.
+    StoppingShort { order: OrderId, way: Length },
+    /// It crawls up to that.
+    Creeping { way: Length },
+    /// It runs at a speed from which it is to stop, ...
+    LearningSpeed { trial: SpeedTrial, from: SpeedStep },
+    /// ... comes to rest from that ...
+    LearningStop { until: Timestamp },
+    /// ... and crawls to a contact that says where that was.
+    LearningRest,
+    /// Everything is known, and it comes to rest.
+    Ending { outcome: Outcome },
+    /// A person has to see to it.
+    GivenUp,
+}
+
+impl Recovery {
+    pub(super) fn new(
+        now: Timestamp,
+        base: MotionModel,
+        why: Alarm,
+        interrupted: Option<(OrderId, Order)>,
+    ) -> Self {
+        Self {
+            why,
+            interrupted,
+            phase: Phase::Stopping,
+            began: now,
+            by: now + STANDS_WITHIN,
+            steps: Steps::of(&base),
+            fit: MotionFit::new(base.train(), base.highest()),
+            base,
+            ratios: Vec::new(),
+            change: Rescaling::of(Vec::new()),
+            lesson: 0,
+            has_turned: false,
+            lost: 0,
+        }
+    }
+
+    /// The train as it was known before.
+    pub(super) const fn base(&self) -> &MotionModel {
+        &self.base
+    }
+
+    /// Whether it moves, or may, because it was told to by its recovery.
+    pub(super) const fn is_active(&self) -> bool {
+        !matches!(self.phase, Phase::Stopping | Phase::Waiting { .. } | Phase::GivenUp)
+    }
+
+    /// When its phase is over at the latest, or wants to be looked at.
+    pub(super) fn next_timeout(&self) -> Option<Timestamp> {
+        match self.phase {
+            Phase::Waiting { .. } | Phase::GivenUp => None,
+            Phase::Crawling { pushed, .. } => Some(self.by.min(pushed + PUSH_AFTER)),
+            Phase::LearningStop { until } => Some(self.by.min(until)),
+            _ => Some(self.by),
+        }
+    }
+
+    /// Speeds from each of which a stop is learnt.
+    pub(super) const fn lessons(&self) -> [SpeedStep; 4] {
+        let Steps { middle, high, low, .. } = self.steps;
+        [middle, high, low, middle]
+    }
+}
+
+impl Watchdog {
+    /// Whatever the clock or the state of things lets go on.
+    pub(super) fn go_on_recovering(&mut self, now: Timestamp) {
+        let trains: Vec<TrainId> = self.dangers.keys().copied().collect();
+        for train in trains {
+            let Some(recovery) = self.dangers.get(&train) else { continue };
+            match recovery.phase {
+                Phase::Stopping
+                    if !self.is_powered() || self.stops.stands(train).is_some_and(|stands| stands <= now) =>
+                {
+                    self.set_phase(train, Phase::Waiting { asked: false }, now);
+                    self.wait(now, train, false);
+                }
+                Phase::Waiting { asked } => self.wait(now, train, asked),
+                Phase::Crawling { step, pushed, seen } if now - pushed >= PUSH_AFTER && now < recovery.by => {
+                    let next = SpeedStep::new(step.get() + 1).filter(|next| *next <= recovery.steps.middle);
+                    self.crawl(now, train, next.unwrap_or(step), seen);
+                }
+                Phase::LearningStop { until } if until <= now => {
+                    let low = recovery.steps.low;
+                    self.set_phase(train, Phase::LearningRest, now + MEASURED_WITHIN);
+                    self.issue(now, Order::Speed { train, step: low });
+                }
+                Phase::Ending { outcome } if self.stops.stands(train).is_some_and(|stands| stands <= now) => {
+                    self.recovered(now, train, outcome);
+                }
+                Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
+                Phase::GivenUp => {}
+                _ if recovery.by <= now => self.need_person(now, train),
+                _ => {}
+            }
+        }
+    }
+
+    pub(super) fn set_phase(&mut self, train: TrainId, phase: Phase, by: Timestamp) {
+        if let Some(recovery) = self.dangers.get_mut(&train) {
+            recovery.phase = phase;
+            recovery.by = by;
+        }
+    }
+
+    /// It stands: goes on when it is its turn and everything allows it.
+    fn wait(&mut self, now: Timestamp, train: TrainId, asked: bool) {
+        let is_free = self.is_powered() && !self.is_silent() && !self.stops.waits(train);
+        let is_first = self.dangers.values().all(|other| !other.is_active());
+        if !is_free || !is_first {
+            return;
+        }
+        if !self.permits_all && !self.permitted.remove(&train) {
+            if !asked {
+                self.set_phase(train, Phase::Waiting { asked: true }, now);
+                self.say(WatchdogNotice::AsksToCrawl { train });
+            }
+            return;
+        }
+        let Some(recovery) = self.dangers.get(&train) else { return };
+        let is_about = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
+        let crawl = recovery.steps.crawl;
+        match self.driver.locate(train, now).filter(|_| is_about) {
+            Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
+            None => self.driver.lose(now, train),
+        }
+        self.keep_clear(now, train);
+        self.say(WatchdogNotice::Crawls { train, step: crawl });
+        if let Some(recovery) = self.dangers.get_mut(&train) {
+            recovery.by = now + FOUND_WITHIN;
+        }
+        self.crawl(now, train, crawl, None);
+    }
+
+    fn crawl(&mut self, now: Timestamp, train: TrainId, step: SpeedStep, seen: Option<NodeId>) {
+        if let Some(recovery) = self.dangers.get_mut(&train) {
+            recovery.phase = Phase::Crawling { step, pushed: now, seen };
+        }
+        self.issue(now, Order::Speed { train, step });
+    }
+
+    /// A command to a train in recovery has left.
+    pub(super) fn recovering_told(&mut self, now: Timestamp, event: &Event) {
+        let (EventKind::Speed { train, .. } | EventKind::Reverse { train }) = event.kind else { return };
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        recovery.fit.take(self.driver.layout(), self.driver.turnouts(), event);
+        if let (EventKind::Reverse { .. }, Phase::Turning { step }) = (event.kind, recovery.phase) {
+            recovery.phase = Phase::Crawling { step, pushed: now, seen: None };
+            recovery.by = now + FOUND_WITHIN;
+            self.keep_clear(now, train);
+        } else if let EventKind::Speed { step, .. } = event.kind
+            && let Phase::Measuring { trial, from } | Phase::LearningSpeed { trial, from } =
+                &mut recovery.phase
+            && trial.step == step
+        {
+            trial.commanded(&recovery.base, *from, event.time);
+        }
+    }
+
+    /// A train in recovery has passed a contact.
+    pub(super) fn recovering_passed(&mut self, now: Timestamp, train: TrainId, passed: &PassedContact) {
+        let Some(node) = self.driver.node_passed(passed) else { return };
+        if !self.dangers.get(&train).is_some_and(|danger| matches!(danger.phase, Phase::Turning { .. })) {
+            self.keep_clear(now, train);
+        }
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        if passed.late.is_none() {
+            recovery.fit.interrupt();
+        }
+        let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
+        let event = Event { time: passed.window.until, kind: EventKind::Sensor(report) };
+        recovery.fit.take(self.driver.layout(), self.driver.turnouts(), &event);
+        let commanded = self.driver.commanded(train);
+        match recovery.phase {
+            Phase::Crawling { step, seen: Some(seen), .. } => {
+                recovery.fit.note_use(step, StepUse::Moves);
+                // Two contacts that follow each other say which way it runs.
+                if self.driver.felt_hop(train, seen, node).is_some() {
+                    self.say(WatchdogNotice::Found { train });
+                    self.measure(now, train);
+                } else {
+                    self.crawl(now, train, step, Some(node));
+                }
+            }
+            Phase::Crawling { step, seen: None, .. } => {
+                recovery.phase = Phase::Crawling { step, pushed: now, seen: Some(node) };
+            }
+            Phase::Measuring { mut trial, from } => {
+                let hop = trial.last().and_then(|last| self.driver.felt_hop(train, last, node));
+                trial.pass(node, passed.window, hop);
+                recovery.phase = Phase::Measuring { trial, from };
+                if trial.is_over() {
+                    recovery.fit.note_use(trial.step, StepUse::Moves);
+                    let ratio = trial.ratio(&recovery.base);
+                    recovery.ratios.extend(ratio);
+                    if let Some(MeasuredRatio { step, ratio, deviation }) = ratio {
+                        self.say(WatchdogNotice::Measured { train, step, ratio, deviation });
+                    }
+                    self.measure(now, train);
+                }
+            }
+            Phase::Creeping { way } => self.check_stop(now, train, way, passed),
+            Phase::LearningSpeed { mut trial, from } => {
+                trial.pass(node, passed.window, None);
+                recovery.phase = Phase::LearningSpeed { trial, from };
+                if trial.last().is_some() && commanded == trial.step {
+                    let until = now + SURELY_STANDS + SURELY_STANDS;
+                    self.set_phase(train, Phase::LearningStop { until }, until + MEASURED_WITHIN);
+                    self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+                }
+            }
+            Phase::LearningRest => self.next_lesson(now, train),
+            _ => {}
+        }
+    }
+
+    /// An order of a recovery has been carried out, or not.
+    pub(super) fn recovering_done(
+        &mut self,
+        now: Timestamp,
+        train: TrainId,
+        done: OrderId,
+        why: Option<&Refusal>,
+    ) {
+        let Some(recovery) = self.dangers.get(&train) else { return };
+        let Phase::StoppingShort { order, way } = recovery.phase else { return };
+        if order != done {
+            return;
+        }
+        let crawl = recovery.steps.crawl;
+        if why.is_none() {
+            self.set_phase(train, Phase::Creeping { way }, now + MEASURED_WITHIN);
+            self.issue(now, Order::Speed { train, step: crawl });
+        } else {
+            self.end_rescaled(now, train);
+        }
+    }
+
+    /// The way ahead of a train in recovery has ended, or another train stands there.
+    pub(super) fn recovering_blocked(&mut self, now: Timestamp, train: TrainId) {
+        match self.dangers.get(&train).map(|recovery| recovery.phase) {
+            Some(Phase::Crawling { .. } | Phase::Measuring { .. }) => self.turn_or_decide(now, train),
+            Some(Phase::Creeping { .. } | Phase::StoppingShort { .. }) => self.end_rescaled(now, train),
+            Some(Phase::LearningSpeed { .. } | Phase::LearningRest) => {
+                self.end(now, train, Outcome::LearntAnew);
+            }
+            _ => {}
+        }
+    }
+
+    /// It has been lost again: it is looked for once more.
+    pub(super) fn recovering_lost(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        recovery.lost += 1;
+        if recovery.lost >= MOST_LOST {
+            return self.need_person(now, train);
+        }
+        let crawl = recovery.steps.crawl;
+        recovery.ratios.clear();
+        recovery.by = now + FOUND_WITHIN;
+        self.crawl(now, train, crawl, None);
+    }
+
+    fn turn_or_decide(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        if recovery.ratios.iter().any(|one| one.deviation.is_finite()) {
+            // What has been measured has to do for the rest.
+            let Steps { middle, low, high, .. } = recovery.steps;
+            for step in [middle, low, high] {
+                if recovery.ratios.iter().all(|one| one.step != step) {
+                    recovery.ratios.push(MeasuredRatio { step, ratio: 1.0, deviation: f64::INFINITY });
+                }
+            }
+            return self.measure(now, train);
+        }
+        if core::mem::replace(&mut recovery.has_turned, true) {
+            return self.need_person(now, train);
+        }
+        let step = recovery.steps.crawl;
+        recovery.phase = Phase::Turning { step };
+        recovery.by = now + STANDS_WITHIN;
+        // Behind it is where it came from.
+        self.driver.set_limit(now, train, None);
+        self.issue(now, Order::Reverse { train, then: step });
+    }
+
+    /// Everything is known: the train comes to rest.
+    pub(super) fn end(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let model = match outcome {
+            Outcome::AsBefore => recovery.base.clone(),
+            Outcome::Rescaled { .. } => recovery.base.rescaled(&recovery.change),
+            Outcome::LearntAnew => {
+                self.driver.refit(&mut recovery.fit);
+                recovery.fit.model().clone()
+            }
+        };
+        self.driver.set_model(model);
+        self.set_phase(train, Phase::Ending { outcome }, now + STANDS_WITHIN);
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+
+    /// It stands and is known again.
+    fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
+        let Some(recovery) = self.dangers.remove(&train) else { return };
+        self.driver.set_limit(now, train, None);
+        if let Some(monitor) = self.monitors.get_mut(&train) {
+            monitor.place();
+        }
+        self.say(WatchdogNotice::Recovered { train, outcome, took: now - recovery.began });
+        if self.dangers.is_empty() {
+            let held = core::mem::take(&mut self.held);
+            let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));
+            let own = recovery.interrupted.map(|order| (train, order));
+            for (train, (id, order)) in interrupted.chain(own).collect::<Vec<_>>() {
+                self.resume(now, train, id, order);
+            }
+        } else {
+            // Others are still in danger: it is held until they are not.
+            self.held.insert(train, recovery.interrupted);
+        }
+    }
+
+    fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
+        // Nobody knows how far a move or a turn had got.
+        let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
+        let resumed = if can_go_on { self.order(now, order).ok() } else { None };
+        match resumed {
+            Some(order) => self.say(WatchdogNotice::Resumed { train, interrupted: Some(id), order }),
+            None => self.say(WatchdogNotice::Dropped { train, order }),
+        }
+    }
+
+    /// Its time is over.
+    pub(super) fn need_person(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let while_it = match recovery.phase {
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => {
+                "while it was being \
+                                                                               stopped"
+            }
+            Phase::Crawling { .. } | Phase::Turning { .. } => "while it crept to a sensor",
+            Phase::GivenUp => return,
+            _ => "while it was measured again",
+        };
+        recovery.phase = Phase::GivenUp;
+        let order = recovery.interrupted.take();
+        self.say(WatchdogNotice::NeedsPerson { train, while_it });
+        if let Some((_, order)) = order {
+            self.say(WatchdogNotice::Dropped { train, order });
+        }
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+}

@@ -1,0 +1,171 @@
+//! Measuring a train again that is located again: speeds first, then a stop, and everything if it is another one.
+
+use alloc::vec::Vec;
+
+use crate::control::drive::{Order, StopOrder};
+use crate::event::Approach;
+use crate::ids::{SpeedStep, TrainId};
+use crate::model::{MeasuredRatio, Rescaling};
+use crate::time::Timestamp;
+use crate::track::Landmark;
+use crate::tracking::PassedContact;
+use crate::units::Length;
+
+use super::alarm::Alarm;
+use super::notice::{Outcome, WatchdogNotice};
+use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
+use super::trials::{SpeedTrial, Steps};
+use super::watchdog::Watchdog;
+
+/// A ratio no further from 1 than this is none: what a run differs from the next, three times.
+const SAME: f64 = 0.02;
+/// See [`SAME`]: in standard deviations.
+const SAME_DEVIATIONS: f64 = 3.0;
+/// Ratios that are further apart than this are not of one train that has changed, but of two.
+const ANOTHER: f64 = 1.10;
+/// A stop this many standard deviations from its forecast is not of the same train either.
+const ANOTHER_STOP: f64 = 2.5;
+/// How far before a contact the checked stop ends, and is crawled up to.
+const SHORT_OF: Length = Length::from_mm(120.0);
+/// Hops ahead among which one is looked for that is long enough for that.
+const HOPS_TO_STOP: usize = 8;
+
+impl Watchdog {
+    /// Begins with the next speed, or decides what the train is.
+    pub(super) fn measure(&mut self, now: Timestamp, train: TrainId) {
+        let commanded = self.driver.commanded(train);
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let Steps { middle, low, high, .. } = recovery.steps;
+        let is_same =
+            |one: &MeasuredRatio| libm::log(one.ratio).abs() <= SAME.max(SAME_DEVIATIONS * one.deviation);
+        let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
+        // Only who is said to drift has to show all of its speeds before that is taken back.
+        let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));
+        // Upwards: a step reached from above is faster, and by how much is not known as well.
+        let plan = [low, middle, high];
+        let next = plan.iter().find(|step| recovery.ratios.iter().all(|one| one.step != **step));
+        if let Some(step) = next.filter(|_| !is_enough) {
+            let trial = SpeedTrial::new(*step, commanded);
+            self.set_phase(train, Phase::Measuring { trial, from: commanded }, now + MEASURED_WITHIN);
+            if commanded == *step {
+                let base = self.dangers.get(&train).map(|recovery| recovery.base.clone());
+                if let (Some(base), Some(Recovery { phase: Phase::Measuring { trial, .. }, .. })) =
+                    (base, self.dangers.get_mut(&train))
+                {
+                    trial.commanded(&base, commanded, now);
+                }
+            } else {
+                self.issue(now, Order::Speed { train, step: *step });
+            }
+            return;
+        }
+        if is_enough {
+            return self.end(now, train, Outcome::AsBefore);
+        }
+        if all_same {
+            // Another engine may be as fast: its stops will tell.
+            recovery.change = Rescaling::of(Vec::new());
+            let base = recovery.base.clone();
+            self.driver.set_model(base);
+            return self.stop_short(now, train);
+        }
+        let measured = recovery.ratios.iter().filter(|one| one.deviation.is_finite()).copied().collect();
+        recovery.change = Rescaling::of(measured);
+        let changed = recovery.base.rescaled(&recovery.change);
+        if recovery.change.measured.is_empty() {
+            return self.need_person(now, train);
+        }
+        if recovery.change.disagreement() > ANOTHER {
+            return self.next_lesson(now, train);
+        }
+        self.driver.set_model(changed);
+        self.stop_short(now, train);
+    }
+
+    /// A step at which the train was not seen is left out.
+    pub(super) fn skip(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) {
+        if let Some(recovery) = self.dangers.get_mut(&train) {
+            recovery.ratios.push(MeasuredRatio { step, ratio: 1.0, deviation: f64::INFINITY });
+        }
+        self.measure(now, train);
+    }
+
+    /// A stop that ends shortly before a contact.
+    pub(super) fn stop_short(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get(&train) else { return };
+        let step = recovery.steps.middle;
+        let target = self.target_short_of_contact(now, train);
+        let way = self.driver.model(train).map(|model| model.stop(step, Approach::Below).distance);
+        let ordered = target.zip(way).and_then(|(target, way)| {
+            let stop = StopOrder { step: Some(step), ..StopOrder::at(train, target) };
+            Some((self.issue(now, Order::Stop(stop))?, way))
+        });
+        match ordered {
+            Some((order, way)) => {
+                self.set_phase(train, Phase::StoppingShort { order, way }, now + MEASURED_WITHIN);
+            }
+            // Where no stop can be checked what is not known of them stays wide.
+            None => self.end_rescaled(now, train),
+        }
+    }
+
+    /// A place shortly before a contact, behind the second one from here on.
+    fn target_short_of_contact(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
+        let context = self.driver.context();
+        let from = self.driver.locate(train, now)?.at.node;
+        let hops = context.hops_ahead(from).skip(2).take(HOPS_TO_STOP);
+        let mut hops = hops.filter(|hop| hop.sensor.is_some() && hop.length > 2.0 * SHORT_OF);
+        hops.next().map(|hop| Landmark { node: hop.from, offset: hop.length + -SHORT_OF })
+    }
+
+    /// How far from its forecast a stop has ended.
+    pub(super) fn check_stop(&mut self, now: Timestamp, train: TrainId, way: Length, passed: &PassedContact) {
+        let speed = self.driver.locate(train, now).map(|located| located.speed);
+        let seen = passed.short.zip(passed.late).zip(speed).filter(|_| passed.missed == 0);
+        let Some(((short, [_, uncertain]), speed)) = seen else { return self.end_rescaled(now, train) };
+        let deviation = (speed * uncertain).max(Length::from_mm(1.0));
+        self.say(WatchdogNotice::StopChecked { train, beyond: short, deviation });
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        if short.abs() > deviation * ANOTHER_STOP {
+            return self.next_lesson(now, train);
+        }
+        // What is not known of the stop is in the deviation already: only the rest of it is of the measurement.
+        let known = way * recovery.change.stops_deviation;
+        let measured = Length::from_m(libm::sqrt(
+            (deviation.as_m() * deviation.as_m() - known.as_m() * known.as_m()).max(1e-5),
+        ));
+        if way > Length::ZERO {
+            recovery.change.take_stop(short / way, measured / way);
+        }
+        self.end_rescaled(now, train);
+    }
+
+    pub(super) fn end_rescaled(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get(&train) else { return };
+        let ratio = recovery.change.ratio;
+        // Without a ratio nothing has changed.
+        let is_same = recovery.change.measured.is_empty();
+        self.end(now, train, if is_same { Outcome::AsBefore } else { Outcome::Rescaled { ratio } });
+    }
+
+    /// Another engine: one more speed and the stop from it.
+    pub(super) fn next_lesson(&mut self, now: Timestamp, train: TrainId) {
+        let commanded = self.driver.commanded(train);
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let Some(step) = recovery.lessons().get(recovery.lesson).copied() else {
+            return self.end(now, train, Outcome::LearntAnew);
+        };
+        recovery.lesson += 1;
+        let trial = SpeedTrial::new(step, commanded);
+        self.set_phase(train, Phase::LearningSpeed { trial, from: commanded }, now + MEASURED_WITHIN);
+        if commanded == step {
+            if let Some(Recovery { phase: Phase::LearningSpeed { trial, .. }, base, .. }) =
+                self.dangers.get_mut(&train)
+            {
+                trial.commanded(base, commanded, now);
+            }
+        } else {
+            self.issue(now, Order::Speed { train, step });
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What is measured with a train that is located again: its speed at a few steps, and a stop.
+
+use alloc::vec::Vec;
+
+use crate::event::Approach;
+use crate::ids::{NodeId, SpeedStep};
+use crate::link::ContactWindow;
+use crate::model::{MeasuredRatio, MotionModel, StepUse};
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Length, Speed};
+
+/// A train that nobody is sure of runs no faster than this to be found, ...
+const CRAWL_UP_TO: Speed = Speed::from_mm_per_s(150.0);
+/// ... and no slower, or it may not start at all.
+const CRAWL_FROM: Speed = Speed::from_mm_per_s(80.0);
+/// Speeds at which it is measured: a low one that it surely has, ...
+const LOW: Speed = Speed::from_mm_per_s(140.0);
+/// ... and a high one from which it stops within a metre.
+const HIGH: Speed = Speed::from_mm_per_s(430.0);
+/// Hops that a speed is measured over, ...
+const HOPS: u8 = 3;
+/// ... or as few as two, if they are this long.
+const LONG_ENOUGH: Length = Length::from_mm(1_200.0);
+/// One run differs from the next by so much, as a part.
+const RUN_DEVIATION: f64 = 0.006;
+/// Changes of speed take a little longer than the model of another train says.
+const SETTLES_PART: f64 = 1.3;
+/// See [`SETTLES_PART`].
+const SETTLES_MORE: TimeSpan = TimeSpan::from_ms(400);
+
+/// The steps that a recovery uses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Steps {
+    pub(super) crawl: SpeedStep,
+    pub(super) middle: SpeedStep,
+    pub(super) low: SpeedStep,
+    pub(super) high: SpeedStep,
+}
+
+impl Steps {
+    pub(super) fn of(model: &MotionModel) -> Self {
+        let all = || (1..=model.highest().get()).filter_map(SpeedStep::new);
+        let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
+        let mut usable: Vec<SpeedStep> = all().filter(|step| model.uses(*step) == StepUse::Moves).collect();
+        if usable.is_empty() {
+            usable = all().filter(|step| model.uses(*step) != StepUse::Unreliable).collect();
+        }
+        let first = usable.first().copied().unwrap_or(model.highest());
+        let least = |from: Speed| usable.iter().find(|step| speed(**step) >= from).copied().unwrap_or(first);
+        let crawl = Some(least(CRAWL_FROM)).filter(|step| speed(*step) <= CRAWL_UP_TO).unwrap_or(first);
+        let low = least(LOW);
+        let high = usable.iter().rev().find(|step| speed(**step) <= HIGH).copied().unwrap_or(low).max(low);
+        let between = Speed::from_mm_per_s(libm::sqrt(speed(low).as_mm_per_s() * speed(high).as_mm_per_s()));
+        Self { crawl, middle: least(between).clamp(low, high), low, high }
+    }
+}
+
+/// A speed being measured: from contact to contact, once it has settled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpeedTrial {
+    pub(super) step: SpeedStep,
+    approach: Approach,
+    settled: Option<Timestamp>,
+    first: Option<ContactWindow>,
+    last: Option<(NodeId, ContactWindow)>,
+    way: Length,
+    hops: u8,
+}
+
+impl SpeedTrial {
+    pub(super) const fn new(step: SpeedStep, from: SpeedStep) -> Self {
+        let approach = if from.get() > step.get() { Approach::Above } else { Approach::Below };
+        Self { step, approach, settled: None, first: None, last: None, way: Length::ZERO, hops: 0 }
+    }
+
+    /// The command has left.
+    pub(super) fn commanded(&mut self, model: &MotionModel, from: SpeedStep, at: Timestamp) {
+        let settles = TimeSpan::from_s(model.settles_within(from, self.step).as_s() * SETTLES_PART);
+        self.settled = Some(at + settles + SETTLES_MORE);
+    }
+
+    /// Where the train passed a contact, and how far that is from the one before.
+    pub(super) fn pass(&mut self, node: NodeId, window: ContactWindow, hop: Option<Length>) {
+        if self.settled.is_none_or(|settled| window.after < settled) {
+            return;
+        }
+        match (self.first, hop) {
+            (Some(_), Some(hop)) => {
+                self.way += hop;
+                self.hops += 1;
+            }
+            // The first one, or one that does not follow the last: from here on.
+            _ => {
+                self.first = Some(window);
+                self.way = Length::ZERO;
+                self.hops = 0;
+            }
+        }
+        self.last = Some((node, window));
+    }
+
+    /// The contact from which the next hop counts.
+    pub(super) fn last(&self) -> Option<NodeId> {
+        self.last.map(|(node, _)| node)
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.hops >= HOPS || self.hops >= 2 && self.way >= LONG_ENOUGH
+    }
+
+    /// What it comes to.
+    pub(super) fn ratio(&self, model: &MotionModel) -> Option<MeasuredRatio> {
+        let (first, (_, last)) = (self.first?, self.last?);
+        let took = (last.middle() - first.middle()).as_s();
+        let known = model.speed(self.step, self.approach).value.as_m_per_s();
+        if self.hops == 0 || took <= 0.0 || known <= 0.0 {
+            return None;
+        }
+        let doubt = libm::sqrt(first.variance_s2() + last.variance_s2()) / took;
+        let ratio = self.way.as_m() / took / known;
+        Some(MeasuredRatio { step: self.step, ratio, deviation: libm::hypot(doubt, RUN_DEVIATION) })
+    }
+}

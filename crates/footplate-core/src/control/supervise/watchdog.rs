@@ -1,0 +1,483 @@
+//! Watches over a driver, and puts things right when they go wrong.
+
+use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
+use alloc::vec::Vec;
+use core::ops::Deref;
+
+use crate::control::drive::{DriveNotice, Driver, Order, OrderId, Refusal};
+use crate::control::{Machine, Output};
+use crate::event::{Command, Event, EventKind};
+use crate::ids::{SpeedStep, TrainId};
+use crate::model::MotionModel;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Position;
+use crate::tracking::{Locator, WayPoint};
+use crate::units::Length;
+
+use super::alarm::Alarm;
+use super::consistency_monitor::ConsistencyMonitor;
+use super::notice::WatchdogNotice;
+use super::recovery::{Phase, Recovery};
+use super::stops::Stops;
+
+/// Times to rest are foreseen to this part, ...
+const REST_PART: f64 = 1.3;
+/// ... and this.
+const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
+/// A train of which nobody knows how it moves stands after this (the longest of the published stops).
+const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
+
+/// Whether the track has power, as far as this machine has a say in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Power {
+    On,
+    Off { since: Timestamp },
+}
+
+/// A driver and everything that is looked at while it drives. To whoever is above it is a driver that sometimes refuses.
+#[derive(Debug, Clone)]
+pub struct Watchdog {
+    pub(super) driver: Driver,
+    queue: VecDeque<Output<WatchdogNotice>>,
+    pub(super) monitors: BTreeMap<TrainId, ConsistencyMonitor>,
+    pub(super) stops: Stops,
+    pub(super) power: Power,
+    /// Since when the station has been silent.
+    pub(super) silent: Option<Timestamp>,
+    /// Trains that are not as they were.
+    pub(super) dangers: BTreeMap<TrainId, Recovery>,
+    /// Trains that are held until the danger is over, with what they were doing.
+    pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
+    /// What each train was commanded last that is not done with.
+    pub(super) standing: BTreeMap<TrainId, (OrderId, Order)>,
+    /// Where each train was seen last.
+    pub(super) seen: BTreeMap<TrainId, Position>,
+    /// Orders of the watchdog's own.
+    own: BTreeMap<OrderId, TrainId>,
+    /// Nobody above keeps trains apart and gives orders anew.
+    pub(super) permits_all: bool,
+    /// Whether it does more than to hand everything through.
+    is_watching: bool,
+    /// A person took the power from the track.
+    pub(super) is_switched_off: bool,
+    pub(super) permitted: BTreeSet<TrainId>,
+    /// When the clock was looked at last: nothing that was due until then is due again.
+    looked: Timestamp,
+}
+
+impl Watchdog {
+    /// Watches over a driver.
+    #[must_use]
+    pub fn new(driver: Driver, now: Timestamp) -> Self {
+        let mut watchdog = Self {
+            driver,
+            queue: VecDeque::new(),
+            monitors: BTreeMap::new(),
+            stops: Stops::default(),
+            power: Power::On,
+            silent: None,
+            dangers: BTreeMap::new(),
+            held: BTreeMap::new(),
+            standing: BTreeMap::new(),
+            seen: BTreeMap::new(),
+            own: BTreeMap::new(),
+            permits_all: true,
+            is_watching: true,
+            is_switched_off: false,
+            permitted: BTreeSet::new(),
+            looked: now,
+        };
+        let trains: Vec<TrainId> = watchdog.driver.trains().collect();
+        for train in trains {
+            if watchdog.driver.locate(train, now).is_some() {
+                watchdog.monitors.entry(train).or_default().place();
+                watchdog.note_place(now, train);
+            }
+        }
+        watchdog
+    }
+
+    /// Watches over nothing: a driver as it is, in the place of one that is watched.
+    #[must_use]
+    pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
+        Self { is_watching: false, ..Self::new(driver, now) }
+    }
+
+    /// The driver itself, for what the watchdog does not look at. Whoever orders trains there does so unwatched.
+    pub const fn driver_mut(&mut self) -> &mut Driver {
+        &mut self.driver
+    }
+
+    /// See [`Driver::add_train`].
+    pub fn add_train(&mut self, model: MotionModel) {
+        self.forget(model.train());
+        self.driver.add_train(model);
+    }
+
+    /// See [`Driver::add_located`].
+    pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
+        self.forget(model.train());
+        self.driver.add_located(model, locator);
+    }
+
+    /// See [`Driver::set_model`]. What a recovery finds takes its place.
+    pub fn set_model(&mut self, model: MotionModel) {
+        if !self.dangers.contains_key(&model.train()) {
+            self.driver.set_model(model);
+        }
+    }
+
+    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
+    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+        if !self.dangers.contains_key(&train) {
+            self.driver.set_limit(now, train, limit);
+            self.drain(now);
+        }
+    }
+
+    /// A person put a train there, or read off where it stands; a train that could not be brought back is trusted again
+    /// with that, as it was before. When nobody is in danger then, those that were held are not any more; what they were
+    /// doing is dropped, and said to be.
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+        self.trust_again(train);
+        self.driver.place(now, train, at, uncertainty);
+        self.monitors.entry(train).or_default().place();
+        self.note_place(now, train);
+        if self.dangers.is_empty() {
+            // A hand was at the track: nothing that waited sets off by itself.
+            for (train, order) in core::mem::take(&mut self.held) {
+                if let Some((_, order)) = order {
+                    self.say(WatchdogNotice::Dropped { train, order });
+                }
+            }
+        }
+        self.drain(now);
+    }
+
+    /// See [`Driver::lose`].
+    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
+        self.driver.lose(now, train);
+        self.drain(now);
+    }
+
+    /// See [`Driver::count_from_behind`].
+    pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
+        self.driver.count_from_behind(now, train);
+        self.drain(now);
+    }
+
+    /// Whether a train is in danger or held because of one.
+    #[must_use]
+    pub fn is_held(&self, train: TrainId) -> bool {
+        self.dangers.contains_key(&train) || self.held.contains_key(&train)
+    }
+
+    /// Whether any train is in danger: until none is, nobody knows what it may run into.
+    #[must_use]
+    pub fn has_danger(&self) -> bool {
+        !self.dangers.is_empty()
+    }
+
+    /// Whether a train is in danger.
+    #[must_use]
+    pub fn is_in_danger(&self, train: TrainId) -> bool {
+        self.dangers.contains_key(&train)
+    }
+
+    /// Whether orders to a train are refused for something that may yet end by itself: a danger that is seen to, a station
+    /// that is silent.
+    #[must_use]
+    pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
+        let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
+        self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
+    }
+
+    /// Somebody above keeps trains apart: from now on a train in danger asks before it crawls, see
+    /// [`permit`](Self::permit), and nothing that was interrupted is gone on with by itself.
+    pub const fn ask_before_crawling(&mut self) {
+        self.permits_all = false;
+    }
+
+    /// A train that asked may crawl and be measured.
+    pub fn permit(&mut self, now: Timestamp, train: TrainId) {
+        self.permitted.insert(train);
+        self.act(now);
+    }
+
+    /// Whoever is above does not trust a train any more.
+    pub fn distrust(&mut self, now: Timestamp, train: TrainId) {
+        self.raise(now, train, Alarm::Distrusted);
+        self.act(now);
+    }
+
+    /// Whoever is above knows that one more train could meet one in danger: it is stopped and held with the others.
+    pub fn also_hold(&mut self, now: Timestamp, train: TrainId) {
+        if !self.dangers.is_empty() && !self.is_held(train) && self.driver.model(train).is_some() {
+            self.hold(now, train);
+            self.act(now);
+        }
+    }
+
+    /// Begins to carry out an order; see [`Driver::order`].
+    ///
+    /// # Errors
+    /// Why it cannot be carried out: what the driver says, and that a train is held.
+    pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        if let Some(train) = order.train() {
+            let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
+            if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
+                // There is nothing to run into: a person lets it run over a contact, which says where it is.
+                self.trust_again(train);
+            }
+            if !stops && (self.is_held(train) || self.could_meet(now, train)) {
+                return Err(Refusal::InDanger { train });
+            }
+            if !stops && self.is_silent() {
+                return Err(Refusal::NoAnswer);
+            }
+            if !stops && !self.is_powered() {
+                return Err(Refusal::NoPower);
+            }
+        }
+        let id = self.driver.order(now, order)?;
+        if let Some(train) = order.train() {
+            if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {
+                self.standing.remove(&train);
+                if let Some(held) = self.held.get_mut(&train) {
+                    *held = None;
+                }
+            } else {
+                self.standing.insert(train, (id, order));
+            }
+        }
+        self.act(now);
+        Ok(id)
+    }
+
+    /// A train that could not be brought back counts as it was before: a person has seen to it.
+    fn trust_again(&mut self, train: TrainId) {
+        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
+        if let Some(base) = given_up.map(|danger| danger.base().clone()) {
+            self.driver.set_model(base);
+            self.forget(train);
+        }
+    }
+
+    /// An order of the watchdog's own.
+    pub(super) fn issue(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
+        let id = self.driver.order(now, order).ok()?;
+        if let Some(train) = order.train() {
+            self.own.insert(id, train);
+        }
+        Some(id)
+    }
+
+    pub(super) fn say(&mut self, notice: WatchdogNotice) {
+        self.queue.push_back(Output::Notice(notice));
+    }
+
+    pub(super) fn command(&mut self, command: Command) {
+        self.queue.push_back(Output::Command(command));
+    }
+
+    fn forget(&mut self, train: TrainId) {
+        self.dangers.remove(&train);
+        self.held.remove(&train);
+        self.standing.remove(&train);
+        self.stops.forget(train);
+        self.monitors.remove(&train);
+        self.seen.remove(&train);
+    }
+
+    /// Everything that follows from what has just been heard.
+    pub(super) fn act(&mut self, now: Timestamp) {
+        self.drain(now);
+        if let Some(train) = self.stops.overdue(now).filter(|_| self.is_watching && self.is_powered()) {
+            self.raise(now, train, Alarm::StopUnconfirmed);
+            self.power_off(now, train);
+        }
+        self.looked = now;
+        self.power_on_again(now);
+        self.go_on_recovering(now);
+        if self.dangers.values().all(|danger| !danger.is_active()) {
+            // One may have ended for which another has waited.
+            self.go_on_recovering(now);
+        }
+        self.drain(now);
+    }
+
+    /// Hands on what the driver wants, and looks at it on the way.
+    fn drain(&mut self, now: Timestamp) {
+        while let Some(output) = self.driver.poll_output() {
+            match output {
+                Output::Command(command) => {
+                    if let Command::Speed { train, step } = command {
+                        if step == SpeedStep::STAND {
+                            self.stops.ask(train, now);
+                        } else {
+                            self.stops.forget(train);
+                        }
+                    }
+                    self.command(command);
+                }
+                Output::HoldLine(until) => self.queue.push_back(Output::HoldLine(until)),
+                Output::Watch(sensor) => self.queue.push_back(Output::Watch(sensor)),
+                Output::Notice(notice) => self.hear(now, notice),
+            }
+        }
+    }
+
+    fn hear(&mut self, now: Timestamp, notice: DriveNotice) {
+        match &notice {
+            DriveNotice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
+            DriveNotice::Lost { train } => {
+                self.monitors.entry(*train).or_default().lose();
+                let train = *train;
+                self.say(WatchdogNotice::Drive(notice));
+                if self.dangers.get(&train).is_some_and(Recovery::is_active) {
+                    self.recovering_lost(now, train);
+                } else {
+                    self.raise(now, train, Alarm::Lost);
+                }
+                return;
+            }
+            DriveNotice::Unexplained { sensor, .. } if self.is_watching => {
+                let stray = |train: &TrainId| {
+                    self.stops.should_stand(*train, now)
+                        && self.driver.contact_ahead(*train, now) == Some(*sensor)
+                };
+                let stray = self.driver.trains().find(stray);
+                if let Some(train) = stray {
+                    self.raise(now, train, Alarm::DoesNotStop(*sensor));
+                    self.power_off(now, train);
+                }
+            }
+            DriveNotice::Done(finished) => {
+                if self.own.remove(&finished.order).is_some() {
+                    return self.recovering_done(now, finished.train, finished.order, None);
+                }
+                let goes_on = |order: &Order| {
+                    matches!(
+                        order,
+                        Order::Speed { .. }
+                            | Order::Hold { .. }
+                            | Order::Follow { .. }
+                            | Order::Reverse { .. }
+                    )
+                };
+                if self
+                    .standing
+                    .get(&finished.train)
+                    .is_some_and(|(id, order)| *id == finished.order && !goes_on(order))
+                {
+                    self.standing.remove(&finished.train);
+                }
+            }
+            DriveNotice::GivenUp { order, train, why } => {
+                if self.own.remove(order).is_some() {
+                    return self.recovering_done(now, *train, *order, Some(why));
+                }
+                // Otherwise it goes on when the train has been found.
+                if self.resumes() && matches!(why, Refusal::Lost { .. }) {
+                    return;
+                }
+                self.standing.remove(train);
+            }
+            DriveNotice::Replaced { order, train }
+                if self.own.contains_key(order) || self.resumes() && self.is_held(*train) =>
+            {
+                self.own.remove(order);
+                return;
+            }
+            DriveNotice::Planned(planned) if self.own.contains_key(&planned.order) => return,
+            DriveNotice::TrackEnds { train, .. } | DriveNotice::AtLimit { train } => {
+                let train = *train;
+                self.standing.remove(&train);
+                self.recovering_blocked(now, train);
+            }
+            _ => {}
+        }
+        self.say(WatchdogNotice::Drive(notice));
+    }
+
+    fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
+        let alarm = self.monitors.entry(train).or_default().pass(passed);
+        self.note_place(now, train);
+        if self.is_watching && self.stops.should_stand(train, now) {
+            self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
+            self.power_off(now, train);
+        } else if self.dangers.contains_key(&train) {
+            self.recovering_passed(now, train, passed);
+        } else if let Some(why) = alarm {
+            self.raise(now, train, why);
+        }
+        if !self.dangers.is_empty() {
+            let stopped = self.hold_what_could_meet(now);
+            debug_assert!(stopped.iter().all(|train| self.is_held(*train)));
+        }
+    }
+
+    /// Whether it goes on by itself with what was interrupted.
+    pub(super) const fn resumes(&self) -> bool {
+        self.permits_all && self.is_watching
+    }
+
+    pub(super) const fn is_watching(&self) -> bool {
+        self.is_watching
+    }
+
+    fn stands_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
+        let located = self.driver.locate(train, left);
+        let model = self.driver.model(train);
+        let doubted = self.dangers.contains_key(&train);
+        let (Some(located), Some(model), false) = (located, model, doubted) else {
+            return left + REST_UNKNOWN;
+        };
+        let stop = model.stop(located.step, crate::event::Approach::Above);
+        left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
+    }
+}
+
+/// What it watches over, for looking only: whatever is told to it passes through the watchdog.
+impl Deref for Watchdog {
+    type Target = Driver;
+
+    fn deref(&self) -> &Driver {
+        &self.driver
+    }
+}
+
+impl Machine for Watchdog {
+    type Notice = WatchdogNotice;
+
+    fn handle_event(&mut self, now: Timestamp, event: &Event) {
+        if let EventKind::Speed { train, step } = event.kind {
+            if step == SpeedStep::STAND {
+                let stands = self.stands_by(train, event.time);
+                self.stops.left(train, stands);
+                self.monitors.entry(train).or_default().stand();
+            } else {
+                self.stops.forget(train);
+            }
+        }
+        self.driver.handle_event(now, event);
+        self.recovering_told(now, event);
+        self.act(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.driver.handle_timeout(now);
+        self.act(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Output<WatchdogNotice>> {
+        self.queue.pop_front()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        let waits = self.dangers.keys().filter_map(|train| self.stops.stands(*train));
+        let recovering = self.dangers.values().filter_map(Recovery::next_timeout);
+        let own = recovering.chain(waits).chain(self.stops.next()).chain(self.power_due());
+        own.filter(|at| *at > self.looked).chain(self.driver.next_timeout()).min()
+    }
+}

@@ -1,0 +1,159 @@
+//! What an experiment would see of a model's numbers, before it is made.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::motion_model::MotionModel;
+use super::parameters::Answers;
+use super::priors::{LATE_START, TRIP_DEVIATION};
+use super::segment::{Pace, Segment, SpeedCommand};
+use super::short_moves::move_way;
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+use crate::time::TimeSpan;
+use crate::units::Length;
+
+/// A contact is timed this well (s): the module that it is on is polled every 40 ms, 40/√12.
+const TIMING: f64 = 0.012;
+/// A contact's place on the way is known this well (m) after some laps.
+const PLACE: f64 = 0.003;
+/// A rest is aimed about this far (m) short of its contact.
+const CRAWL: f64 = 0.06;
+/// After a contact passed in braking, the next one is about this far (m).
+const TO_NEXT: f64 = 0.3;
+/// A hop between two contacts (m).
+const HOP: f64 = 0.39;
+/// Part of the way to rest by which no law's shape is true before its end.
+const SHAPE: f64 = 0.01;
+
+/// Sums of the model's numbers that an experiment would see, each with noise of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpectedInformation {
+    pub(super) seen: Vec<Seen>,
+}
+
+/// One of them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seen {
+    pub(super) slopes: Vec<(usize, f64)>,
+    /// In m².
+    pub(super) variance: f64,
+}
+
+/// The way of a stop (m), from the command on.
+pub(super) fn stop_way(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
+    let speed = answers.speed(usize::from(step), above);
+    let segment = stop_from(answers, step, speed);
+    speed * segment.begins + segment.way_to_rest()
+}
+
+fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
+    Segment::of(&SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
+}
+
+pub(super) fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
+    Segment::of(&SpeedCommand { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
+}
+
+/// The time (s) at which something that only grows reaches a value, by halving.
+pub(super) fn time_of(value: f64, of: impl Fn(f64) -> f64) -> f64 {
+    let (mut early, mut late) = (0.0, 60.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (early + late);
+        if of(middle) < value {
+            early = middle;
+        } else {
+            late = middle;
+        }
+    }
+    late
+}
+
+impl MotionModel {
+    /// How something changes with each of the numbers.
+    pub(super) fn slopes(&self, of: impl Fn(&Answers<'_>) -> f64) -> Vec<(usize, f64)> {
+        self.spread.slopes(&self.values, self.steps(), of)
+    }
+
+    /// A hop at a steady step.
+    #[must_use]
+    pub fn prospect_of_speed(&self, step: SpeedStep, approach: Approach) -> ExpectedInformation {
+        let (place, above) = (usize::from(step.get()), approach == Approach::Above);
+        let speed = self.answers().speed(place, above).max(0.01);
+        let takes = HOP / speed;
+        let slopes = self.slopes(|answers| takes * answers.speed(place, above));
+        let variance =
+            sum_of_squares(&[speed * TIMING * core::f64::consts::SQRT_2, PLACE, TRIP_DEVIATION * HOP]);
+        ExpectedInformation { seen: vec![Seen { slopes, variance }] }
+    }
+
+    /// A stop from a steady step and a crawl to the next contact. With `past`, the train is to pass a contact so far
+    /// before it rests, and crawls to the one behind it.
+    #[must_use]
+    pub fn prospect_of_stop(
+        &self,
+        step: SpeedStep,
+        approach: Approach,
+        crawl: SpeedStep,
+        past: Option<Length>,
+    ) -> ExpectedInformation {
+        let (step, above) = (step.get(), approach == Approach::Above);
+        let answers = self.answers();
+        let speed = answers.speed(usize::from(step), above);
+        let scatter = self.scatter(speed);
+        let whole = stop_way(&answers, step, above);
+        // Where it was when it was commanded to stop.
+        let begin = sum_of_squares(&[speed * TIMING, PLACE]);
+        let mut seen = Vec::new();
+        if let Some(past) = past {
+            let until = (whole - past.as_m()).max(0.0);
+            let way = |answers: &Answers<'_>, time: f64| {
+                let speed = answers.speed(usize::from(step), above);
+                let segment = stop_from(answers, step, speed);
+                speed * segment.begins + segment.way(time)
+            };
+            let time = time_of(until, |time| way(&answers, time));
+            let slow = stop_from(&answers, step, speed).speed(time);
+            let variance = begin + sum_of_squares(&[slow * TIMING, SHAPE * whole, scatter]);
+            seen.push(Seen { slopes: self.slopes(|answers| way(answers, time)), variance });
+        }
+        let rest = if past.is_some() { TO_NEXT } else { CRAWL };
+        let (time, crawl_speed) = self.crawl(crawl, rest);
+        let slopes =
+            self.slopes(|answers| stop_way(answers, step, above) + start_to(answers, crawl.get()).way(time));
+        let late = crawl_speed * LATE_START;
+        let variance =
+            begin + sum_of_squares(&[scatter, late, crawl_speed * TIMING, TRIP_DEVIATION * rest, PLACE]);
+        seen.push(Seen { slopes, variance });
+        ExpectedInformation { seen }
+    }
+
+    /// A short move from a place of rest that was reached at a crawl, and another crawl to the next contact.
+    #[must_use]
+    pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, crawl: SpeedStep) -> ExpectedInformation {
+        let (time, crawl_speed) = self.crawl(crawl, CRAWL);
+        let slopes = self.slopes(|answers| {
+            stop_way(answers, crawl.get(), false)
+                + move_way(answers, step.get(), run.as_s())
+                + start_to(answers, crawl.get()).way(time)
+        });
+        let answers = self.answers();
+        let reached = start_to(&answers, step.get()).speed(run.as_s());
+        let late =
+            sum_of_squares(&[crawl_speed * LATE_START, reached * LATE_START, crawl_speed * TIMING, PLACE]);
+        let scatter = self.scatter(reached);
+        ExpectedInformation { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
+    }
+
+    /// The time (s) of a crawl over a way (m) from rest, and the speed (m/s) then.
+    fn crawl(&self, step: SpeedStep, way: f64) -> (f64, f64) {
+        let answers = self.answers();
+        let start = start_to(&answers, step.get());
+        let time = time_of(way, |time| if time <= start.begins { 0.0 } else { start.way(time) });
+        (time, start.speed(time))
+    }
+}
+
+fn sum_of_squares(of: &[f64]) -> f64 {
+    of.iter().map(|one| one * one).sum()
+}

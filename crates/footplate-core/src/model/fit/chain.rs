@@ -1,0 +1,174 @@
+//! From commands and reports to trips: what a train was told, and the contacts it passed, one after the other.
+
+use alloc::vec::Vec;
+
+use super::trip::{MeasuredRest, Trip, TripContact};
+use crate::event::{Event, EventKind};
+use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::model::parameters::Answers;
+use crate::model::segment::SpeedCommand;
+use crate::model::survey::SectionIndex;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, Reach, TurnoutStates};
+use crate::units::Length;
+
+/// A poll whose interval nobody recorded: a slow 6051.
+const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
+/// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
+const BETWEEN_RUNS: f64 = 60.0;
+/// Contacts that may stay silent in a row before the way is no longer believed.
+const BELIEVED_MISSED: usize = 2;
+
+/// The trips of one train, the last of them under way.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Chain {
+    pub(super) trips: Vec<Trip>,
+    /// The recording's clock, and the seconds of this chain that its first entry has.
+    origin: Option<Timestamp>,
+    begins: f64,
+    /// Seconds of the latest entry.
+    latest: f64,
+    /// Whether the train is known to be at rest, because its run begins so.
+    at_rest: bool,
+    step: u8,
+    above: bool,
+    /// The contact passed last.
+    at: Option<NodeId>,
+    last_sensor: Option<SensorId>,
+    /// Whether the next trip begins where the last one ended.
+    unbroken: bool,
+}
+
+impl Chain {
+    fn seconds(&mut self, time: Timestamp) -> f64 {
+        let seconds = self.begins + (time - *self.origin.get_or_insert(time)).as_s();
+        self.latest = self.latest.max(seconds);
+        seconds
+    }
+
+    /// A run begins in which the train has been running steadily at `step`, or is at rest at step 0. Its clock has
+    /// nothing to do with that of the run before.
+    pub(super) fn begin_run(&mut self, step: SpeedStep) {
+        self.interrupt();
+        self.origin = None;
+        self.begins = self.latest + BETWEEN_RUNS;
+        (self.step, self.above, self.at_rest) = (step.get(), false, step == SpeedStep::STAND);
+    }
+
+    /// Breaks the chain: where the train is now has nothing to do with where it was.
+    pub(super) fn interrupt(&mut self) {
+        self.unbroken = false;
+        self.at = None;
+        self.last_sensor = None;
+    }
+
+    /// A command to the train. Whether it stands by then is judged by how it answers as far as is known.
+    pub(super) fn command(&mut self, time: Timestamp, step: SpeedStep, answers: &Answers<'_>) {
+        let sent = self.seconds(time);
+        let (from, to) = (self.step, step.get());
+        if to == from {
+            return;
+        }
+        let at_rest = from == 0
+            && (self.at_rest || self.trips.last().is_none_or(|trip| trip.rests_at(answers) <= sent));
+        self.at_rest = false;
+        if from == 0 && (at_rest || self.trips.is_empty()) {
+            if let Some(last) = self.trips.last_mut().filter(|_| self.unbroken) {
+                last.came_to_rest = true;
+            }
+            let continues = self.unbroken && self.trips.last().is_some();
+            self.trips.push(Trip::new(sent, None, continues));
+            self.unbroken = true;
+        } else if !self.unbroken {
+            self.trips.push(Trip::new(sent, Some((from, self.above)), false));
+            self.unbroken = true;
+        }
+        if let Some(trip) = self.trips.last_mut() {
+            trip.command(SpeedCommand { sent, from, to, at_rest });
+        }
+        (self.step, self.above) = (to, to < from);
+    }
+
+    /// A report that was judged to be of the train.
+    pub(super) fn pass(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        turnouts: &TurnoutStates,
+        event: &Event,
+    ) {
+        let EventKind::Sensor(report) = event.kind else { return };
+        let Some(node) = layout.sensor_node(report.sensor) else { return };
+        if self.last_sensor == Some(report.sensor) {
+            return;
+        }
+        let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs().as_s();
+        let time = self.seconds(event.time) - 0.5 * interval;
+        if self.step == 0 && (self.at_rest || self.trips.is_empty()) {
+            return;
+        }
+        let way = self
+            .at
+            .filter(|_| self.unbroken)
+            .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
+        let begins_anew = !self.unbroken || (self.at.is_some() && way.is_none());
+        if begins_anew {
+            // Running, nobody knows from where: ways are counted from here.
+            self.trips.push(Trip::new(time, Some((self.step, self.above)), false));
+            self.unbroken = true;
+        }
+        if let (Some([hop]), [.., stopped, trip]) = (way.as_ref().map(Reach::hops), self.trips.as_mut_slice())
+            && trip.continues
+            && trip.contacts.is_empty()
+        {
+            stopped.rest_hop = Some(hop.index());
+        }
+        let Some(trip) = self.trips.last_mut() else { return };
+        let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
+            (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
+        });
+        trip.pass(TripContact { node, time, variance: interval * interval / 12.0, way: length, sections });
+        (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
+    }
+
+    /// A person measured how far past a sensor the train came to rest.
+    pub(super) fn measure_rest(
+        &mut self,
+        layout: &Layout,
+        index: &SectionIndex,
+        turnouts: &TurnoutStates,
+        landmark: SensorId,
+        offset: Length,
+    ) {
+        let Some(node) = layout.sensor_node(landmark).filter(|_| self.step == 0 && self.unbroken) else {
+            return;
+        };
+        let at = self.at;
+        let Some(trip) = self.trips.last_mut() else { return };
+        let passed = trip.contacts.iter().rposition(|contact| contact.node == node);
+        let beyond = (offset.as_m(), Vec::new());
+        let (contacts, (beyond, sections)) = match passed {
+            Some(place) => (place + 1, beyond),
+            None => {
+                let Some(reach) = at.and_then(|from| reach_of(layout, turnouts, from, landmark)) else {
+                    return;
+                };
+                let sections = reach.hops().iter().filter_map(|hop| index.section(*hop)).collect();
+                (trip.contacts.len(), (reach.length.as_m() + offset.as_m(), sections))
+            }
+        };
+        trip.came_to_rest = true;
+        trip.measured = Some(MeasuredRest { contacts, beyond, sections });
+    }
+}
+
+/// The way past the fewest silent contacts, and of these the shortest.
+fn reach_of(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, sensor: SensorId) -> Option<Reach> {
+    (0..=BELIEVED_MISSED).find_map(|missed| {
+        layout
+            .reaches(from, turnouts, missed)
+            .filter(|reach| reach.sensor == Some(sensor))
+            .min_by(|one, other| one.length.as_m().total_cmp(&other.length.as_m()))
+    })
+}

@@ -1,0 +1,53 @@
+//! A model that is told the truth, for yardsticks: what forecasts would come to if nothing were left to learn.
+
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+use crate::model::MotionModel;
+use crate::model::parameters::{Answers, HYSTERESIS, hysteresis_at, speed_at};
+use crate::model::spread::Spread;
+use crate::units::Speed;
+
+impl MotionModel {
+    /// The same model with nothing uncertain: no number of the train, no length.
+    #[must_use]
+    pub fn taken_for_certain(&self) -> Self {
+        let side = crate::model::parameters::count(self.steps());
+        let mut certain = self.clone();
+        certain.spread = Spread::of_lower_triangle(side, &alloc::vec![0.0; side * (side + 1) / 2]);
+        for (_, variance) in certain.sections.values_mut() {
+            *variance = 0.0;
+        }
+        for (_, variance) in certain.stop_offsets.of_hop.values_mut() {
+            *variance = 0.0;
+        }
+        certain
+    }
+
+    /// Tells it the steady speed at a step. Speeds that are not positive, and steps that its decoder does not have, leave it
+    /// as it was.
+    pub fn tell_speed(&mut self, step: SpeedStep, approach: Approach, speed: Speed) {
+        let (place, speed) = (usize::from(step.get()), speed.as_m_per_s());
+        if !(1..=self.steps()).contains(&place) || speed.is_nan() || speed <= 0.0 {
+            return;
+        }
+        if approach != Approach::Above {
+            if let Some(slot) = self.values.get_mut(speed_at(place)) {
+                *slot = libm::log(speed);
+            }
+            return;
+        }
+        let below = self.answers().speed(place, false);
+        let common = self.values.get(HYSTERESIS).copied().unwrap_or(0.0);
+        let own = (speed - below) / Answers::hysteresis_part(below).max(f64::MIN_POSITIVE) - common;
+        let steps = self.steps();
+        if let Some(slot) = self.values.get_mut(hysteresis_at(place, steps)) {
+            *slot = own;
+        }
+    }
+
+    /// Contacts passed at all of its steps.
+    #[must_use]
+    pub fn contacts_passed(&self) -> u32 {
+        self.counts.iter().flatten().map(|counts| counts.contacts).sum()
+    }
+}

@@ -1,0 +1,430 @@
+//! Everything a train did of late, and the model that explains it best.
+//!
+//! One chain of trips: a trip begins where the one before came to rest. With `p` the place where a trip began, counted
+//! from the sensor passed last before it, `F(t)` the distance run by the laws and `W` the path length to a sensor as the
+//! train measures it, every sensor passed at `t` says `p + F(t) − W = 0`, and every stop that the next trip's `p′` is where
+//! this one ended, give or take the scatter of stops. All numbers are found together (Gauss and Newton); the derivatives are
+//! numerical. The numbers of single trips, and the places between them, are taken out of the equations trip by trip, and trips
+//! of the past for good ([`MarginalPrior`]): a fit costs as much after ten thousand stops as after sixty.
+//!
+//! A stop that is followed by a run to the next sensor is measured as the sum of stop and start: what one of them is longer,
+//! the other may be shorter. The covariance keeps that; what distinguishes them are sensors passed in braking, tapes, and starts
+//! to other speeds. What is far off counts little ([`robust`](super::robust)): one outlier costs one outlier.
+
+mod refit;
+
+use alloc::vec::Vec;
+
+pub use refit::Refit;
+
+use super::chain::Chain;
+use super::marginal_prior::MarginalPrior;
+use super::rows::{Point, Source, TripAt};
+use super::trip::{Own, Trip};
+use super::unknowns::Columns;
+use crate::event::{Event, EventKind};
+use crate::ids::{SpeedStep, TrainId};
+use crate::linalg::{Eliminated, NormalEquations};
+use crate::model::motion_model::{MotionModel, StepUse};
+use crate::model::priors::section_variance;
+use crate::model::scatter::{Scatter, ScatterSums};
+use crate::model::survey::SectionIndex;
+use crate::time::Timestamp;
+use crate::track::{Layout, TurnoutStates};
+
+/// Promises are watched once so many stops are known: those of a train that is hardly known yet are broken because numbers
+/// that are far off do not change evenly, which says nothing of how its stops scatter.
+const WATCHED_FROM: u32 = 20;
+/// Steps after which an iteration that has not settled is taken as it is.
+const MOST_ITERATIONS: usize = 15;
+/// A step is shortened by half so often before the point counts as the best.
+const MOST_HALVINGS: usize = 6;
+/// A step of ln speed no longer than this is believed at once: beyond it the laws bend too much.
+const LONGEST_STEP: f64 = 0.6;
+/// A step that changes no number by more than this (in its unit) was the last.
+const SETTLED: f64 = 2e-4;
+/// In so many iterations all rows count in full: what is far off may only not be known yet.
+const ALL_BELIEVED: usize = 3;
+/// How well the total of all sections passed counts as surveyed (m), ...
+const TOTAL: f64 = 0.001;
+/// ... where lengths of their own make that known to this part at least.
+const WELL_SURVEYED: f64 = 0.03;
+/// When so many trips are kept, the oldest become part of the prior, ...
+const MOST_TRIPS: usize = 60;
+/// ... but for so many.
+const KEPT_TRIPS: usize = 30;
+
+/// Collects what one train does and fits its [`MotionModel`] to all of it.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MotionFit {
+    model: MotionModel,
+    prior: MarginalPrior,
+    chain: Chain,
+    /// Follows from the layout, and is made when it is first needed.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    sections: Option<SectionIndex>,
+    date: Timestamp,
+}
+
+/// A point of the search: the numbers that last, and those of each kept trip.
+#[derive(Debug, Clone)]
+struct Values {
+    lasting: Vec<f64>,
+    trips: Vec<Own>,
+}
+
+/// The equations of all that is kept, the numbers of single trips taken out.
+#[derive(Debug, Clone)]
+struct Reduced {
+    /// Of the numbers that last and the place at which a next trip would begin.
+    equations: NormalEquations,
+    /// What was taken out, trip by trip, in the order in which it was.
+    trips: Vec<Vec<Eliminated>>,
+}
+
+/// What the survey of the layout says of the sections passed, and what is usual of stops for where they end.
+///
+/// Speeds and lengths could all be longer by the same part, and no timing would tell: where the survey's scale is known, give
+/// or take a deviation, its total is the measure. All that is asked of a model, where a train comes to rest, is the same in
+/// any.
+#[derive(Debug, Clone)]
+struct Survey {
+    /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
+    rows: Vec<(Vec<(usize, f64)>, f64)>,
+    scale: Option<f64>,
+}
+
+/// Equations of the numbers that last alone.
+#[derive(Debug, Clone)]
+struct Closed {
+    equations: NormalEquations,
+    /// The place at which a next trip would begin.
+    next_place: Eliminated,
+    trips: Vec<Vec<Eliminated>>,
+}
+
+impl MotionFit {
+    /// Nothing seen yet.
+    #[must_use]
+    pub fn new(train: TrainId, highest: SpeedStep) -> Self {
+        Self {
+            model: MotionModel::unknown(train, highest),
+            prior: MarginalPrior::new(usize::from(highest.get())),
+            chain: Chain::default(),
+            sections: None,
+            date: Timestamp::ZERO,
+        }
+    }
+
+    /// The next entry that is about this train: a command to it that has been sent, or a report that was judged to be
+    /// of it. The turnouts as they lay at that time.
+    pub fn take(&mut self, layout: &Layout, turnouts: &TurnoutStates, event: &Event) {
+        match event.kind {
+            EventKind::Sensor(_) => {
+                let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
+                self.chain.pass(layout, sections, turnouts, event);
+            }
+            EventKind::Speed { train, step } if train == self.model.train() => {
+                self.chain.command(event.time, step, &self.model.answers());
+            }
+            EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
+            EventKind::Stopped { train, landmark, offset } if train == self.model.train() => {
+                let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
+                self.chain.measure_rest(layout, sections, turnouts, landmark, offset);
+            }
+            _ => return,
+        }
+        self.date = event.time;
+    }
+
+    /// A run begins: the train has been running steadily at `step`, or is at rest at step 0. The run's clock has
+    /// nothing to do with that of any run before.
+    pub fn begin_run(&mut self, step: SpeedStep) {
+        self.chain.begin_run(step);
+    }
+
+    /// Another session begins with the train at rest: the train, its track and their voltage may have changed a little since
+    /// the last one, and what was measured before counts as much as it can. Takes as long as a fit.
+    pub fn begin_session(&mut self, sections: &SectionIndex) {
+        self.chain.begin_run(SpeedStep::STAND);
+        if self.chain.trips.is_empty() {
+            return;
+        }
+        self.refit(sections);
+        self.condense(self.chain.trips.len());
+        self.prior.begin_session(self.highest());
+        self.refit(sections);
+    }
+
+    /// The chain is broken: the train was lifted, pushed, stalled or lost. What it did before still counts.
+    pub fn interrupt(&mut self) {
+        self.chain.interrupt();
+    }
+
+    /// A step moved the train, or did not.
+    pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
+        self.model.note_use(step, found);
+    }
+
+    fn highest(&self) -> usize {
+        usize::from(self.model.highest().get())
+    }
+
+    fn point<'p>(&self, columns: &'p Columns, lasting: &'p [f64]) -> Point<'p> {
+        Point {
+            columns,
+            lasting,
+            highest: self.highest(),
+            scatter: self.model.scatter,
+            stop_offset_variance: self.model.stop_offsets.variance(),
+            stop_shape_error: self.model.stop_shape_error(),
+        }
+    }
+
+    /// Makes the oldest trips part of the prior.
+    fn condense(&mut self, count: usize) {
+        let columns = self.prior.columns();
+        let values = self.start(&columns);
+        let Some(Reduced { equations, .. }) = self.reduced(&columns, &values, false, count) else { return };
+        self.prior.scatter = self.scatter_of(&columns, &values, count).with_promises_of(&self.prior.scatter);
+        self.prior.equations = equations;
+        let old: Vec<Trip> = self.chain.trips.drain(..count.min(self.chain.trips.len())).collect();
+        for trip in &old {
+            super::learn::count(&mut self.prior.counts, trip);
+        }
+        if let Some(last) = old.last() {
+            self.prior.age(self.highest(), last.begins);
+        }
+    }
+
+    /// Where the search begins: what the last fit found; of trips that are new, where they would have begun.
+    fn start(&self, columns: &Columns) -> Values {
+        let mut lasting = self.model.values.clone();
+        lasting.resize(columns.lasting, 0.0);
+        for (section, column) in &columns.sections {
+            if let (Some(slot), Some((by, _))) = (lasting.get_mut(*column), self.model.section(*section)) {
+                *slot = by;
+            }
+        }
+        for (hop, column) in &columns.stop_offsets {
+            if let Some(slot) = lasting.get_mut(*column) {
+                *slot = self.model.stop_offsets.of(Some(*hop)).mean;
+            }
+        }
+        let point = self.point(columns, &lasting);
+        let mut trips: Vec<Own> = Vec::with_capacity(self.chain.trips.len());
+        let mut next_place = 0.0;
+        for trip in &self.chain.trips {
+            let mut own = trip.start();
+            let (rest, first) = point.reach(trip, &own);
+            if trip.own.is_none() {
+                let surveyed = trip.contacts.first().map_or(0.0, |contact| contact.way);
+                own.place = if trip.continues { next_place } else { surveyed - first.unwrap_or(surveyed) };
+            }
+            next_place = own.place + rest - trip.contacts.iter().map(|contact| contact.way).sum::<f64>();
+            trips.push(own);
+        }
+        Values { lasting, trips }
+    }
+
+    fn trip_at<'t>(&'t self, values: &'t Values, place: usize) -> Option<TripAt<'t>> {
+        let next = self.chain.trips.get(place + 1).filter(|next| next.continues);
+        let next_place = next.and_then(|_| values.trips.get(place + 1)).map(|own| own.place);
+        Some(TripAt { trip: self.chain.trips.get(place)?, own: values.trips.get(place)?, next_place })
+    }
+
+    /// The equations of the first so many trips, the trips' own numbers taken out.
+    fn reduced(
+        &self,
+        columns: &Columns,
+        values: &Values,
+        believes_all: bool,
+        count: usize,
+    ) -> Option<Reduced> {
+        let point = self.point(columns, &values.lasting);
+        let mut equations = self.prior.equations.clone();
+        let mut trips = Vec::with_capacity(count);
+        for place in 0..count {
+            let at = self.trip_at(values, place)?;
+            let own = at.own.count();
+            equations.append(1 + own);
+            let here = values.columns_of(place);
+            for row in point.rows(at, true) {
+                // The row is about the step from here; its terms are about the numbers themselves.
+                let now: f64 = row.terms.iter().map(|(column, slope)| slope * here(*column)).sum();
+                let variance = row.variance / row.weight(believes_all);
+                equations.add(&row.terms, now - row.residual, variance);
+            }
+            let mut eliminated = Vec::with_capacity(own + 1);
+            for _ in 0..own {
+                eliminated.push(equations.eliminate_last()?);
+            }
+            equations.swap_last_two();
+            eliminated.push(equations.eliminate_last()?);
+            trips.push(eliminated);
+        }
+        Some(Reduced { equations, trips })
+    }
+
+    /// How unlikely a point is.
+    fn cost(&self, columns: &Columns, values: &Values, believes_all: bool) -> f64 {
+        let point = self.point(columns, &values.lasting);
+        let mut known = values.lasting.clone();
+        known.push(values.trips.first().map_or(0.0, |own| own.place));
+        let rows = (0..values.trips.len())
+            .filter_map(|place| self.trip_at(values, place))
+            .flat_map(|at| point.rows(at, false));
+        self.prior.equations.cost(&known) + rows.map(|row| row.cost(believes_all)).sum::<f64>()
+    }
+
+    /// Compares the first sensor after each stop that is new with what was foreseen of it before the fit.
+    fn compare_promises(&mut self, columns: &Columns, values: &Values) {
+        let stops: u32 = self.model.counts.iter().flatten().map(|counts| counts.stops).sum();
+        if stops < WATCHED_FROM {
+            return;
+        }
+        let point = self.point(columns, &values.lasting);
+        let mut scatter = self.prior.scatter;
+        for (place, pair) in self.chain.trips.windows(2).enumerate() {
+            let [before, after] = pair else { continue };
+            // Where the stop began is known by a fit; the start behind it has not been seen by any.
+            let is_new = before.own.is_some() && after.own.is_none() && after.continues;
+            let Some(next) = self.trip_at(values, place + 1).filter(|_| is_new) else { continue };
+            let Some(foreseen) =
+                self.trip_at(values, place).and_then(|last| point.foreseen(&self.model, last, next))
+            else {
+                continue;
+            };
+            let stop_speed =
+                before.commanded.iter().rev().nth(1).map_or(0.0, |commanded| point.speed(commanded.to));
+            // Residuals of a young fit scatter too little: it has much to explain them by.
+            let stops = self.model.scatter.stops.max(1.0);
+            let usual = Scatter { stops, floor: 0.0, ..self.model.scatter }.of_stop(stop_speed);
+            let explained = foreseen.variance + usual * usual;
+            scatter.take_promise(foreseen.residual * foreseen.residual, explained);
+        }
+        self.prior.scatter = scatter;
+    }
+
+    /// How far stops and starts scatter, as the first so many kept trips and those before show.
+    ///
+    /// A stop and the start behind it are seen as a sum, of which each is given its likely part: what scatters little in
+    /// both is found to scatter less than it does. So few of them count for less than what is usual.
+    fn scatter_of(&self, columns: &Columns, values: &Values, count: usize) -> ScatterSums {
+        let mut sums = self.prior.scatter;
+        let point = self.point(columns, &values.lasting);
+        for place in 0..count {
+            let Some(at) = self.trip_at(values, place) else { continue };
+            for row in point.rows(at, false) {
+                let square = row.residual * row.residual / row.variance;
+                match row.source {
+                    Source::Stop => sums.stops.take(square * point.scatter.stops * point.scatter.stops),
+                    Source::Start if at.trip.continues && !at.trip.contacts.is_empty() => {
+                        sums.starts.take(square * point.scatter.starts * point.scatter.starts);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        sums
+    }
+
+    /// The model as of the last fit.
+    #[must_use]
+    pub const fn model(&self) -> &MotionModel {
+        &self.model
+    }
+}
+
+impl Survey {
+    fn of(columns: &Columns, index: &SectionIndex, stop_offset_variance: f64) -> Self {
+        let mut rows: Vec<(Vec<(usize, f64)>, f64)> = columns
+            .sections
+            .iter()
+            .map(|(section, column)| (alloc::vec![(*column, 1.0)], section_variance(index, *section)))
+            .collect();
+        let offsets = columns.stop_offsets.values();
+        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], stop_offset_variance)));
+        let of_total = index.scale_variance(columns.sections.keys().copied());
+        // What all lengths have in common does not keep their total from being a measure.
+        let of_lengths = of_total - index.scale() * index.scale();
+        let is_measure = !rows.is_empty() && of_lengths <= WELL_SURVEYED * WELL_SURVEYED;
+        let scale = is_measure.then(|| libm::sqrt(of_total));
+        if scale.is_some() {
+            rows.push((columns.sections.values().map(|column| (*column, 1.0)).collect(), TOTAL * TOTAL));
+        }
+        Self { rows, scale }
+    }
+
+    fn cost(&self, lasting: &[f64]) -> f64 {
+        let longer = |terms: &[(usize, f64)]| -> f64 {
+            terms.iter().filter_map(|(column, slope)| Some(slope * lasting.get(*column)?)).sum()
+        };
+        self.rows.iter().map(|(terms, variance)| longer(terms) * longer(terms) / variance).sum()
+    }
+}
+
+impl Values {
+    /// A part of the step to another point.
+    fn towards(&self, other: &Self, part: f64) -> Self {
+        let step = |from: &f64, to: &f64| from + part * (to - from);
+        Self {
+            lasting: self.lasting.iter().zip(&other.lasting).map(|(from, to)| step(from, to)).collect(),
+            trips: self.trips.iter().zip(&other.trips).map(|(from, to)| from.with(to, step)).collect(),
+        }
+    }
+
+    /// The value of each column of the equations with one trip's.
+    fn columns_of(&self, place: usize) -> impl Fn(usize) -> f64 + '_ {
+        let own = self.trips.get(place).map(Own::flat).unwrap_or_default();
+        let next = self.trips.get(place + 1).map_or(0.0, |own| own.place);
+        move |column| {
+            let Some(behind) = column.checked_sub(self.lasting.len()) else {
+                return self.lasting.get(column).copied().unwrap_or(0.0);
+            };
+            match behind {
+                0 => own.first().copied().unwrap_or(0.0),
+                1 => next,
+                _ => own.get(behind - 1).copied().unwrap_or(0.0),
+            }
+        }
+    }
+}
+
+impl Reduced {
+    /// Takes out the last place, too, and adds what the survey says.
+    fn closed(self, survey: &Survey) -> Option<Closed> {
+        let Self { mut equations, trips } = self;
+        let next_place = equations.eliminate_last()?;
+        for (terms, variance) in &survey.rows {
+            equations.add(terms, 0.0, *variance);
+        }
+        Some(Closed { equations, next_place, trips })
+    }
+}
+
+impl Closed {
+    /// The best values of all unknowns.
+    fn solved(&self, columns: &Columns, trips: &[Trip]) -> Option<Values> {
+        let lasting = self.equations.values()?;
+        let mut next_place = self.next_place.value(&lasting);
+        let mut found: Vec<Own> = Vec::with_capacity(trips.len());
+        for (trip, eliminated) in trips.iter().zip(&self.trips).rev() {
+            let (place, own) = eliminated.split_last()?;
+            // The place was taken out last, when the next one stood before it.
+            let mut known = lasting.clone();
+            known.push(next_place);
+            let place = place.value(&known);
+            known.insert(lasting.len(), place);
+            for one in own.iter().rev() {
+                let value = one.value(&known);
+                known.push(value);
+            }
+            found.push(columns.own(trip, &known));
+            next_place = place;
+        }
+        found.reverse();
+        Some(Values { lasting, trips: found })
+    }
+}

@@ -1,0 +1,139 @@
+//! A fit in parts, each of which takes milliseconds, so that what drives trains can fit between two reports.
+//!
+//! A part is one step of Gauss and Newton. What is searched is a copy: the train may go on meanwhile, and what it does since
+//! is part of the next fit.
+
+use super::{
+    ALL_BELIEVED, Closed, KEPT_TRIPS, LONGEST_STEP, MOST_HALVINGS, MOST_ITERATIONS, MOST_TRIPS, MotionFit,
+    SETTLED, Survey, Values,
+};
+use crate::model::MotionModel;
+use crate::model::fit::unknowns::Columns;
+use crate::model::parameters::SPEEDS;
+use crate::model::survey::SectionIndex;
+
+/// A fit under way; see [`MotionFit::begin_refit`].
+#[derive(Debug, Clone)]
+pub struct Refit {
+    fit: MotionFit,
+    columns: Columns,
+    values: Values,
+    survey: Survey,
+    closed: Option<Closed>,
+    iteration: usize,
+    /// Trips that have become part of the prior.
+    condensed: usize,
+    is_over: bool,
+}
+
+impl MotionFit {
+    /// Begins to fit anew to all that was seen; sections as the layout has them.
+    #[must_use]
+    pub fn begin_refit(&self, sections: &SectionIndex) -> Refit {
+        let mut fit = self.clone();
+        let passed = fit.chain.trips.iter().flat_map(|trip| &trip.contacts);
+        fit.prior.meet(passed.flat_map(|contact| &contact.sections));
+        fit.prior.meet_stops(fit.chain.trips.iter().filter_map(|trip| trip.rest_hop));
+        let columns = fit.prior.columns();
+        let values = fit.start(&columns);
+        fit.compare_promises(&columns, &values);
+        let survey = Survey::of(&columns, sections, fit.model.stop_offsets.variance());
+        Refit { fit, columns, values, survey, closed: None, iteration: 0, condensed: 0, is_over: false }
+    }
+
+    /// Takes over what a fit found that was begun here. What was seen since then stays, and is part of the next.
+    pub fn adopt(&mut self, refit: Refit) {
+        let Refit { fit, condensed, .. } = refit;
+        self.chain.trips.drain(..condensed.min(self.chain.trips.len()));
+        let own = fit.chain.trips.into_iter().map(|trip| trip.own);
+        for (trip, own) in self.chain.trips.iter_mut().zip(own) {
+            trip.own = own;
+        }
+        self.prior = fit.prior;
+        self.model = fit.model;
+    }
+
+    /// Fits anew to all that was seen, at once. Takes milliseconds; not for between two reports.
+    pub fn refit(&mut self, sections: &SectionIndex) {
+        let mut refit = self.begin_refit(sections);
+        while !refit.is_over() {
+            refit.go_on();
+        }
+        self.adopt(refit);
+    }
+}
+
+impl Refit {
+    /// The model that the fit found; before it is over that of the fit before.
+    #[must_use]
+    pub const fn model(&self) -> &MotionModel {
+        self.fit.model()
+    }
+
+    /// Whether nothing is left to do.
+    #[must_use]
+    pub const fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// Does the next part.
+    pub fn go_on(&mut self) {
+        if self.is_over {
+            return;
+        }
+        if self.iteration >= MOST_ITERATIONS {
+            self.conclude();
+        } else if self.step() {
+            self.iteration += 1;
+        } else {
+            self.iteration = MOST_ITERATIONS;
+        }
+    }
+
+    /// One step of the search; `false` where it was the last.
+    fn step(&mut self) -> bool {
+        let Self { fit, columns, values, survey, .. } = self;
+        let believes_all = self.iteration < ALL_BELIEVED;
+        let now = fit.reduced(columns, values, believes_all, fit.chain.trips.len());
+        let Some(now) = now.and_then(|now| now.closed(survey)) else { return false };
+        let Some(next) = now.solved(columns, &fit.chain.trips) else { return false };
+        let before = fit.cost(columns, values, believes_all) + survey.cost(&values.lasting);
+        let logarithms = SPEEDS..SPEEDS + fit.highest();
+        let longest = values.lasting.get(logarithms.clone()).unwrap_or_default().iter();
+        let longest = longest.zip(next.lasting.get(logarithms).unwrap_or_default());
+        let longest = longest.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
+        let mut part = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
+        let mut moved = 0.0_f64;
+        for _ in 0..MOST_HALVINGS {
+            let tried = values.towards(&next, part);
+            if fit.cost(columns, &tried, believes_all) + survey.cost(&tried.lasting) < before {
+                let lasting = values.lasting.iter().zip(&tried.lasting);
+                moved = lasting.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
+                *values = tried;
+                break;
+            }
+            part *= 0.5;
+        }
+        self.closed = Some(now);
+        believes_all || moved >= SETTLED
+    }
+
+    /// What was found goes into the model, and the oldest trips into the prior.
+    fn conclude(&mut self) {
+        self.is_over = true;
+        let Self { fit, columns, values, survey, .. } = self;
+        // The last equations are those of a point less than a step away.
+        let Some(solution) = self.closed.take().and_then(|closed| closed.equations.solve()) else { return };
+        for (trip, own) in fit.chain.trips.iter_mut().zip(&values.trips) {
+            trip.own = Some(own.clone());
+        }
+        let trips = fit.chain.trips.len();
+        let scatter = fit.scatter_of(columns, values, trips);
+        fit.model.learn(columns, &values.lasting, &solution, survey.scale, scatter, fit.date);
+        fit.model.recount(&fit.prior.counts, &fit.chain.trips);
+        if trips >= MOST_TRIPS {
+            fit.condense(trips - KEPT_TRIPS);
+            self.condensed = trips - fit.chain.trips.len();
+        }
+    }
+}

@@ -1,0 +1,378 @@
+//! What each sensor passed, each stop and each tape of a trip says of the numbers, as linear equations about a point.
+#![expect(clippy::indexing_slicing, reason = "columns are counted before the vectors are made by that count")]
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::robust::RobustWeight;
+use super::trip::{Own, Trip, Walk};
+use super::unknowns::Columns;
+use crate::model::decoder_kind::SHAPE_ERROR;
+use crate::model::parameters::{
+    Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
+};
+use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
+use crate::model::scatter::Scatter;
+use crate::model::segment::Segment;
+use crate::model::stop_offset::stop_offset_share;
+
+/// Sensors trip a little earlier or later from one passage to the next (m).
+const SENSOR_SCATTER: f64 = 0.0015;
+/// A tape read to the centimetre beside a train: one standard deviation (m).
+const TAPE: f64 = 0.005;
+/// What the train's own settling leaves of a place of rest (m).
+const REST_SCATTER: f64 = 0.0005;
+/// By how much the error of a law's shape counts more than that of one change: it is the same in every change of the kind, of
+/// which some ten are kept, and does not become less with their number (√10).
+const SYSTEMATIC: f64 = 3.2;
+/// Where a chain begins is known to some metres.
+const ANYWHERE: f64 = 10.0;
+
+/// What an equation comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A sensor passed, or a tape.
+    Sensor,
+    /// A stop: the next trip begins where this one came to rest.
+    Stop,
+    /// What is usual of a start from rest.
+    Start,
+    /// What is usual of a trip's other numbers.
+    Usual,
+}
+
+/// One linear equation: `residual + Σ slope·Δ = 0`, give or take.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    pub(super) terms: Vec<(usize, f64)>,
+    pub(super) residual: f64,
+    pub(super) variance: f64,
+    /// Variance of one such measurement by itself, which does not count what errors of a law's shape have in common.
+    pub(super) once: f64,
+    pub(super) source: Source,
+}
+
+impl Linear {
+    fn size(&self) -> f64 {
+        self.residual.abs() / libm::sqrt(self.variance)
+    }
+
+    /// How far it is believed; in full for what is only usual.
+    fn belief(&self, believes_all: bool) -> Option<RobustWeight> {
+        match self.source {
+            _ if believes_all => None,
+            Source::Usual => None,
+            Source::Sensor => Some(RobustWeight::SENSORS),
+            Source::Stop | Source::Start => Some(RobustWeight::STOPS),
+        }
+    }
+
+    /// How much it counts.
+    pub(super) fn weight(&self, believes_all: bool) -> f64 {
+        self.belief(believes_all).map_or(1.0, |belief| belief.weight(self.size()))
+    }
+
+    /// What its residual costs.
+    pub(super) fn cost(&self, believes_all: bool) -> f64 {
+        let size = self.size();
+        self.belief(believes_all).map_or(size * size, |belief| belief.cost(size))
+    }
+}
+
+/// Steps of the numerical derivatives, in the unit of each number: small against its uncertainty.
+const STEP: f64 = 1e-4;
+
+/// What a trip comes to with some numbers: distance (m) at each sensor, and at rest.
+struct Outcome {
+    at: Vec<f64>,
+    rest: f64,
+}
+
+fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) -> Outcome {
+    trip.segments(answers, own, segments);
+    let mut walk = Walk::new(trip, own, segments);
+    let at = trip.contacts.iter().map(|contact| walk.way(contact.time)).collect();
+    Outcome { at, rest: walk.way_to_rest() }
+}
+
+/// What is common to the trips of a fit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point<'p> {
+    pub(super) columns: &'p Columns,
+    /// The numbers that last.
+    pub(super) lasting: &'p [f64],
+    pub(super) highest: usize,
+    /// How far stops and starts scatter.
+    pub(super) scatter: Scatter,
+    /// Variance of what stops are longer by for where they end (m²).
+    pub(super) stop_offset_variance: f64,
+    /// Part of a stop's displacement by which its shape is not true in its middle.
+    pub(super) stop_shape_error: f64,
+}
+
+/// A trip and what was found of it, beside where the next one begins if it continues there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TripAt<'t> {
+    pub(super) trip: &'t Trip,
+    pub(super) own: &'t Own,
+    pub(super) next_place: Option<f64>,
+}
+
+impl Point<'_> {
+    /// Steady speed (m/s) of a step from below.
+    pub(super) fn speed(&self, step: u8) -> f64 {
+        let step = usize::from(step).min(self.highest);
+        if step == 0 { 0.0 } else { libm::exp(self.lasting[speed_at(step)]) }
+    }
+
+    /// A trip's distance to rest from where it began (m), and to the first sensor.
+    pub(super) fn reach(&self, trip: &Trip, own: &Own) -> (f64, Option<f64>) {
+        let mut segments = Vec::new();
+        let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
+        (outcome.rest, outcome.at.first().copied())
+    }
+
+    /// By how much the sections passed are longer than surveyed (m), and the terms of that.
+    fn longer<'s>(&self, sections: impl Iterator<Item = &'s usize>) -> (f64, Vec<(usize, f64)>) {
+        let mut terms: Vec<(usize, f64)> = Vec::new();
+        for column in sections.filter_map(|section| self.columns.sections.get(section)) {
+            add_term(&mut terms, *column, 1.0);
+        }
+        (terms.iter().map(|(column, slope)| slope * self.lasting[*column]).sum(), terms)
+    }
+
+    /// The equations of a trip; without slopes they only tell how far off the point is.
+    pub(super) fn rows(&self, at: TripAt<'_>, with_slopes: bool) -> Vec<Linear> {
+        let TripAt { trip, own, next_place } = at;
+        let columns = self.columns;
+        let mut rows = self.usual(trip, own);
+        let mut segments = Vec::new();
+        let here = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
+        let errors = errors(trip, own, &segments, self.stop_shape_error);
+        let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
+        let stop_step = trip.step_of(segments.len().saturating_sub(1));
+        let slopes = if with_slopes { self.slopes(trip, own, &segments) } else { Vec::new() };
+        let terms_of = |of: &dyn Fn(&Outcome) -> f64| {
+            let mut terms = vec![(columns.place(), 1.0)];
+            terms.extend(
+                slopes
+                    .iter()
+                    .map(|(column, other)| (*column, (of(other) - of(&here)) / STEP))
+                    .filter(|(_, slope)| *slope != 0.0),
+            );
+            terms
+        };
+        let row =
+            |terms, residual, variance, source| Linear { terms, residual, variance, once: variance, source };
+        let mut surveyed = 0.0;
+        for (index, contact) in trip.contacts.iter().enumerate() {
+            surveyed += contact.way;
+            let passed = trip.contacts.iter().take(index + 1).flat_map(|contact| &contact.sections);
+            let (longer, sections) = self.longer(passed);
+            let mut terms = terms_of(&|outcome| outcome.at[index]);
+            subtract(&mut terms, &sections);
+            let Error { speed, law, step } = errors[index];
+            let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+            let variance = own + SYSTEMATIC * SYSTEMATIC * law * law;
+            let residual = at.own.place + here.at[index] - surveyed - longer;
+            if with_slopes {
+                self.scaled(&mut terms, residual, step);
+            }
+            rows.push(Linear { once: own + law * law, ..row(terms, residual, variance, Source::Sensor) });
+        }
+        let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
+        let beyond_last = own.place + here.rest - surveyed - longer;
+        let scatter = self.scatter.of_stop(stop_speed);
+        let scatter = scatter * scatter + REST_SCATTER * REST_SCATTER;
+        let next_place = next_place.filter(|_| trip.came_to_rest);
+        if let Some(next_place) = next_place {
+            let mut terms = terms_of(&|outcome| outcome.rest);
+            subtract(&mut terms, &sections);
+            terms.push((columns.next_place(), -1.0));
+            let (offset, free) = self.stop_offset(trip, stop_speed);
+            terms.extend(offset);
+            let longer: f64 = offset.map_or(0.0, |(column, share)| share * self.lasting[column]);
+            let residual = beyond_last + longer - next_place;
+            if with_slopes {
+                self.scaled(&mut terms, residual, stop_step);
+            }
+            rows.push(row(terms, residual, scatter + free, Source::Stop));
+        }
+        if let Some(rest) = &trip.measured {
+            let counted = || trip.contacts.iter().take(rest.contacts);
+            let taped = counted().map(|contact| contact.way).sum::<f64>() + rest.beyond;
+            let passed = counted().flat_map(|contact| &contact.sections).chain(&rest.sections);
+            let (taped_longer, taped_sections) = self.longer(passed);
+            let tape = TAPE * TAPE + FELT * FELT * rest.beyond * rest.beyond;
+            // Where the next trip begins is where the tape found the train; otherwise the stop itself scatters.
+            let (mut terms, at_rest, variance) = match next_place {
+                Some(place) => {
+                    let mut terms = sections;
+                    terms.push((columns.next_place(), 1.0));
+                    (terms, place + surveyed + longer, tape)
+                }
+                None => (terms_of(&|outcome| outcome.rest), own.place + here.rest, tape + scatter),
+            };
+            subtract(&mut terms, &taped_sections);
+            terms.retain(|(_, slope)| *slope != 0.0);
+            rows.push(row(terms, at_rest - taped - taped_longer, variance, Source::Sensor));
+        }
+        rows
+    }
+
+    /// The column of what a trip's stop is longer by for where it ended, with its slope, or the variance (m²) of that where nobody
+    /// knows on which hop it did.
+    fn stop_offset(&self, trip: &Trip, speed: f64) -> (Option<(usize, f64)>, f64) {
+        let share = stop_offset_share(speed);
+        let column = trip.rest_hop.and_then(|hop| self.columns.stop_offsets.get(&hop));
+        match column {
+            Some(column) => (Some((*column, share)), 0.0),
+            None => (None, share * share * self.stop_offset_variance),
+        }
+    }
+
+    /// A residual in m that noise of time makes is as large as the train is fast: its slope in ln speed is no error of speed.
+    /// Without that, speeds and lengths that are all smaller would fit better, by the sum of squares.
+    fn scaled(&self, terms: &mut Vec<(usize, f64)>, residual: f64, step: u8) {
+        if (1..=self.highest).contains(&usize::from(step)) {
+            add_term(terms, speed_at(usize::from(step)), -residual);
+        }
+    }
+
+    /// What is usual of a trip's own numbers.
+    fn usual(&self, trip: &Trip, own: &Own) -> Vec<Linear> {
+        let columns = self.columns;
+        let mut rows = Vec::new();
+        let mut add = |terms: Vec<(usize, f64)>, residual: f64, deviation: f64, source: Source| {
+            let variance = deviation * deviation;
+            rows.push(Linear { terms, residual, variance, once: variance, source });
+        };
+        if !trip.continues {
+            add(vec![(columns.place(), 1.0)], own.place, ANYWHERE, Source::Usual);
+        }
+        let late = self.scatter.of_start();
+        add(vec![(columns.late_start(), 1.0)], own.late_start, late, Source::Start);
+        for (piece, deviation) in own.deviations.iter().enumerate() {
+            match piece.checked_sub(1) {
+                None => add(vec![(columns.deviation(0), 1.0)], *deviation, TRIP_DEVIATION, Source::Usual),
+                Some(before) => {
+                    let terms = vec![(columns.deviation(piece), 1.0), (columns.deviation(before), -1.0)];
+                    add(terms, deviation - own.deviations[before], WANDER, Source::Usual);
+                }
+            }
+        }
+        for (index, commanded) in trip.commanded.iter().enumerate() {
+            // Starts and stops have residuals of their own, by speed.
+            let is_end = commanded.to == 0 || commanded.at_rest;
+            let change = if is_end { 0.0 } else { self.speed(commanded.to) - self.speed(commanded.from) };
+            let terms = vec![(columns.change(trip, index), 1.0)];
+            add(terms, own.changes[index], change_error(change), Source::Usual);
+        }
+        rows
+    }
+
+    /// Outcomes with each number moved by a little on which the trip can depend.
+    fn slopes(&self, trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(usize, Outcome)> {
+        let columns = self.columns;
+        let mut slopes: Vec<(usize, Outcome)> = Vec::new();
+        let mut moved_segments = Vec::new();
+        let mut numbers = self.lasting.to_vec();
+        for column in involved(trip, segments, self.highest) {
+            numbers[column] += STEP;
+            let answers = Answers::new(&numbers, self.highest);
+            slopes.push((column, outcome(trip, &answers, own, &mut moved_segments)));
+            numbers[column] = self.lasting[column];
+        }
+        let answers = Answers::new(self.lasting, self.highest);
+        let mut moved = own.clone();
+        let mut add = |moved: &Own, column| {
+            slopes.push((column, outcome(trip, &answers, moved, &mut moved_segments)));
+        };
+        if trip.commanded.first().is_some_and(|commanded| commanded.at_rest) {
+            moved.late_start += STEP;
+            add(&moved, columns.late_start());
+            moved.late_start = own.late_start;
+        }
+        for piece in 0..own.deviations.len() {
+            moved.deviations[piece] += STEP;
+            add(&moved, columns.deviation(piece));
+            moved.deviations[piece] = own.deviations[piece];
+        }
+        for change in 0..own.changes.len() {
+            moved.changes[change] += STEP;
+            add(&moved, columns.change(trip, change));
+            moved.changes[change] = own.changes[change];
+        }
+        slopes
+    }
+}
+
+pub(super) fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
+    match terms.iter_mut().find(|(known, _)| *known == column) {
+        Some((_, slope)) => *slope += by,
+        None => terms.push((column, by)),
+    }
+}
+
+fn subtract(terms: &mut Vec<(usize, f64)>, others: &[(usize, f64)]) {
+    for (column, slope) in others {
+        add_term(terms, *column, -slope);
+    }
+}
+
+/// What makes the time or the place of a sensor uncertain.
+struct Error {
+    /// Speed there (m/s).
+    speed: f64,
+    /// By how much the law's shape may be off there (m).
+    law: f64,
+    /// The step from which that speed comes.
+    step: u8,
+}
+
+fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<Error> {
+    let mut walk = Walk::new(trip, own, segments);
+    trip.contacts
+        .iter()
+        .map(|contact| {
+            walk.way(contact.time);
+            let (middle, displacement) = walk.in_change(contact.time);
+            let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
+            let law = shape_error * middle * displacement.abs();
+            Error { speed: walk.speed(contact.time), law, step: trip.step_of(walk.segment()) }
+        })
+        .collect()
+}
+
+/// The columns of the train's own numbers on which a trip can depend.
+fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
+    let mut columns: Vec<usize> = (0..STOP_NODES).collect();
+    let mut add = |column: usize| {
+        if !columns.contains(&column) {
+            columns.push(column);
+        }
+    };
+    for (commanded, segment) in trip.commanded.iter().zip(segments.iter().skip(1)) {
+        let nodes = if commanded.to == 0 {
+            Some((STOP_NODES, segment.from.set))
+        } else {
+            commanded.at_rest.then_some((START_NODES, segment.to))
+        };
+        for (node, weight) in nodes.into_iter().flat_map(|(first, speed)| {
+            nodes_about(speed).into_iter().map(move |(node, weight)| (first + node.min(NODES - 1), weight))
+        }) {
+            if weight != 0.0 {
+                add(node);
+            }
+        }
+    }
+    let steps = trip.commanded.iter().flat_map(|commanded| [commanded.from, commanded.to]);
+    for step in steps.chain(trip.running.map(|(step, _)| step)).map(usize::from) {
+        if (1..=highest).contains(&step) {
+            add(speed_at(step));
+            add(hysteresis_at(step, highest));
+        }
+    }
+    debug_assert!(columns.iter().all(|column| *column < SPEEDS + 2 * highest));
+    columns
+}

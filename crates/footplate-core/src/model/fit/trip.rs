@@ -1,0 +1,269 @@
+//! One trip: from standstill to standstill, with the commands that made it and the contacts passed.
+
+use alloc::vec::Vec;
+
+use crate::ids::NodeId;
+use crate::model::parameters::Answers;
+use crate::model::segment::{Segment, SpeedCommand};
+
+/// A contact passed, and the way there from the one before (or from where the trip's ways are counted).
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct TripContact {
+    /// Its node.
+    pub(super) node: NodeId,
+    /// Mean time at which it closed (s, on the clock of the run) and the variance of that.
+    pub(super) time: f64,
+    pub(super) variance: f64,
+    /// Way by the survey (m) and the sections on it.
+    pub(super) way: f64,
+    pub(super) sections: Vec<usize>,
+}
+
+/// Where a person measured that the train came to rest: a distance beyond one of the contacts of the trip.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct MeasuredRest {
+    /// Contacts of the trip up to the one from which it is counted.
+    pub(super) contacts: usize,
+    /// Distance beyond that contact (m), by tape and survey.
+    pub(super) beyond: f64,
+    /// Sections between that contact and the one from which the tape was laid.
+    pub(super) sections: Vec<usize>,
+}
+
+/// A trip of one train.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Trip {
+    /// Step and approach of a train that was running steadily when it was first seen; `None` from standstill.
+    pub(super) running: Option<(u8, bool)>,
+    /// Whether it begins where the trip before it ended.
+    pub(super) continues: bool,
+    /// When it begins (s).
+    pub(super) begins: f64,
+    #[cfg_attr(feature = "serde", serde(rename = "told"))]
+    pub(super) commanded: Vec<SpeedCommand>,
+    pub(super) contacts: Vec<TripContact>,
+    /// When pieces of a constant deviation of speed begin (s).
+    #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
+    pub(super) pieces: Vec<f64>,
+    /// Whether it ended at rest by the train's own law.
+    pub(super) came_to_rest: bool,
+    /// The hop on which it did, once the next trip has told.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub(super) rest_hop: Option<usize>,
+    /// Where it did, if a person measured that.
+    pub(super) measured: Option<MeasuredRest>,
+    /// What the last fit found of it.
+    pub(super) own: Option<Own>,
+}
+
+/// A piece of a trip over which the deviation of the speed counts as constant, at most this long (s): trains wander over
+/// a lap, not over a hop.
+const LONGEST_PIECE: f64 = 4.0;
+
+/// What a trip has of its own: where it began (m beyond the sensor passed last before), late start (s), deviations of ln
+/// speed by piece, and additional distance of changes (m).
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Own {
+    pub(super) place: f64,
+    pub(super) late_start: f64,
+    pub(super) deviations: Vec<f64>,
+    pub(super) changes: Vec<f64>,
+}
+
+impl Own {
+    /// How many numbers there are beside the place.
+    pub(super) const fn count(&self) -> usize {
+        1 + self.deviations.len() + self.changes.len()
+    }
+
+    /// All of them in the order of their columns, the place first.
+    pub(super) fn flat(&self) -> Vec<f64> {
+        let mut all = alloc::vec![self.place, self.late_start];
+        all.extend(&self.deviations);
+        all.extend(&self.changes);
+        all
+    }
+
+    /// Each number together with another's.
+    pub(super) fn with(&self, other: &Self, of: impl Fn(&f64, &f64) -> f64) -> Self {
+        let all =
+            |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| of(one, other)).collect();
+        Self {
+            place: of(&self.place, &other.place),
+            late_start: of(&self.late_start, &other.late_start),
+            deviations: all(&self.deviations, &other.deviations),
+            changes: all(&self.changes, &other.changes),
+        }
+    }
+}
+
+impl Trip {
+    pub(super) fn new(begins: f64, running: Option<(u8, bool)>, continues: bool) -> Self {
+        Self {
+            running,
+            continues,
+            begins,
+            commanded: Vec::new(),
+            contacts: Vec::new(),
+            pieces: alloc::vec![f64::NEG_INFINITY],
+            came_to_rest: false,
+            rest_hop: None,
+            measured: None,
+            own: None,
+        }
+    }
+
+    pub(super) fn command(&mut self, commanded: SpeedCommand) {
+        self.commanded.push(commanded);
+        if self.commanded.len() > 1 {
+            self.pieces.push(commanded.sent);
+        }
+    }
+
+    pub(super) fn pass(&mut self, contact: TripContact) {
+        let since = self.pieces.last().copied().unwrap_or(f64::NEG_INFINITY).max(self.begins);
+        if contact.time > since + LONGEST_PIECE {
+            self.pieces.push(contact.time);
+        }
+        self.contacts.push(contact);
+    }
+
+    /// The step from which the speed of a segment comes: of a stop, the one before.
+    pub(super) fn step_of(&self, segment: usize) -> u8 {
+        let commanded = segment.checked_sub(1).and_then(|place| self.commanded.get(place));
+        commanded.map_or(self.running.map_or(0, |(step, _)| step), |commanded| {
+            if commanded.to == 0 { commanded.from } else { commanded.to }
+        })
+    }
+
+    /// Its own numbers as the last fit found them; what it has done since is as usual.
+    pub(super) fn start(&self) -> Own {
+        let mut own = self.own.clone().unwrap_or_default();
+        let deviation = own.deviations.last().copied().unwrap_or(0.0);
+        own.deviations.resize(self.pieces.len(), deviation);
+        own.changes.resize(self.commanded.len(), 0.0);
+        own
+    }
+
+    /// When the train rests, if it was commanded to stop last (s).
+    pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
+        let mut segments = Vec::new();
+        self.segments(answers, &self.start(), &mut segments);
+        segments.last().filter(|last| last.to == 0.0).map_or(f64::INFINITY, Segment::settled)
+    }
+
+    /// The changes of speed one after the other, the state before the first command included.
+    pub(super) fn segments(&self, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) {
+        segments.clear();
+        let speed = self.running.map_or(0.0, |(step, above)| answers.speed(usize::from(step), above));
+        let mut last = Segment::steady(self.begins, speed);
+        segments.push(last);
+        for commanded in &self.commanded {
+            let mut effect = commanded.effect(answers);
+            if commanded.at_rest {
+                effect += own.late_start;
+            }
+            let effect = effect.max(last.begins);
+            let mut next = Segment::of(commanded, answers, last.pace(effect));
+            next.begins = effect;
+            segments.push(next);
+            last = next;
+        }
+    }
+}
+
+/// The way of a trip as a function of time, for times that rise.
+#[derive(Debug)]
+pub(super) struct Walk<'t> {
+    trip: &'t Trip,
+    own: &'t Own,
+    segments: &'t [Segment],
+    segment: usize,
+    /// Way without deviations at the beginning of the segment.
+    base: f64,
+    piece: usize,
+    /// Way without deviations and with them at the beginning of the piece.
+    piece_base: f64,
+    done: f64,
+}
+
+impl<'t> Walk<'t> {
+    pub(super) const fn new(trip: &'t Trip, own: &'t Own, segments: &'t [Segment]) -> Self {
+        Self { trip, own, segments, segment: 0, base: 0.0, piece: 0, piece_base: 0.0, done: 0.0 }
+    }
+
+    fn deviation(&self) -> f64 {
+        libm::exp(self.own.deviations.get(self.piece).copied().unwrap_or(0.0))
+    }
+
+    /// Way without deviations; moves on to the segment of that time.
+    fn plain(&mut self, time: f64) -> f64 {
+        while let (Some(now), Some(next)) =
+            (self.segments.get(self.segment), self.segments.get(self.segment + 1))
+            && next.begins <= time
+        {
+            self.base += now.way(next.begins);
+            self.segment += 1;
+        }
+        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.way(time))
+    }
+
+    /// Way (m) from where the trip began, at a time (s) that is not before the last asked for.
+    pub(super) fn way(&mut self, time: f64) -> f64 {
+        while let Some(next) = self.trip.pieces.get(self.piece + 1).copied()
+            && next <= time
+        {
+            let plain = self.plain(next);
+            self.done += self.deviation() * (plain - self.piece_base);
+            self.piece_base = plain;
+            self.piece += 1;
+        }
+        let plain = self.plain(time);
+        self.done + self.deviation() * (plain - self.piece_base) + self.added(time)
+    }
+
+    /// The additional way of changes as far as they are done.
+    fn added(&self, time: f64) -> f64 {
+        let changes = self.segments.iter().skip(1).zip(&self.own.changes);
+        changes.filter(|(_, by)| **by != 0.0).map(|(segment, by)| by * segment.share(time)).sum()
+    }
+
+    /// Way to standstill, when the last segment is a stop.
+    pub(super) fn way_to_rest(mut self) -> f64 {
+        let Some(last) = self.segments.last() else { return 0.0 };
+        let begins = last.begins;
+        let start = self.way(begins);
+        while self.piece + 1 < self.trip.pieces.len() {
+            self.piece += 1;
+        }
+        let added: f64 = self.own.changes.iter().sum::<f64>() - self.added(begins);
+        start + self.deviation() * last.way_to_rest() + added
+    }
+
+    /// Speed (m/s) at the time last asked for, or later.
+    pub(super) fn speed(&self, time: f64) -> f64 {
+        self.deviation() * self.segments.get(self.segment).map_or(0.0, |segment| segment.speed(time))
+    }
+
+    /// The segment of the time last asked for.
+    pub(super) const fn segment(&self) -> usize {
+        self.segment
+    }
+
+    /// Whether the change under way ends at rest.
+    pub(super) fn is_stopping(&self) -> bool {
+        self.segments.get(self.segment).is_some_and(Segment::is_stop)
+    }
+
+    /// How much of the change under way is neither begun nor done (0 to 1, most at its middle), and its displacement (m).
+    pub(super) fn in_change(&self, time: f64) -> (f64, f64) {
+        self.segments.get(self.segment).map_or((0.0, 0.0), |segment| {
+            let share = segment.share(time);
+            (4.0 * share * (1.0 - share), segment.displacement())
+        })
+    }
+}

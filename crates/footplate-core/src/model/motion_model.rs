@@ -1,0 +1,323 @@
+//! How one train moves, as far as is known, and what follows from it.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::doubts::END_OF_STOP;
+use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
+use super::priors::section_variance;
+use super::scatter::Scatter;
+use super::segment::{Pace, Segment, SpeedCommand};
+use super::spread::Spread;
+use super::stop_offset::{StopOffsets, stop_offset_share};
+use super::survey::SectionIndex;
+use super::variation::Variation;
+use crate::estimate::Estimate;
+use crate::event::Approach;
+use crate::ids::{SpeedStep, TrainId};
+use crate::linalg::Gaussian;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Hop, HopId};
+use crate::units::{Acceleration, Length, Speed};
+
+/// Whether a step moves the train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum StepUse {
+    /// Never tried.
+    Untried,
+    /// It moves the train.
+    Moves,
+    /// The train did not start, or stalled, at this step: not to be relied upon.
+    Unreliable,
+}
+
+/// The way and time to rest from a steady speed, counted from when the command left the line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopForecast {
+    /// The way, as the train feels it.
+    pub distance: Length,
+    /// One standard deviation of what is not known of it.
+    pub doubt: Length,
+    /// One standard deviation of single stops about it.
+    pub scatter: Length,
+    /// The time.
+    pub time: TimeSpan,
+    /// Stops from this step that were measured.
+    pub count: u32,
+}
+
+/// How one train answers its commands on one layout.
+///
+/// Everything in it is in the train's own measure of way: a hop is as long as the train needs speed times time for it
+/// ([`length`](Self::length)), curves and slopes included, so that a stop takes as far in a curve as on the straight.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MotionModel {
+    train: TrainId,
+    highest: SpeedStep,
+    pub(crate) values: Vec<f64>,
+    pub(crate) spread: Spread,
+    /// By how much sections are longer than surveyed (m), with the variance.
+    pub(crate) sections: BTreeMap<usize, (f64, f64)>,
+    /// By how much stops are longer for where they end.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) stop_offsets: StopOffsets,
+    uses: Vec<StepUse>,
+    /// Contacts passed and stops made at each step, from below and from above.
+    pub(crate) counts: Vec<[Counts; 2]>,
+    /// How far stops and starts scatter.
+    pub(crate) scatter: Scatter,
+    /// What each number is off by for one standard deviation of the survey's scale.
+    pub(crate) scale: Vec<f64>,
+    pub(crate) date: Timestamp,
+}
+
+/// Measurements at one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Counts {
+    pub(crate) contacts: u32,
+    pub(crate) stops: u32,
+}
+
+/// A stop from rest takes no time; this long (s) is waited anyway before a train counts as standing.
+const LEAST_STOP_S: f64 = 0.5;
+
+/// How many standard deviations of its time a ramp has to last to be one (95 % of normal errors are smaller).
+const DECISIVE: f64 = 2.0;
+
+impl MotionModel {
+    /// What all model trains have in common, and nothing of this one.
+    #[must_use]
+    pub fn unknown(train: TrainId, highest: SpeedStep) -> Self {
+        let steps = usize::from(highest.get());
+        Self {
+            train,
+            highest,
+            values: prior_means(steps),
+            spread: Spread::prior(steps),
+            sections: BTreeMap::new(),
+            stop_offsets: StopOffsets::default(),
+            uses: vec![StepUse::Untried; steps + 1],
+            counts: vec![[Counts::default(); 2]; steps + 1],
+            scatter: Scatter::USUAL,
+            scale: vec![0.0; super::parameters::count(steps)],
+            date: Timestamp::ZERO,
+        }
+    }
+
+    /// The train.
+    #[must_use]
+    pub const fn train(&self) -> TrainId {
+        self.train
+    }
+
+    /// The highest step of its decoder.
+    #[must_use]
+    pub const fn highest(&self) -> SpeedStep {
+        self.highest
+    }
+
+    pub(crate) fn steps(&self) -> usize {
+        usize::from(self.highest.get())
+    }
+
+    pub(crate) fn answers(&self) -> Answers<'_> {
+        Answers::new(&self.values, self.steps())
+    }
+
+    /// Places of what hysteresis at a step is made of.
+    pub(crate) fn hysteresis_places(&self, step: usize) -> [usize; 2] {
+        [HYSTERESIS, hysteresis_at(step, self.steps())]
+    }
+
+    fn counts_at(&self, step: SpeedStep, approach: Approach) -> Counts {
+        let from_above = usize::from(approach == Approach::Above);
+        let both = self.counts.get(usize::from(step.get())).copied().unwrap_or_default();
+        both.get(from_above).copied().unwrap_or_default()
+    }
+
+    /// Its steady speed at a step; the count is of contacts passed at it. An unknown approach counts as from below.
+    #[must_use]
+    pub fn speed(&self, step: SpeedStep, approach: Approach) -> Estimate<Speed> {
+        let (place, above) = (usize::from(step.get()), approach == Approach::Above);
+        let speed = |answers: &Answers<'_>| answers.speed(place, above);
+        Estimate {
+            value: Speed::from_m_per_s(speed(&self.answers())),
+            uncertainty: Speed::from_m_per_s(self.deviation_with_scale(speed)),
+            count: self.counts_at(step, approach).contacts,
+            date: self.date,
+        }
+    }
+
+    /// The most likely steady speed at a step, without its uncertainty, which takes a hundred times as long.
+    pub(crate) fn steady_speed(&self, step: SpeedStep, approach: Approach) -> Speed {
+        let above = approach == Approach::Above;
+        Speed::from_m_per_s(self.answers().speed(usize::from(step.get()), above))
+    }
+
+    /// One standard deviation of what follows from the model's numbers, in the measure of a tape: the scale of the survey
+    /// may be off, too.
+    pub(crate) fn deviation_with_scale(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
+        let slopes = self.spread.slopes(&self.values, self.steps(), of);
+        let by_scale: f64 =
+            slopes.iter().filter_map(|(place, slope)| Some(slope * self.scale.get(*place)?)).sum();
+        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), by_scale)
+    }
+
+    /// The model with what may have changed by another session: what a measurement of today promises for tomorrow.
+    #[must_use]
+    pub fn for_later_session(&self) -> Self {
+        let mut later = self.clone();
+        later.spread.widen(&Variation::between_sessions(), self.steps());
+        later
+    }
+
+    /// One standard deviation (s) by which starts from rest are late or early.
+    pub(crate) fn start_scatter(&self) -> f64 {
+        self.scatter.of_start()
+    }
+
+    /// By how much an even change of speed of a running train is late: the delay of the command, and the lag with which
+    /// the train follows its decoder.
+    #[must_use]
+    pub fn change_delay(&self, is_faster: bool) -> Estimate<TimeSpan> {
+        let late = |answers: &Answers<'_>| {
+            let (lag, _) = answers.lag_and_ramp(is_faster, 0.0, 0.0);
+            answers.delay(is_faster) + lag
+        };
+        Estimate {
+            value: TimeSpan::from_s(late(&self.answers()).max(0.0)),
+            uncertainty: TimeSpan::from_s(self.deviation_with_scale(late)),
+            count: self.contacts_passed(),
+            date: self.date,
+        }
+    }
+
+    /// The even acceleration of the train's decoder from one step to another, negative for slowing down: the speeds'
+    /// difference by the time of the ramp. `None` if the model cannot tell the ramp from a jump.
+    #[must_use]
+    pub fn ramp_acceleration(&self, from: SpeedStep, to: SpeedStep) -> Option<Estimate<Acceleration>> {
+        let gain = |answers: &Answers<'_>| {
+            answers.speed(usize::from(to.get()), to < from) - answers.speed(usize::from(from.get()), false)
+        };
+        let ramp = |answers: &Answers<'_>| {
+            let steps = f64::from(to.get()) - f64::from(from.get());
+            answers.lag_and_ramp(to > from, gain(answers), steps).1
+        };
+        // 1/a is as good as normal where the ramp is short, a is not.
+        let slowness = |answers: &Answers<'_>| ramp(answers) / gain(answers);
+        let (value, deviation) = (slowness(&self.answers()), self.deviation_with_scale(slowness));
+        let is_a_ramp = ramp(&self.answers()) > 0.0 && value.abs() > DECISIVE * deviation;
+        is_a_ramp.then(|| Estimate {
+            value: Acceleration::from_m_per_s2(1.0 / value),
+            uncertainty: Acceleration::from_m_per_s2(deviation / (value * value)),
+            count: self.contacts_passed(),
+            date: self.date,
+        })
+    }
+
+    /// What experience says of a step.
+    #[must_use]
+    pub fn uses(&self, step: SpeedStep) -> StepUse {
+        self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable)
+    }
+
+    /// Keeps in mind whether a step moved the train.
+    pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
+        if let Some(slot) = self.uses.get_mut(usize::from(step.get())) {
+            *slot = found;
+        }
+    }
+
+    /// How it stops from its steady speed at a step.
+    #[must_use]
+    pub fn stop(&self, step: SpeedStep, approach: Approach) -> StopForecast {
+        let above = approach == Approach::Above;
+        let commanded = SpeedCommand { sent: 0.0, from: step.get(), to: 0, at_rest: false };
+        let stop = |answers: &Answers<'_>| {
+            let speed = answers.speed(usize::from(step.get()), above);
+            let segment = Segment::of(&commanded, answers, Pace::steady(speed));
+            (speed * segment.begins + segment.way_to_rest(), segment.settled())
+        };
+        let (distance, time) = stop(&self.answers());
+        let speed = self.answers().speed(usize::from(step.get()), above);
+        StopForecast {
+            distance: Length::from_m(distance.max(0.0)),
+            doubt: Length::from_m(libm::hypot(
+                self.deviation_with_scale(|answers| stop(answers).0),
+                END_OF_STOP,
+            )),
+            scatter: Length::from_m(libm::hypot(
+                self.scatter(speed),
+                libm::sqrt(self.stop_offset(None, speed).variance),
+            )),
+            time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
+            count: self.counts_at(step, approach).stops,
+        }
+    }
+
+    /// One standard deviation (m) of stops from a speed (m/s).
+    pub(crate) fn scatter(&self, speed: f64) -> f64 {
+        self.scatter.of_stop(speed)
+    }
+
+    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop; or nobody knows where.
+    pub(crate) fn stop_offset(&self, hop: Option<HopId>, speed: f64) -> Gaussian {
+        let (share, offset) = (stop_offset_share(speed), self.stop_offsets.of(hop.map(HopId::index)));
+        Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
+    }
+
+    /// One standard deviation of what stops scatter by that nothing in the model explains, as promises that were broken show:
+    /// loads, wear, laws that are none of ours. It is part of every stop's scatter.
+    #[must_use]
+    pub const fn unexplained_scatter(&self) -> Length {
+        Length::from_m(self.scatter.floor)
+    }
+
+    /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.
+    #[must_use]
+    pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
+        let answers = self.answers();
+        let commanded =
+            SpeedCommand { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
+        let pace = Pace::steady(answers.speed(usize::from(from.get()), false));
+        let segment = Segment::of(&commanded, &answers, pace);
+        TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
+    }
+
+    /// The way over a hop as the train feels it, and one standard deviation of it.
+    #[must_use]
+    pub fn length(&self, sections: &SectionIndex, hop: &Hop<'_>) -> [Length; 2] {
+        let section = sections.section(hop.id);
+        let known = section.and_then(|section| self.sections.get(&section).copied());
+        let (by, variance) =
+            known.or_else(|| Some((0.0, section_variance(sections, section?)))).unwrap_or_default();
+        let length = (hop.length.as_m() + by).max(0.0);
+        [Length::from_m(length), Length::from_m(libm::sqrt(variance.max(0.0)))]
+    }
+
+    /// The sections that it ran over: by how much they are longer than surveyed (m), with the variance.
+    pub fn sections(&self) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
+        self.sections.iter().map(|(section, (longer, variance))| (*section, *longer, *variance))
+    }
+
+    /// Another estimate of by how much a section is longer than surveyed (m), with the variance.
+    pub(crate) fn set_section(&mut self, section: usize, longer: f64, variance: f64) {
+        self.sections.insert(section, (longer, variance));
+    }
+
+    /// By how much a section is longer than surveyed (m), with the variance.
+    pub(crate) fn section(&self, section: usize) -> Option<(f64, f64)> {
+        self.sections.get(&section).copied()
+    }
+
+    /// How fast a train of which nothing is known may be at a step (m/s), one standard deviation above the usual.
+    #[must_use]
+    pub fn fastest_of_unknown(step: SpeedStep, highest: SpeedStep) -> Speed {
+        let (mean, deviation) = speed_prior(usize::from(step.get()).max(1), usize::from(highest.get()));
+        Speed::from_m_per_s(libm::exp(mean + deviation))
+    }
+}

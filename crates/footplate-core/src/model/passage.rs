@@ -1,0 +1,259 @@
+//! From the raw entries of a run to passages: a train passed a contact, within this window, by this way.
+//!
+//! Recordings hold more reports than passages: a contact repeats in every poll while the shoe is on it, a
+//! station still remembers a contact from before the start, and now and then a contact stays silent. What
+//! each report is taken for is said here once, for whoever reviews runs and for the live estimator alike.
+
+use crate::event::{Approach, Event, EventKind};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::link::{ContactWindow, PollTimingEstimator};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, Leg, Reach, TurnoutStates};
+
+/// A report this soon after a start from rest is of a contact the train stood on, or that the station still
+/// remembered: command delay (0.1 to 0.6 s measured) and the first 0.5 s of any start move a train by less
+/// than its shoe is long.
+pub const STALE_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
+/// Contacts that may stay silent in a row before the way is no longer believed.
+const BELIEVED_MISSED: usize = 2;
+
+/// Commands that follow one another this fast keep the line busy: a solenoid is switched off 150 to 200 ms after it is switched
+/// on, and the next one behind it.
+const SAME_BURST: TimeSpan = TimeSpan::from_ms(250);
+
+/// What a train was commanded last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drive {
+    /// The step it is to run at.
+    pub step: SpeedStep,
+    /// The step it ran at before.
+    pub from: SpeedStep,
+    /// When it was told; `None` when the recording begins with the train running at `step`.
+    pub commanded: Option<Timestamp>,
+}
+
+impl Drive {
+    /// From which side the step was reached.
+    #[must_use]
+    pub fn approach(self) -> Approach {
+        match self.commanded {
+            None => Approach::Unknown,
+            Some(_) if self.from > self.step => Approach::Above,
+            Some(_) => Approach::Below,
+        }
+    }
+}
+
+/// A train passed a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passage {
+    /// The contact.
+    pub sensor: SensorId,
+    /// Its node, which tells the direction of travel.
+    pub node: NodeId,
+    /// When it closed.
+    pub window: ContactWindow,
+    /// The way from the passage before; `None` for the first of a run and where no way leads from there.
+    pub way: Option<Reach>,
+    /// What the train was told at the time.
+    pub drive: Drive,
+    /// The entry of the run that reported it, counted from 0.
+    pub entry: usize,
+}
+
+/// What a report was taken for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sighting {
+    /// The train passed the contact.
+    Passage(Passage),
+    /// The shoe is still on the contact of the last passage.
+    Repeat,
+    /// The train stands on it, or the station remembered it from before.
+    Standing,
+    /// The layout has no such sensor.
+    UnknownSensor,
+}
+
+/// Follows one train through the entries of a run.
+#[derive(Debug, Clone)]
+pub struct PassageTracker {
+    train: TrainId,
+    drive: Drive,
+    /// Node of the last passage.
+    at: Option<NodeId>,
+    last_sensor: Option<SensorId>,
+    last_report: Option<Timestamp>,
+    timing: PollTimingEstimator,
+    /// The first and the last of the commands that were sent one right after the other.
+    burst: Option<[Timestamp; 2]>,
+    turnouts: TurnoutStates,
+    entries: usize,
+}
+
+impl PassageTracker {
+    /// A run of `train` begins, which has been running at `step` for long or stands.
+    #[must_use]
+    pub fn new(train: TrainId, step: SpeedStep, timing: PollTimingEstimator) -> Self {
+        Self {
+            train,
+            drive: Drive { step, from: step, commanded: None },
+            at: None,
+            last_sensor: None,
+            last_report: None,
+            timing,
+            burst: None,
+            turnouts: TurnoutStates::unknown(),
+            entries: 0,
+        }
+    }
+
+    /// A new run begins: another clock, and nothing is known of where the train is.
+    pub fn begin_run(&mut self, step: SpeedStep) {
+        self.drive = Drive { step, from: step, commanded: None };
+        self.at = None;
+        self.last_sensor = None;
+        self.last_report = None;
+        self.burst = None;
+        self.entries = 0;
+        self.timing.restart();
+    }
+
+    /// The next entry of the run; the sighting where it is a report.
+    #[inline]
+    pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Sighting> {
+        let entry = self.entries;
+        self.entries += 1;
+        match event.kind {
+            EventKind::Sensor(report) => {
+                let mut window = ContactWindow::of_report(
+                    event.time,
+                    report.poll_interval,
+                    self.last_report,
+                    self.timing.timing(),
+                );
+                if report.poll_interval.is_none() {
+                    window.after = window.after.min(self.pushed_from(event.time));
+                }
+                self.timing.report(event.time);
+                self.last_report = Some(event.time);
+                if self.last_sensor == Some(report.sensor) {
+                    return Some(Sighting::Repeat);
+                }
+                Some(self.sight(layout, report.sensor, window, entry))
+            }
+            EventKind::Speed { train, step } => {
+                self.command_sent(event.time);
+                if train == self.train && step != self.drive.step {
+                    self.drive = Drive { step, from: self.drive.step, commanded: Some(event.time) };
+                }
+                None
+            }
+            EventKind::Reverse { train } => {
+                self.command_sent(event.time);
+                if train == self.train {
+                    // The contact behind becomes the one ahead, at an unknown distance.
+                    self.at = None;
+                    self.last_sensor = None;
+                }
+                None
+            }
+            EventKind::Turnout { turnout, curved } => {
+                self.command_sent(event.time);
+                self.turnouts.set(turnout, Leg::from_curved(curved));
+                None
+            }
+            EventKind::Stopped { .. } => None,
+        }
+    }
+
+    /// A command went over the line before the next poll.
+    fn command_sent(&mut self, time: Timestamp) {
+        self.timing.command_sent();
+        self.burst = match self.burst {
+            Some([first, last]) if time - last < SAME_BURST => Some([first, time]),
+            _ => Some([time, time]),
+        };
+    }
+
+    /// Since when the sensor of a report may have been closed: commands right before it pushed its poll, and the last poll
+    /// before them is as old as they are.
+    fn pushed_from(&self, stamp: Timestamp) -> Timestamp {
+        let period = self.timing.timing().period;
+        match self.burst {
+            Some([first, last]) if stamp - last < SAME_BURST + period + period => {
+                (first - period).max(self.last_report.unwrap_or(first - period))
+            }
+            _ => stamp,
+        }
+    }
+
+    /// The next entry of the run was excluded by a person: it counts, but nothing is made of it.
+    pub const fn skip(&mut self) {
+        self.entries += 1;
+    }
+
+    fn sight(&mut self, layout: &Layout, sensor: SensorId, window: ContactWindow, entry: usize) -> Sighting {
+        let Some(node) = layout.sensor_node(sensor) else { return Sighting::UnknownSensor };
+        self.last_sensor = Some(sensor);
+        if self.stands_until().is_some_and(|until| window.until < until) {
+            // It moves off from somewhere behind or on the contact: no way can be measured from here.
+            self.at = None;
+            return Sighting::Standing;
+        }
+        let way = self.at.and_then(|from| {
+            // The way past the fewest silent contacts, and of these the shortest.
+            (0..=BELIEVED_MISSED).find_map(|missed| {
+                layout
+                    .reaches(from, &self.turnouts, missed)
+                    .filter(|reach| reach.sensor == Some(sensor))
+                    .min_by(|one, other| one.length.as_m().total_cmp(&other.length.as_m()))
+            })
+        });
+        self.at = Some(node);
+        Sighting::Passage(Passage { sensor, node, window, way, drive: self.drive, entry })
+    }
+
+    /// Until when reports say nothing of the motion of a train that starts from rest.
+    fn stands_until(&self) -> Option<Timestamp> {
+        match self.drive.commanded {
+            None if self.drive.step == SpeedStep::STAND => Some(Timestamp::from_ns(i64::MAX)),
+            Some(commanded) if self.drive.from == SpeedStep::STAND => Some(commanded + STALE_WITHIN),
+            _ => None,
+        }
+    }
+
+    /// The train followed.
+    #[must_use]
+    pub const fn train(&self) -> TrainId {
+        self.train
+    }
+
+    /// What it was commanded last.
+    #[must_use]
+    pub const fn drive(&self) -> Drive {
+        self.drive
+    }
+
+    /// The node of the contact it passed last.
+    #[must_use]
+    pub const fn at(&self) -> Option<NodeId> {
+        self.at
+    }
+
+    /// How the turnouts lie, as far as the run told.
+    #[must_use]
+    pub const fn turnouts(&self) -> &TurnoutStates {
+        &self.turnouts
+    }
+
+    /// The rhythm of the link as learnt so far.
+    #[must_use]
+    pub const fn timing(&self) -> &PollTimingEstimator {
+        &self.timing
+    }
+
+    /// The rhythm of the link, to learn it from elsewhere.
+    pub const fn timing_mut(&mut self) -> &mut PollTimingEstimator {
+        &mut self.timing
+    }
+}

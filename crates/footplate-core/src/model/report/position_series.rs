@@ -1,0 +1,388 @@
+//! One start or one stop from a series of positions: video, a tape, light gates.
+//!
+//! The law is that of the motion model ([`Segment`]): a ramp of the set speed, a lag behind it and, at the end of a stop,
+//! friction. A series knows no command, so that the time is found at which the change takes effect, not its delay.
+//! Letters: `x` unknowns, `s(t)` position by the law, `r` residual, `ρ` correlation of neighbouring residuals.
+//!
+//! ```text
+//! x = position and time at which the change takes effect, speed, ln lag, ln ramp, ln friction
+//! cost = Σ r²/(σ² (1 + ρ)/(1 − ρ)) + Σ (x − prior)²/spread²
+//! ```
+//!
+//! Residuals of a tracker are alike from picture to picture. Counted as independent, a hundred of them would promise far
+//! too much; the factor is that of the mean of a series whose correlation falls geometrically (Bartlett, 1946).
+#![expect(clippy::indexing_slicing, reason = "every index is below the number of unknowns or of points")]
+
+use alloc::vec::Vec;
+
+use crate::estimate::Estimate;
+use crate::kinematics::RampedLag;
+use crate::linalg::{CurveFit, FittedCurve, Unknown};
+use crate::model::segment::Segment;
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::{Acceleration, Length, Speed};
+
+const POSITION: usize = 0;
+const EFFECT: usize = 1;
+const SPEED: usize = 2;
+const LAG: usize = 3;
+const RAMP: usize = 4;
+const FRICTION: usize = 5;
+const N: usize = 6;
+
+/// Steps of the numerical derivatives, as fine as the law is smooth: m, s, m/s, 1, 1, 1.
+const STEP: [f64; N] = [1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3];
+/// Spreads (m, s, m/s) far beyond any layout: they only keep the equations from being singular.
+const WIDE: [f64; 3] = [1e3, 1e4, 1e2];
+/// Before anything is known: a lag of 0.3 s and friction of 15 mm/s² as in `parameters.rs`, each within a factor of 4.5.
+const LN_LAG: (f64, f64) = (-1.2, 1.5);
+const LN_FRICTION: (f64, f64) = (-4.2, 1.5);
+/// A ramp is anything from a jump to half a second: 0.04 s within a factor of 12. Longer or less wide, a jump would be taken for a
+/// short ramp.
+const LN_RAMP: (f64, f64) = (-3.2, 2.5);
+/// Wider than any ramp: for an even change, of which nothing is known beforehand.
+const ANY_LN_RAMP: f64 = 10.0;
+/// A lag that answers at once, in 1 ms: an even change of speed.
+const EVEN_LN_LAG: f64 = -7.0;
+/// An even change needs no friction to end (m/s²).
+const NO_FRICTION: f64 = 1e-4;
+
+/// How far the law's shape is off within a change, as part of its way: for most trains (docs/theory/motion_model.md). No number
+/// of positions narrows it, so that it is added to where a stop begins and how long it is.
+const SHAPE: f64 = 0.04;
+
+/// Positions below which six unknowns and the noise are not found.
+const FEWEST_POINTS: usize = 10;
+/// The part of the series at either end from which the two speeds are read.
+const END_PART: f64 = 0.1;
+/// A train counts as standing at an end below this part of the speed at the other.
+const STANDING: f64 = 0.1;
+/// A train that moves less than this in all stands (m).
+const NO_MOTION: f64 = 0.01;
+/// No position is known better than this (m); keeps a series without noise from being divided by nothing.
+const LEAST_NOISE: f64 = 1e-5;
+/// Correlation above which positions say next to nothing new.
+const MOST_CORRELATED: f64 = 0.98;
+
+/// Where the train was at a time, on any clock and from any origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionPoint {
+    /// Time on the clock of the series.
+    pub time: TimeSpan,
+    /// Place along the track.
+    pub position: Length,
+}
+
+/// Which change of speed a series shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SeriesChange {
+    /// From standstill to a speed.
+    Start,
+    /// From a speed to standstill.
+    Stop,
+}
+
+/// What a series of positions says of a start or a stop. All uncertainties are standard deviations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeriesFit {
+    /// Which change it is.
+    pub change: SeriesChange,
+    /// Steady speed before a stop, or after a start; never negative.
+    pub speed: Estimate<Speed>,
+    /// When the change takes effect, on the clock of the series.
+    pub effect: Estimate<TimeSpan>,
+    /// Time constant of the lag.
+    pub lag: Estimate<TimeSpan>,
+    /// Duration of the ramp of the set speed before the lag; short against its uncertainty if the set speed jumps.
+    pub ramp: Estimate<TimeSpan>,
+    /// Deceleration by friction at the end of a stop.
+    pub friction: Option<Estimate<Acceleration>>,
+    /// From where a stop takes effect to rest.
+    pub stopping_distance: Option<Estimate<Length>>,
+    /// From when a stop takes effect to rest.
+    pub stopping_time: Option<Estimate<TimeSpan>>,
+    /// Root mean square of the residuals.
+    pub residual: Length,
+    /// The same if speed changed evenly, without lag and friction (`τv + v²/2a`).
+    pub even_residual: Length,
+    /// Correlation of neighbouring residuals.
+    pub correlation: f64,
+}
+
+/// Why a series says nothing of a change of speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum SeriesError {
+    /// There are too few positions.
+    TooFew {
+        /// How many there are.
+        found: usize,
+    },
+    /// A time is not later than the one before.
+    NotLater {
+        /// Number of the point, from 0.
+        point: usize,
+    },
+    /// The train stands all the time.
+    Standing {
+        /// How far it moved in all.
+        moved: Length,
+    },
+    /// The train moves at both ends, or at neither.
+    NotOneChange {
+        /// Speed in the first tenth.
+        first: Speed,
+        /// Speed in the last tenth.
+        last: Speed,
+    },
+    /// The positions leave the law's numbers open.
+    NotDetermined,
+}
+
+impl core::fmt::Display for SeriesError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooFew { found } => {
+                write!(f, "{found} positions are too few for a law: measure {FEWEST_POINTS} or more")
+            }
+            Self::NotLater { point } => {
+                write!(
+                    f,
+                    "the time of position {} is not after the one before: sort the rows by time",
+                    point + 1
+                )
+            }
+            Self::Standing { moved } => write!(
+                f,
+                "the train moved only {:.1} mm, so that it stood all the time: measure a start or a stop",
+                moved.as_mm()
+            ),
+            Self::NotOneChange { first, last } => write!(
+                f,
+                "the train runs at {:.0} mm/s at the beginning and {:.0} mm/s at the end: one of them should be standstill, \
+                 so cut the series to one start or one stop",
+                first.as_mm_per_s(),
+                last.as_mm_per_s()
+            ),
+            Self::NotDetermined => {
+                write!(f, "the positions leave the law open: measure more of them while the speed changes")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SeriesError {}
+
+impl SeriesFit {
+    /// Fits the law to positions of one start or one stop, in either direction along the track.
+    ///
+    /// # Errors
+    ///
+    /// If there are too few positions, their times do not increase, or they show no change from or to standstill.
+    pub fn of(points: &[PositionPoint]) -> Result<Self, SeriesError> {
+        let series = Series::of(points)?;
+        let even = series.fitted(&[POSITION, EFFECT, SPEED, RAMP]).ok_or(SeriesError::NotDetermined)?;
+        let fit = series.fitted(series.unknowns()).ok_or(SeriesError::NotDetermined)?;
+        Ok(series.report(&fit, &even))
+    }
+}
+
+/// Positions in m and s, turned so that the train runs towards larger ones.
+struct Series {
+    times: Vec<f64>,
+    positions: Vec<f64>,
+    change: SeriesChange,
+    speed: f64,
+}
+
+/// A fitted law and what it leaves over.
+struct Fitted {
+    curve: FittedCurve,
+    unknowns: [Unknown; N],
+    rms: f64,
+    correlation: f64,
+}
+
+impl Series {
+    fn of(points: &[PositionPoint]) -> Result<Self, SeriesError> {
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return Err(SeriesError::TooFew { found: 0 });
+        };
+        if points.len() < FEWEST_POINTS {
+            return Err(SeriesError::TooFew { found: points.len() });
+        }
+        let pairs = points.iter().zip(points.iter().skip(1));
+        if let Some(before) = pairs.clone().position(|(one, next)| next.time <= one.time) {
+            return Err(SeriesError::NotLater { point: before + 1 });
+        }
+        let moved = last.position - first.position;
+        let most = points.iter().map(|point| (point.position - first.position).as_m().abs());
+        let most = most.fold(0.0, f64::max);
+        if moved.as_m().is_nan() || moved.as_m().abs() < NO_MOTION {
+            return Err(SeriesError::Standing { moved: Length::from_m(most) });
+        }
+        let sense = moved.as_m().signum();
+        let times: Vec<f64> = points.iter().map(|point| (point.time - first.time).as_s()).collect();
+        let positions: Vec<f64> =
+            points.iter().map(|point| sense * (point.position - first.position).as_m()).collect();
+        let part = ((END_PART * times.len() as f64) as usize).max(3);
+        let speed_in = |from: usize| {
+            let (times, positions) = (&times[from..from + part], &positions[from..from + part]);
+            slope(times, positions)
+        };
+        let (begin, end) = (speed_in(0), speed_in(times.len() - part));
+        let (change, speed) = if end.abs() < STANDING * begin {
+            (SeriesChange::Stop, begin)
+        } else if begin.abs() < STANDING * end {
+            (SeriesChange::Start, end)
+        } else {
+            return Err(SeriesError::NotOneChange {
+                first: Speed::from_m_per_s(sense * begin),
+                last: Speed::from_m_per_s(sense * end),
+            });
+        };
+        Ok(Self { times, positions, change, speed })
+    }
+
+    fn unknowns(&self) -> &'static [usize] {
+        match self.change {
+            SeriesChange::Stop => &[POSITION, EFFECT, SPEED, LAG, RAMP, FRICTION],
+            SeriesChange::Start => &[POSITION, EFFECT, SPEED, LAG, RAMP],
+        }
+    }
+
+    fn law(&self, x: &[f64]) -> Segment {
+        let shape = RampedLag::new(libm::exp(x[RAMP]), libm::exp(x[LAG]));
+        match self.change {
+            SeriesChange::Stop => {
+                Segment::by_law(x[EFFECT], [x[SPEED], 0.0], shape, Some(libm::exp(x[FRICTION])))
+            }
+            SeriesChange::Start => Segment::by_law(x[EFFECT], [0.0, x[SPEED]], shape, None),
+        }
+    }
+
+    fn residuals(&self, x: &[f64]) -> Vec<f64> {
+        let law = self.law(x);
+        let pairs = self.times.iter().zip(&self.positions);
+        pairs.map(|(time, position)| position - x[POSITION] - law.way(*time)).collect()
+    }
+
+    /// Where the search begins: the delay and ramp that a stop or start of this length has at an even rate.
+    fn first(&self, is_even: bool) -> [f64; N] {
+        let (duration, way) =
+            (self.times.last().copied().unwrap_or(0.0), self.positions.last().copied().unwrap_or(0.0));
+        // A change at once at the time `at` would get as far; a real one begins before it, and takes about a second.
+        let running = way / self.speed;
+        let at = if self.change == SeriesChange::Stop { running } else { duration - running };
+        let effect = (at - 0.5).max(0.0);
+        let position = if self.change == SeriesChange::Stop { self.speed * effect } else { 0.0 };
+        let (lag, ramp, friction) = if is_even {
+            (EVEN_LN_LAG, 0.0, libm::log(NO_FRICTION))
+        } else {
+            (-0.7, LN_RAMP.0, LN_FRICTION.0)
+        };
+        [position, effect, self.speed, lag, ramp, friction]
+    }
+
+    fn fitted(&self, free: &[usize]) -> Option<Fitted> {
+        let is_even = !free.contains(&LAG);
+        let unknowns = self.priors(free, is_even);
+        let curve = CurveFit {
+            unknowns: &unknowns,
+            residuals: |x: &[f64]| self.residuals(x),
+            variance: |residuals: &[f64]| noise(residuals),
+        };
+        let curve = curve.fitted(&self.first(is_even))?;
+        let (rms, correlation) = spread(&self.residuals(&curve.x));
+        rms.is_finite().then_some(Fitted { curve, unknowns, rms, correlation })
+    }
+
+    /// What is known of the unknowns beforehand.
+    fn priors(&self, free: &[usize], is_even: bool) -> [Unknown; N] {
+        let ramp = if is_even { ANY_LN_RAMP } else { LN_RAMP.1 };
+        let of = [
+            (0.0, WIDE[POSITION]),
+            (0.0, WIDE[EFFECT]),
+            (self.speed, WIDE[SPEED]),
+            LN_LAG,
+            (LN_RAMP.0, ramp),
+            LN_FRICTION,
+        ];
+        core::array::from_fn(|unknown| Unknown {
+            prior: of[unknown].0,
+            spread: of[unknown].1,
+            step: STEP[unknown],
+            is_free: free.contains(&unknown),
+        })
+    }
+
+    fn report(&self, fit: &Fitted, even: &Fitted) -> SeriesFit {
+        let count = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
+        let (x, deviation) = (&fit.curve.x, |unknown| fit.curve.deviation(unknown));
+        let derived = |of: fn(&Segment) -> f64| fit.curve.derived(&fit.unknowns, |x| of(&self.law(x)));
+        let span = |(value, deviation): (f64, f64)| Estimate {
+            value: TimeSpan::from_s(value),
+            uncertainty: TimeSpan::from_s(deviation),
+            count,
+            date: Timestamp::ZERO,
+        };
+        let (lag, is_stop) = (libm::exp(x[LAG]), self.change == SeriesChange::Stop);
+        let (ramp, friction) = (libm::exp(x[RAMP]), libm::exp(x[FRICTION]));
+        let (way, way_deviation) = derived(Segment::way_to_rest);
+        let (time, time_deviation) = derived(|law| law.settled() - law.begins);
+        let shape = SHAPE * self.law(x).delay() * x[SPEED];
+        let shape_time = SHAPE * self.law(x).delay();
+        SeriesFit {
+            change: self.change,
+            speed: Estimate {
+                value: Speed::from_m_per_s(x[SPEED]),
+                uncertainty: Speed::from_m_per_s(deviation(SPEED)),
+                count,
+                date: Timestamp::ZERO,
+            },
+            effect: span((x[EFFECT], libm::hypot(deviation(EFFECT), shape_time))),
+            lag: span((lag, lag * deviation(LAG))),
+            ramp: span((ramp, ramp * deviation(RAMP))),
+            friction: is_stop.then(|| Estimate {
+                value: Acceleration::from_m_per_s2(friction),
+                uncertainty: Acceleration::from_m_per_s2(friction * deviation(FRICTION)),
+                count,
+                date: Timestamp::ZERO,
+            }),
+            stopping_distance: is_stop.then(|| Estimate {
+                value: Length::from_m(way),
+                uncertainty: Length::from_m(libm::hypot(way_deviation, shape)),
+                count,
+                date: Timestamp::ZERO,
+            }),
+            stopping_time: is_stop.then(|| span((time, libm::hypot(time_deviation, shape_time)))),
+            residual: Length::from_m(fit.rms),
+            even_residual: Length::from_m(even.rms),
+            correlation: fit.correlation,
+        }
+    }
+}
+
+/// Slope of the straight line through points, least squares.
+fn slope(times: &[f64], positions: &[f64]) -> f64 {
+    let count = times.len() as f64;
+    let mean = times.iter().sum::<f64>() / count;
+    let products: f64 = times.iter().zip(positions).map(|(time, position)| (time - mean) * position).sum();
+    let squares: f64 = times.iter().map(|time| (time - mean) * (time - mean)).sum();
+    products / squares
+}
+
+/// Variance that one position counts with: what is left over, times how much alike neighbours are.
+fn noise(residuals: &[f64]) -> f64 {
+    let (rms, correlation) = spread(residuals);
+    let freedom = residuals.len() as f64 / (residuals.len().saturating_sub(N).max(1)) as f64;
+    (rms * rms * freedom).max(LEAST_NOISE * LEAST_NOISE) * (1.0 + correlation) / (1.0 - correlation)
+}
+
+/// Root mean square of residuals, and the correlation of neighbours, at least zero.
+fn spread(residuals: &[f64]) -> (f64, f64) {
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
+    let products: f64 = residuals.iter().zip(residuals.iter().skip(1)).map(|(one, next)| one * next).sum();
+    let correlation = if squares > 0.0 { (products / squares).clamp(0.0, MOST_CORRELATED) } else { 0.0 };
+    (libm::sqrt(squares / residuals.len().max(1) as f64), correlation)
+}

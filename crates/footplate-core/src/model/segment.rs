@@ -1,0 +1,269 @@
+//! What a train does between one command's effect and the next: a change of speed and the run behind it.
+
+use super::decoder_kind::SHAPE_ERROR;
+use super::parameters::Answers;
+use crate::kinematics::RampedLag;
+
+/// What a command asks of a train in the state it is in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct SpeedCommand {
+    /// When the command left the line (s, on the clock of the run).
+    pub(crate) sent: f64,
+    /// The step before and the step commanded.
+    pub(crate) from: u8,
+    pub(crate) to: u8,
+    /// Whether the train stands when it takes effect.
+    pub(crate) at_rest: bool,
+}
+
+impl SpeedCommand {
+    /// Whether the speed of its step is reached from above.
+    pub(crate) const fn above(&self) -> bool {
+        self.to < self.from
+    }
+
+    /// When it takes effect (s).
+    pub(crate) fn effect(&self, answers: &Answers<'_>) -> f64 {
+        let up = self.to > self.from;
+        self.sent + if self.at_rest { answers.start_delay() } else { answers.delay(up) }
+    }
+}
+
+/// How fast a train runs, and how fast its decoder would have it run at the same moment (m/s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Pace {
+    pub(crate) speed: f64,
+    pub(crate) set: f64,
+}
+
+impl Pace {
+    /// Of a train that has been running, or standing, for long.
+    pub(crate) const fn steady(speed: f64) -> Self {
+        Self { speed, set: speed }
+    }
+
+    /// Faster by so much, as ln.
+    pub(crate) fn faster(self, by: f64) -> Self {
+        let times = libm::exp(by);
+        Self { speed: times * self.speed, set: times * self.set }
+    }
+}
+
+/// A change of speed that has taken effect, with distance counted from there.
+///
+/// It begins where the last one was interrupted: the set speed goes on from where it was, and the train, which is behind
+/// it by its lag, catches up with it. Letters as in [`RampedLag`]: with `u` the set speed and `v` the speed when the change
+/// took effect, the way is `u τ + (u′ − u) R(τ) + (v − u) θ (1 − e^(−τ/θ))`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Segment {
+    /// When it took effect (s, on the clock of the run).
+    pub(crate) begins: f64,
+    pub(crate) from: Pace,
+    pub(crate) to: f64,
+    shape: RampedLag,
+    /// Way that the law leaves over.
+    residual: f64,
+    braking: Option<Rolling>,
+}
+
+/// The end of a stop: nothing drives any more, friction slows the train, and it comes to rest.
+///
+/// With `A` the speed when the set speed is down, `f` friction and `x` the time since then, `v = A e^(−x/θ) −
+/// f θ (1 − e^(−x/θ))`, which is zero at `x = θ ln(1 + A/(f θ))`, and friction has taken `f θ² ln(1 + A/(f θ))` from the way
+/// but for what the lag had left of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Rolling {
+    friction: f64,
+    /// Since the stop took effect (s), ...
+    begins: f64,
+    /// ... and from then to rest.
+    lasts: f64,
+}
+
+impl Rolling {
+    /// What friction has taken of the speed, and of the way, so long after the stop took effect.
+    fn taken(&self, since: f64, lag: f64) -> (f64, f64) {
+        let time = (since - self.begins).clamp(0.0, self.lasts);
+        let gone = -libm::expm1(-time / lag);
+        (self.friction * lag * gone, self.friction * lag * (time - lag * gone))
+    }
+
+    /// What friction has taken of the whole way, with what the lag alone would still have run.
+    fn loss(&self, lag: f64) -> f64 {
+        self.friction * lag * self.lasts
+    }
+
+    fn ends(&self) -> f64 {
+        self.begins + self.lasts
+    }
+}
+
+/// Share of a change that counts as none: 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
+const SETTLED: f64 = 0.03;
+
+/// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
+/// (3τ² − 2τ³) and an even one are apart by up to 0.096.
+const SHAPE_SPEED_ERROR: f64 = 0.07;
+
+impl Segment {
+    /// A train at rest, or running steadily since ever.
+    pub(crate) const fn steady(begins: f64, speed: f64) -> Self {
+        let from = Pace::steady(speed);
+        Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
+    }
+
+    /// A start or a stop of which its law is known: from one steady speed to another, with friction (m/s²) where it ends
+    /// at rest.
+    pub(crate) fn by_law(begins: f64, speeds: [f64; 2], shape: RampedLag, friction: Option<f64>) -> Self {
+        let [from, to] = speeds;
+        let from = Pace::steady(from);
+        let mut segment = Self { begins, from, to, shape, residual: 0.0, braking: None };
+        segment.braking = friction.map(|friction| segment.rolling(friction));
+        segment
+    }
+
+    /// Whether its speed is and stays the same.
+    pub(crate) fn is_steady(&self) -> bool {
+        self.from == Pace::steady(self.to)
+    }
+
+    /// What a command makes of a train that goes at a pace when it takes effect.
+    pub(crate) fn of(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace) -> Self {
+        Self::toward(commanded, answers, from, answers.speed(usize::from(commanded.to), commanded.above()))
+    }
+
+    /// The same where the steady speed at the step commanded is known to be `to`.
+    pub(crate) fn toward(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace, to: f64) -> Self {
+        let change = to - from.set;
+        // Those steps that the set speed still has to go: a change that is interrupted has not gone all of its own.
+        let steps = f64::from(commanded.to) - answers.step_at(usize::from(commanded.from), from.set);
+        let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
+        let shape = RampedLag::new(ramp, lag);
+        // The shape cannot be less than nothing; the way that follows from the numbers is kept linear in them.
+        let cut = -change * (lag + 0.5 * ramp - shape.delay());
+        let residual = if commanded.to == 0 {
+            answers.stop_residual(from.set)
+        } else if commanded.at_rest {
+            answers.start_residual(to)
+        } else {
+            0.0
+        };
+        let begins = commanded.effect(answers);
+        let mut segment = Self { begins, from, to, shape, residual: residual + cut, braking: None };
+        if commanded.to == 0 {
+            segment.braking = Some(segment.rolling(answers.friction()));
+        }
+        segment
+    }
+
+    /// The end of a stop.
+    fn rolling(&self, friction: f64) -> Rolling {
+        let (ramp, lag) = (self.shape.ramp(), self.shape.lag());
+        let left = self.speed(self.begins + ramp).max(0.0);
+        let lasts = lag * libm::log1p(left / (friction * lag));
+        Rolling { friction, begins: ramp, lasts }
+    }
+
+    /// The part of being behind the set speed at the beginning that is left.
+    fn behind(&self, since: f64) -> f64 {
+        libm::exp(-since / self.shape.lag())
+    }
+
+    /// Way (m) run since it took effect; before that, at the speed before.
+    pub(crate) fn way(&self, time: f64) -> f64 {
+        let since = time - self.begins;
+        let Pace { speed, set } = self.from;
+        if since <= 0.0 {
+            return speed * since;
+        }
+        if let Some(rolling) = self.braking.filter(|rolling| since >= rolling.ends()) {
+            return self.way_of_stop(rolling);
+        }
+        let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
+        let taken = self.braking.map_or(0.0, |rolling| rolling.taken(since, self.shape.lag()).1);
+        set * since + (self.to - set) * self.shape.area(since) + caught_up + self.residual * self.done(since)
+            - taken
+    }
+
+    /// Speed (m/s).
+    pub(crate) fn speed(&self, time: f64) -> f64 {
+        let since = time - self.begins;
+        let Pace { speed, set } = self.from;
+        if since <= 0.0 {
+            return speed;
+        }
+        let taken = match self.braking {
+            Some(rolling) if since >= rolling.ends() => return 0.0,
+            Some(rolling) => rolling.taken(since, self.shape.lag()).0,
+            None => 0.0,
+        };
+        (set + (self.to - set) * self.shape.share(since) + (speed - set) * self.behind(since) - taken)
+            .max(0.0)
+    }
+
+    /// Speed and set speed.
+    pub(crate) fn pace(&self, time: f64) -> Pace {
+        let set = self.from.set + (self.to - self.from.set) * self.shape.set_share(time - self.begins);
+        Pace { speed: self.speed(time), set }
+    }
+
+    /// Whether it ends at rest.
+    pub(crate) const fn is_stop(&self) -> bool {
+        self.braking.is_some()
+    }
+
+    /// The share of the change that is done.
+    pub(crate) fn share(&self, time: f64) -> f64 {
+        self.done(time - self.begins)
+    }
+
+    /// A stop is done at rest, which friction brings before the lag alone would.
+    fn done(&self, since: f64) -> f64 {
+        match self.braking {
+            Some(rolling) if since >= rolling.ends() => 1.0,
+            Some(rolling) => (self.shape.share(since) / self.shape.share(rolling.ends())).min(1.0),
+            None => self.shape.share(since),
+        }
+    }
+
+    /// When the change is done but for a last bit (s, on the clock of the run).
+    pub(crate) fn settled(&self) -> f64 {
+        self.begins + self.braking.map_or_else(|| self.shape.settled(SETTLED), |rolling| rolling.ends())
+    }
+
+    /// The whole way of a stop (m).
+    pub(crate) fn way_to_rest(&self) -> f64 {
+        self.braking.map_or_else(|| self.displacement(), |rolling| self.way_of_stop(rolling))
+    }
+
+    fn way_of_stop(&self, rolling: Rolling) -> f64 {
+        self.displacement() - rolling.loss(self.shape.lag())
+    }
+
+    /// Mean time (s) by which the change is late against one at once.
+    pub(crate) const fn delay(&self) -> f64 {
+        self.shape.delay()
+    }
+
+    /// By how much the way once it is settled differs from that of a change at once (m).
+    pub(crate) fn displacement(&self) -> f64 {
+        let Pace { speed, set } = self.from;
+        (set - self.to) * self.shape.delay() + (speed - set) * self.shape.lag() + self.residual
+    }
+
+    /// One standard deviation of where the train is within a change, as no shape is true of all decoders (m).
+    pub(crate) fn shape_error(&self, time: f64) -> f64 {
+        let share = self.share(time);
+        SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.displacement().abs()
+    }
+
+    /// The same of the speed (m/s).
+    pub(crate) fn shape_speed_error(&self, time: f64) -> f64 {
+        let share = self.share(time);
+        SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.to - self.from.speed).abs()
+    }
+}

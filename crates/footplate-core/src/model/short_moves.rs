@@ -1,0 +1,84 @@
+//! Short moves by the motion model: "go, wait, stop", with the stop commanded before the speed is reached.
+
+use super::doubts::END_OF_STOP;
+use super::doubts::OTHER_SHAPES;
+use super::expected_information::{start_to, time_of};
+use super::motion_model::MotionModel;
+use super::parameters::Answers;
+use super::segment::{Segment, SpeedCommand};
+use crate::ids::SpeedStep;
+use crate::time::TimeSpan;
+use crate::units::Length;
+
+/// Longest time between the two commands: a train that takes longer runs steadily, and a stop is planned for it.
+const LONGEST_S: f64 = 60.0;
+
+/// Keeps the time that a stop takes from standstill finite (m/s).
+const LEAST_SPEED: f64 = 1e-3;
+
+/// How far a train gets on a short move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShortMoveForecast {
+    /// From rest to rest.
+    pub distance: Length,
+    /// One standard deviation of what is not known of it.
+    pub uncertainty: Length,
+    /// One standard deviation of single moves about it.
+    pub scatter: Length,
+}
+
+impl ShortMoveForecast {
+    /// One standard deviation of where a single move ends.
+    #[must_use]
+    pub fn deviation(&self) -> Length {
+        Length::from_m(libm::hypot(self.uncertainty.as_m(), self.scatter.as_m()))
+    }
+}
+
+/// The distance of a short move (m): a start, and a stop commanded some seconds later.
+pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
+    let start = start_to(answers, step);
+    let mut commanded = SpeedCommand { sent: run, from: step, to: 0, at_rest: false };
+    let effect = commanded.effect(answers);
+    if effect <= start.begins {
+        return 0.0;
+    }
+    commanded.sent = 0.0;
+    start.way(effect) + Segment::of(&commanded, answers, start.pace(effect)).way_to_rest()
+}
+
+impl MotionModel {
+    /// How far the train gets if it is commanded to a step and, after `run`, to stop.
+    #[must_use]
+    pub fn short_move(&self, step: SpeedStep, run: TimeSpan) -> ShortMoveForecast {
+        let run = run.as_s().clamp(0.0, LONGEST_S);
+        let answers = self.answers();
+        let start = start_to(&answers, step.get());
+        let reached = start.speed(run);
+        let unknown = self.deviation_with_scale(|answers| move_way(answers, step.get(), run));
+        let distance = move_way(&answers, step.get(), run).max(0.0);
+        let commanded = SpeedCommand { sent: run, from: step.get(), to: 0, at_rest: false };
+        let effect = commanded.effect(&answers);
+        // The stop begins in the middle of the start, where its law is least known; it goes on for as long as the speed there
+        // says, so that both errors go the same way.
+        let stop = Segment::of(&commanded, &answers, start.pace(effect));
+        let stop_lasts = stop.way_to_rest() / start.speed(effect).max(LEAST_SPEED);
+        let shape = OTHER_SHAPES * (start.shape_error(effect) + stop_lasts * start.shape_speed_error(effect));
+        ShortMoveForecast {
+            distance: Length::from_m(distance),
+            uncertainty: Length::from_m(libm::hypot(libm::hypot(unknown, shape), END_OF_STOP)),
+            scatter: Length::from_m(libm::hypot(self.scatter(reached), reached * self.start_scatter())),
+        }
+    }
+
+    /// The time between the commands of a short move of this distance; `None` if it takes longer than a minute or is not
+    /// ahead.
+    #[must_use]
+    pub fn short_move_time(&self, step: SpeedStep, distance: Length) -> Option<TimeSpan> {
+        let answers = self.answers();
+        let wanted = distance.as_m();
+        let way = |run| move_way(&answers, step.get(), run);
+        let is_reached = wanted > 0.0 && wanted <= way(LONGEST_S);
+        is_reached.then(|| TimeSpan::from_s(time_of(wanted, way)))
+    }
+}

@@ -1,0 +1,129 @@
+//! Whether the lengths of a layout are those that a train ran over.
+//!
+//! A train feels all lengths longer or shorter by one factor that no timing tells, so lengths are compared with each other:
+//! with `m` a surveyed length, `l` what the train makes of it and `k` the median of all `l/m`, a section is off by
+//! `l − k m`, and that over its standard deviation (survey, what trains feel of curves, the train's own) is its `z`. Where
+//! many are off by more than the survey says of itself, the survey is worse than it says; where single ones are, they are
+//! wrong. Medians see either as long as the other half is right.
+
+use alloc::vec::Vec;
+
+use super::section_index::SectionIndex;
+use crate::model::FELT;
+
+/// Fewer sections cannot tell which of them is wrong.
+const FEWEST: usize = 4;
+
+/// Beyond this many standard deviations a length is not that of the layout: chance alone does it once in 15 000 sections.
+const ODD: f64 = 4.0;
+
+/// A survey is doubted as a whole if it is off by this many times what it says of itself: with ten sections chance alone does
+/// it once in a hundred layouts.
+const DOUBTED: f64 = 1.8;
+
+/// Of a normal distribution, one standard deviation over the median of the sizes.
+const PER_MEDIAN: f64 = 1.4826;
+
+/// A section whose surveyed length contradicts what a train made of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OddSection {
+    /// By its number in the [`SectionIndex`].
+    pub section: usize,
+    /// Its length by the survey (m).
+    pub surveyed: f64,
+    /// Its length by the train, as a tape would have it if the survey is right about half of the sections (m).
+    pub felt: f64,
+}
+
+/// How a survey compares with what a train ran over.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SurveyTest {
+    /// Sections whose lengths contradict, the farthest off first.
+    pub odd: Vec<OddSection>,
+    /// How many times farther than it says of itself the survey is off; 1 if it is not.
+    pub factor: f64,
+    /// One standard deviation of the factor that all lengths may have in common, as a part, if the survey is worse than it
+    /// says: it may be off in common by as much as its lengths are off each by itself. Else zero.
+    pub scale: f64,
+}
+
+impl SurveyTest {
+    /// Compares the lengths of a survey with a train's: by section, by how much it feels it longer (m), with the variance.
+    #[must_use]
+    pub fn of(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64)>) -> Self {
+        let fits = Self { odd: Vec::new(), factor: 1.0, scale: 0.0 };
+        let known: Vec<Compared> = compared(sections, felt);
+        let Some(ratio) = median(known.iter().map(|one| one.felt / one.surveyed)) else { return fits };
+        if known.len() < FEWEST || ratio <= 0.0 {
+            return fits;
+        }
+        let off = |one: &Compared| one.felt / ratio - one.surveyed;
+        let z = |one: &Compared| off(one).abs() / libm::sqrt(one.variance);
+        let factor = PER_MEDIAN * median(known.iter().map(z)).unwrap_or(0.0);
+        let factor = if factor > DOUBTED { factor } else { 1.0 };
+        let part = PER_MEDIAN * median(known.iter().map(|one| off(one).abs() / one.surveyed)).unwrap_or(0.0);
+        let mut odd: Vec<&Compared> = known.iter().filter(|one| z(one) > ODD * factor).collect();
+        odd.sort_by(|one, other| z(other).total_cmp(&z(one)));
+        let odd = odd.into_iter().map(|one| OddSection {
+            section: one.section,
+            surveyed: one.surveyed,
+            felt: one.felt / ratio,
+        });
+        Self { odd: odd.collect(), factor, scale: if factor > 1.0 { part } else { 0.0 } }
+    }
+
+    /// Whether nothing speaks against the survey.
+    #[must_use]
+    pub fn is_passed(&self) -> bool {
+        self.odd.is_empty() && self.factor <= 1.0
+    }
+
+    /// The sections with what the survey is worth after this: what is off counts for no more than that.
+    #[must_use]
+    pub fn applied_to(&self, sections: &SectionIndex) -> SectionIndex {
+        sections.doubted(self.factor * self.factor, self.scale, |section| {
+            let odd = self.odd.iter().find(|odd| odd.section == section);
+            odd.map_or(0.0, |odd| (odd.felt - odd.surveyed) * (odd.felt - odd.surveyed))
+        })
+    }
+}
+
+/// A section that a train ran over (m, m²).
+struct Compared {
+    section: usize,
+    surveyed: f64,
+    felt: f64,
+    variance: f64,
+}
+
+fn compared(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Compared> {
+    let run_over: Vec<(usize, f64, f64)> =
+        felt.filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();
+    // What a train does not know of the scale all its lengths share: it is no part of how they differ.
+    let part = |section: usize, variance: f64| {
+        let length = sections.surveyed_length(section);
+        variance / (length * length)
+    };
+    let shared =
+        run_over.iter().map(|(section, _, variance)| part(*section, *variance)).fold(f64::INFINITY, f64::min);
+    run_over
+        .into_iter()
+        .map(|(section, longer, variance)| {
+            let surveyed = sections.surveyed_length(section);
+            let feels = FELT * surveyed;
+            let own = (part(section, variance) - shared) * surveyed * surveyed;
+            Compared {
+                section,
+                surveyed,
+                felt: surveyed + longer,
+                variance: sections.survey_variance(section) + feels * feels + own,
+            }
+        })
+        .collect()
+}
+
+pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}

@@ -1,0 +1,261 @@
+//! What a balise says of the distance, whether it can be true, and what is known of the distance after it.
+//!
+//! A balise lies at a known place, give or take a bound. The train is between its own bounds. Where the two overlap the
+//! train is for certain; without an overlap the balise is unexpected and changes nothing. Two unexpected balises in a row
+//! that agree with each other say that it was the odometer that was wrong, and are believed.
+//!
+//! Linking (SUBSET-026-3, 3.4.4) says where the next balise lies, so that one that is not there is noticed too: it is due
+//! within a window, and missed when the train is past it for certain.
+
+use super::diameter::BaliseAccuracy;
+use crate::units::Length;
+
+/// The square of a width over the variance of what is even over it.
+const EVEN: f64 = 12.0;
+
+/// A distance and between which bounds it lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DistanceInterval {
+    /// The best estimate.
+    pub estimate: Length,
+    /// The distance is at least this ...
+    pub low: Length,
+    /// ... and at most this.
+    pub high: Length,
+}
+
+/// What came of a balise that was passed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BaliseVerdict {
+    /// It can lie where it says; this is the distance now.
+    Accepted(DistanceInterval),
+    /// It cannot lie where it says. The distance stays as it was.
+    Unexpected {
+        /// Where it says it lies.
+        place: Length,
+        /// By the odometer it lies at least here ...
+        low: Length,
+        /// ... and at most here.
+        high: Length,
+    },
+    /// It cannot lie where it says, but it agrees with the unexpected balise before it: the bounds were wrong. This is the
+    /// distance now.
+    Contradicts(DistanceInterval),
+}
+
+/// A linked balise that the train passed without hearing it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MissedBalise {
+    /// Where it should be.
+    pub place: Length,
+    /// The train is at least here.
+    pub low: Length,
+}
+
+/// Pairs what balises say with what the odometer knows. Places count from where the distance is 0.
+#[derive(Debug, Clone)]
+pub struct BaliseLink {
+    accuracy: BaliseAccuracy,
+    linked: Option<Length>,
+    /// The latest unexpected balise since one that was accepted, and the bounds when it was passed.
+    unexpected: Option<(Length, DistanceInterval)>,
+}
+
+impl BaliseLink {
+    /// Nothing is linked yet.
+    #[must_use]
+    pub fn new(accuracy: BaliseAccuracy) -> Self {
+        Self { accuracy, linked: None, unexpected: None }
+    }
+
+    /// The next balise lies here, ahead of the train.
+    pub fn link(&mut self, place: Length) {
+        self.linked = Some(place);
+    }
+
+    /// How far the train runs from now until it hears the linked balise: at least and at most.
+    #[must_use]
+    pub fn due(&self, now: &DistanceInterval) -> Option<[Length; 2]> {
+        let place = self.linked?;
+        Some([place - self.accuracy.bound - now.high, place + self.accuracy.bound - now.low])
+    }
+
+    /// Whether the train is past the linked balise for certain. To be asked in every period; says so once.
+    pub fn missed(&mut self, now: &DistanceInterval) -> Option<MissedBalise> {
+        let place = self.linked.filter(|place| now.low > *place + self.accuracy.bound)?;
+        self.linked = None;
+        Some(MissedBalise { place, low: now.low })
+    }
+
+    /// Judges a balise that was passed within the period that has just ended, in which the train ran at most so far, and says
+    /// what is known of the distance at its end.
+    pub fn pass(&mut self, place: Length, ran: Length, now: &DistanceInterval) -> BaliseVerdict {
+        let bound = self.accuracy.bound;
+        // Forward or backward, it lies somewhere on the way of the period.
+        let [least, most] = [place - bound + ran.min(Length::ZERO), place + bound + ran.max(Length::ZERO)];
+        let (low, high) = (now.low.max(least), now.high.min(most));
+        if place.is_finite() && ran.is_finite() && low <= high {
+            self.heard(place);
+            let middle = place + ran * 0.5;
+            return BaliseVerdict::Accepted(self.between(middle, ran, now, [low, high]));
+        }
+        match self.unexpected {
+            Some((before, then)) if agree(place - before, bound + ran.abs(), &then, now) => {
+                self.heard(place);
+                BaliseVerdict::Contradicts(DistanceInterval {
+                    estimate: place + ran * 0.5,
+                    low: least,
+                    high: most,
+                })
+            }
+            _ => {
+                self.unexpected = Some((place, *now));
+                let (low, high) = (now.low - (most - place), now.high + (place - least));
+                BaliseVerdict::Unexpected { place, low, high }
+            }
+        }
+    }
+
+    fn heard(&mut self, place: Length) {
+        self.unexpected = None;
+        self.linked = self.linked.filter(|linked| (place - *linked).abs() > 2.0 * self.accuracy.bound);
+    }
+
+    /// Weighs the place against the estimate. Of that no more is known here than its bounds, between which every distance
+    /// is as likely.
+    fn between(
+        &self,
+        place: Length,
+        ran: Length,
+        now: &DistanceInterval,
+        [low, high]: [Length; 2],
+    ) -> DistanceInterval {
+        let square = |length: Length| length.as_m() * length.as_m();
+        let odometer = square(now.high - now.low) / EVEN;
+        let balise = square(self.accuracy.deviation) + square(ran) / EVEN;
+        let both = odometer + balise;
+        let gain = if both > 0.0 { odometer / both } else { 0.0 };
+        let estimate = (now.estimate + (place - now.estimate) * gain).max(low).min(high);
+        DistanceInterval { estimate, low, high }
+    }
+}
+
+/// Whether a way between two balises is one that the train can have run between two moments.
+fn agree(way: Length, bound: Length, then: &DistanceInterval, now: &DistanceInterval) -> bool {
+    let [least, most] = [now.low - then.low, now.high - then.high];
+    way >= least - 2.0 * bound && way <= most + 2.0 * bound
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn interval(estimate: f64, low: f64, high: f64) -> DistanceInterval {
+        let [estimate, low, high] = [estimate, low, high].map(Length::from_m);
+        DistanceInterval { estimate, low, high }
+    }
+
+    fn link() -> BaliseLink {
+        BaliseLink::new(BaliseAccuracy { deviation: Length::from_m(0.5), bound: Length::from_m(2.0) })
+    }
+
+    #[test]
+    fn a_balise_narrows_the_bounds_to_what_both_allow() {
+        let verdict = link().pass(Length::from_m(1512.0), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
+        let BaliseVerdict::Accepted(now) = verdict else { panic!("{verdict:?}") };
+        assert_eq!((now.low.as_m(), now.high.as_m()), (1510.0, 1513.0));
+        // Even over 28 m is a deviation of 8.1 m, 16 times that of the balise: 12 m shrink to 5 cm.
+        assert!((now.estimate.as_m() - 1511.95).abs() < 0.01, "{now:?}");
+    }
+
+    #[test]
+    fn an_odometer_that_knows_better_keeps_its_estimate() {
+        let verdict = link().pass(Length::from_m(100.4), Length::ZERO, &interval(100.0, 99.9, 100.1));
+        assert!(
+            matches!(verdict, BaliseVerdict::Accepted(now) if now.estimate.as_m() < 100.01),
+            "{verdict:?}"
+        );
+    }
+
+    #[test]
+    fn an_impossible_balise_is_refused_with_its_numbers() {
+        for place in [700.0, 1483.0 - 0.1, 1515.0 + 0.1] {
+            let verdict = link().pass(Length::from_m(place), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
+            let [place, low, high] = [place, 1483.0, 1515.0].map(Length::from_m);
+            assert_eq!(verdict, BaliseVerdict::Unexpected { place, low, high });
+        }
+        let nothing = link().pass(Length::from_m(f64::NAN), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
+        assert!(matches!(nothing, BaliseVerdict::Unexpected { .. }));
+    }
+
+    #[test]
+    fn two_impossible_balises_that_agree_are_believed() {
+        let mut link = link();
+        let then = interval(1500.0, 1485.0, 1515.0);
+        let now = interval(2500.0, 2475.0, 2525.0);
+        link.pass(Length::from_m(1800.0), Length::ZERO, &then);
+        let verdict = link.pass(Length::from_m(2803.0), Length::ZERO, &now);
+        assert_eq!(verdict, BaliseVerdict::Contradicts(interval(2803.0, 2801.0, 2805.0)));
+
+        link.pass(Length::from_m(1800.0), Length::ZERO, &then);
+        let apart = link.pass(Length::from_m(9000.0), Length::ZERO, &now);
+        assert!(matches!(apart, BaliseVerdict::Unexpected { .. }), "they are too far apart");
+    }
+
+    #[test]
+    fn a_linked_balise_is_due_in_a_window_and_missed_after_it() {
+        let mut link = link();
+        link.link(Length::from_m(2000.0));
+        let due = link.due(&interval(1500.0, 1490.0, 1510.0)).unwrap();
+        assert_eq!(due.map(Length::as_m), [488.0, 512.0]);
+        assert_eq!(link.missed(&interval(2010.0, 2002.0, 2018.0)), None);
+        let low = Length::from_m(2002.5);
+        let missed = link.missed(&interval(2010.0, 2002.5, 2018.0));
+        assert_eq!(missed, Some(MissedBalise { place: Length::from_m(2000.0), low }));
+        assert_eq!(link.missed(&interval(2010.0, 2002.5, 2018.0)), None, "said once");
+    }
+
+    #[test]
+    fn a_linked_balise_that_was_heard_is_not_missed() {
+        let mut link = link();
+        link.link(Length::from_m(2000.0));
+        // Another one before it is not the one that is due.
+        link.pass(Length::from_m(1990.0), Length::ZERO, &interval(1992.0, 1980.0, 2005.0));
+        assert!(link.due(&interval(1990.0, 1988.0, 1992.0)).is_some());
+        link.pass(Length::from_m(2001.0), Length::ZERO, &interval(2000.0, 1990.0, 2010.0));
+        assert_eq!(link.missed(&interval(3000.0, 2990.0, 3010.0)), None);
+    }
+
+    proptest! {
+        /// Bounds that held the truth hold it after every balise within its bound, wherever in its period it was passed, and are
+        /// no wider.
+        #[test]
+        fn bounds_go_on_holding_the_truth(
+            passages in prop::collection::vec(
+                (0.0..2000.0_f64, 0.0..0.05_f64, 0.0..0.05_f64, 0.0..=1.0_f64, -2.0..2.0_f64, -4.0..4.0_f64, 0.0..=1.0_f64),
+                1..30,
+            ),
+        ) {
+            let mut link = link();
+            let mut now = interval(0.0, 0.0, 0.0);
+            let mut truth = 0.0;
+            for (way, below, above, place, error, ran, part) in passages {
+                now.low += Length::from_m(way * (1.0 - below));
+                now.high += Length::from_m(way * (1.0 + above));
+                now.estimate += Length::from_m(way);
+                truth += way * (1.0 - below + (below + above) * place);
+                let said = Length::from_m(truth - ran * part + error);
+                let verdict = link.pass(said, Length::from_m(ran), &now);
+                let BaliseVerdict::Accepted(after) = verdict else {
+                    return Err(TestCaseError::fail(std::format!("{verdict:?}")));
+                };
+                prop_assert!(after.low.as_m() <= truth + 1e-9 && truth <= after.high.as_m() + 1e-9);
+                prop_assert!(after.low >= now.low && after.high <= now.high);
+                prop_assert!(after.low <= after.estimate && after.estimate <= after.high);
+                now = after;
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What the command allows the train and its wheels to do right now.
+//!
+//! A brake takes time to build up and to release, and a wheel that was held back takes time to turn with the train
+//! again. What may still act is assumed to act; what may not act yet is not.
+
+use super::sound::sound;
+use super::wheels::{Range, Vehicle, larger, smaller};
+
+/// Efforts nearer to zero are coasting: what analogue controllers show at rest.
+const COASTING: f64 = 0.02;
+/// How long full traction or full brake takes to fade (s): by 0.5 m/s³, the comfort limit of passenger trains.
+const FADE_S: f64 = 2.5;
+/// How long an acceleration is remembered because a window of counts may reach back over it (s).
+const REMEMBERED_S: f64 = 0.9;
+
+/// Follows the command.
+#[derive(Debug, Clone)]
+pub(super) struct CommandWatch {
+    since_brake: f64,
+    since_traction: f64,
+    /// Effort to which the brake has built up at least, and from which it has faded at most.
+    built_up: f64,
+    brake: f64,
+    /// Effort from which traction has faded at most.
+    traction: f64,
+    widest: Range,
+    narrower_for: f64,
+}
+
+/// What the command allows in one period, in the direction of travel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Allowed {
+    /// A braked wheel may turn slower than the train moves.
+    pub(super) slide: bool,
+    /// A powered wheel may turn faster than the train moves.
+    pub(super) slip: bool,
+    /// Acceleration of the train (m/s²) within the last windows of counts, whatever the rail carries.
+    pub(super) acceleration: Range,
+    /// The same for a train whose wheels roll: brakes and motors do what is claimed of them.
+    pub(super) rolling: Range,
+    /// What the command makes the train do where the rail carries it (m/s²); nothing if it is not recorded.
+    pub(super) commanded: Option<f64>,
+    /// How much of full traction and of the full brake may act, 0 to 1.
+    pub(super) traction: f64,
+    pub(super) brake: f64,
+}
+
+impl CommandWatch {
+    pub(super) const fn new() -> Self {
+        Self {
+            since_brake: f64::INFINITY,
+            since_traction: f64::INFINITY,
+            built_up: 0.0,
+            brake: 0.0,
+            traction: 0.0,
+            widest: Range { low: 0.0, high: 0.0 },
+            narrower_for: 0.0,
+        }
+    }
+
+    /// The command of the next `t` seconds.
+    pub(super) fn next(&mut self, effort: Option<f64>, t: f64, vehicle: &Vehicle) -> Allowed {
+        let max_traction = vehicle.max_traction.as_m_per_s2();
+        let max_brake = vehicle.max_brake.as_m_per_s2();
+        let Some(effort) = effort else {
+            let any = Range { low: -max_brake, high: max_traction };
+            *self = Self {
+                since_brake: 0.0,
+                since_traction: 0.0,
+                built_up: 0.0,
+                brake: 1.0,
+                traction: 1.0,
+                ..self.clone()
+            };
+            let acceleration = self.lately(any, t);
+            return Allowed {
+                slide: true,
+                slip: true,
+                acceleration,
+                rolling: acceleration,
+                commanded: None,
+                traction: 1.0,
+                brake: 1.0,
+            };
+        };
+        let command = &vehicle.brake_command;
+        let release = command.release.as_s();
+        self.since_brake = if effort < -COASTING { 0.0 } else { self.since_brake + t };
+        self.since_traction = if effort > COASTING { 0.0 } else { self.since_traction + t };
+        let slide = self.since_brake < release;
+        let slip = self.since_traction < release;
+        let full = command.full.as_m_per_s2();
+        let wanted = sound(-effort, 0.0, 1.0);
+        let driven = sound(effort, 0.0, 1.0);
+        self.built_up = smaller(wanted, self.built_up + t / larger(command.build_up.as_s(), t));
+        // Until the brake must have released, all of it may still act.
+        self.brake = larger(wanted, if slide { self.brake } else { self.brake - t / FADE_S });
+        self.traction = larger(driven, if slip { self.traction } else { self.traction - t / FADE_S });
+
+        let gradient = command.gradient.as_m_per_s2();
+        let strongest =
+            self.brake * full * (1.0 + command.tolerance) + gradient + command.resistance.as_m_per_s2();
+        let low = -smaller(strongest, max_brake);
+        let high = smaller(self.traction * max_traction + gradient, max_traction);
+        let least = vehicle.thresholds.least_sliding_deceleration.as_m_per_s2();
+        let by_brake = gradient - self.built_up * full * (1.0 - command.tolerance);
+        let held = effort < -COASTING && self.traction <= 0.0;
+        let now = Range { low, high: if held && least > 0.0 { larger(by_brake, -least) } else { high } };
+        let acceleration = self.lately(now, t);
+        let rolling = Range {
+            low: acceleration.low,
+            high: if held { larger(by_brake, low) } else { acceleration.high },
+        };
+        let commanded = if effort < 0.0 { -wanted * full } else { driven * max_traction };
+        Allowed {
+            slide,
+            slip,
+            acceleration,
+            rolling,
+            commanded: Some(commanded),
+            traction: self.traction,
+            brake: self.brake,
+        }
+    }
+
+    /// The widest range of the last windows.
+    fn lately(&mut self, now: Range, t: f64) -> Range {
+        let as_wide = now.low <= self.widest.low || now.high >= self.widest.high;
+        self.narrower_for = if as_wide { 0.0 } else { self.narrower_for + t };
+        self.widest = if self.narrower_for > REMEMBERED_S { now } else { self.widest.or(now) };
+        self.widest
+    }
+}

@@ -1,0 +1,394 @@
+//! The true diameters of two measured wheelsets, from balises that lie a known way apart and from each other.
+//!
+//! Two answers side by side. The *estimate* is the most likely scale with its standard deviation ([`ScaleFilter`]); the
+//! *interval* is what remains possible if the diameter was within its tolerance, no balise is further off than its bound
+//! and no rolling wheel creeps more than its allowance ([`ScaleInterval`]). A balise that the interval excludes is refused
+//! with its numbers and moves neither.
+
+use core::fmt;
+
+use libm::{log, sqrt};
+
+use super::balise_accuracy::BaliseAccuracy;
+use super::balise_passage::{PairedWay, Passage, ways};
+use super::scale_filter::ScaleFilter;
+use super::scale_interval::ScaleInterval;
+use crate::estimate::Estimate;
+use crate::odometry::wheels::Wheelset;
+use crate::time::Timestamp;
+use crate::units::Length;
+
+/// Balises nearer than this tell nothing about a diameter (m): half a metre in it is half a per cent.
+const NEAREST_PAIR_M: f64 = 100.0;
+/// So far both wheelsets have to roll in one go to be compared (m): a pulse is then 0.02 %.
+const COMPARED_WAY_M: f64 = 200.0;
+/// Two wheelsets that roll with little effort differ by so much in creepage and cone (one standard deviation). Chosen: a
+/// third of what a curve does to one of them (0.1 %).
+const COMPARED_DEVIATION: f64 = 3e-4;
+/// Mean creepage of a rolling wheel over a pair of balises (one standard deviation). Chosen: the lower end of what normal
+/// traction and braking make (0.1 to 1 %), because most of a way is neither.
+const CREEPAGE_DEVIATION: f64 = 3e-4;
+/// The scale changes by no more than this part in a kilometre: thirty times the fastest wear (0.3 mm in 10 000 km).
+const CHANGES_PER_KM: f64 = 1e-6;
+/// From one step to the next in which a way makes the scales less certain (m). Chosen: so rare that it costs nothing.
+const GROWS_EVERY_M: f64 = 100.0;
+/// The variance of what is left of a pulse at one end of a way, in squared pulses: even over one pulse.
+const PULSE_VARIANCE: f64 = 1.0 / 12.0;
+
+/// What is known of one wheelset, to be kept from run to run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WheelScale {
+    /// True diameter over believed diameter.
+    pub estimate: Estimate,
+    /// Between which bounds it lies as long as the assumptions hold.
+    pub interval: ScaleInterval,
+}
+
+/// What came of a balise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PairVerdict {
+    /// There is none before it to pair it with.
+    First,
+    /// It is so near to the one before that it tells nothing.
+    TooNear,
+    /// Both wheelsets slipped, slid or were not counted since the one before.
+    Disturbed,
+    /// The scales have learnt from it.
+    Accepted,
+    /// It cannot lie where it says, so far from the one before.
+    Refused {
+        /// The way between the two balises as they say, negative if the wheels turned the other way.
+        said: Length,
+        /// By the wheels it is at least this ...
+        low: Length,
+        /// ... and at most this, the bounds of both balises included.
+        high: Length,
+    },
+}
+
+/// Learns the scales of two wheelsets. Fixed memory.
+#[derive(Debug, Clone)]
+pub struct WheelDiameters {
+    wheelsets: [Wheelset; 2],
+    balise: BaliseAccuracy,
+    filter: ScaleFilter,
+    intervals: [ScaleInterval; 2],
+    counts: [u32; 2],
+    dates: [Timestamp; 2],
+    /// The latest balise that agreed with the one before it.
+    trusted: Option<Passage>,
+    /// A later one that did not. It is the right one if the next agrees with it.
+    doubted: Option<Passage>,
+    /// For each wheelset the first balise of those that agreed since which it has rolled.
+    origins: [Option<Passage>; 2],
+    /// Where both began to roll with little effort.
+    comparing_from: Option<[Length; 2]>,
+    /// Whether the axles were compared since the latest pair; the pair then says nothing new about their ratio.
+    compared: bool,
+    counted: [Length; 2],
+    counted_before: [Length; 2],
+    grown_at: [Length; 2],
+}
+
+impl WheelDiameters {
+    /// Knows the diameters and their tolerances, and nothing else.
+    #[must_use]
+    pub fn new(wheelsets: [Wheelset; 2], balise: BaliseAccuracy) -> Self {
+        // All scales within the tolerance are alike: the standard deviation of an even distribution.
+        let deviations = wheelsets.map(|wheelset| wheelset.diameter_tolerance / sqrt(3.0));
+        Self {
+            wheelsets,
+            balise,
+            filter: ScaleFilter::new([1.0; 2], deviations),
+            intervals: wheelsets.map(|wheelset| ScaleInterval::of_tolerance(wheelset.diameter_tolerance)),
+            counts: [0; 2],
+            dates: [Timestamp::ZERO; 2],
+            trusted: None,
+            doubted: None,
+            origins: [None; 2],
+            comparing_from: None,
+            compared: false,
+            counted: [Length::ZERO; 2],
+            counted_before: [Length::ZERO; 2],
+            grown_at: [Length::ZERO; 2],
+        }
+    }
+
+    /// Goes on from what an earlier run has learnt of the same wheelsets.
+    ///
+    /// # Errors
+    /// The first scale that these wheelsets cannot have.
+    pub fn resume(
+        wheelsets: [Wheelset; 2],
+        balise: BaliseAccuracy,
+        known: [WheelScale; 2],
+    ) -> Result<Self, ForeignScale> {
+        let mut resumed = Self::new(wheelsets, balise);
+        for ((wheel, known), interval) in known.iter().enumerate().zip(&mut resumed.intervals) {
+            let Estimate { value, uncertainty, .. } = known.estimate;
+            let both = interval.meet(known.interval);
+            *interval = match both {
+                Some(both) if both.holds(value) && uncertainty > 0.0 && uncertainty.is_finite() => both,
+                _ => return Err(ForeignScale { wheelset: wheel + 1, known: *known, possible: *interval }),
+            };
+        }
+        resumed.filter = ScaleFilter::new(
+            known.map(|known| known.estimate.value),
+            known.map(|known| known.estimate.uncertainty / known.estimate.value),
+        );
+        resumed.counts = known.map(|known| known.estimate.count);
+        resumed.dates = known.map(|known| known.estimate.date);
+        Ok(resumed)
+    }
+
+    /// Takes in what was counted by the end of a period.
+    ///
+    /// `counted` are the ways since the start by pulses and believed diameters, negative backwards; `rolling` whether each
+    /// wheelset was counted and neither slipped nor slid in this period; `little_effort` whether the train coasted or
+    /// nearly so.
+    pub fn roll(&mut self, time: Timestamp, counted: [Length; 2], rolling: [bool; 2], little_effort: bool) {
+        self.grow(counted);
+        if rolling != [true; 2] {
+            let Self { trusted, doubted, origins: [first, second], .. } = self;
+            for passage in [trusted, doubted, first, second].into_iter().flatten() {
+                for (rolled, rolling) in passage.rolled.iter_mut().zip(rolling) {
+                    *rolled &= rolling;
+                }
+            }
+        }
+        if rolling != [true; 2] || !little_effort {
+            self.comparing_from = None;
+            return;
+        }
+        let Some(from) = self.comparing_from else {
+            self.comparing_from = Some(counted);
+            return;
+        };
+        let [first, second] = ways(from, counted);
+        if first.min(second).as_m() >= COMPARED_WAY_M {
+            self.comparing_from = Some(counted);
+            self.compare(time, [first, second]);
+        }
+    }
+
+    /// Takes in a balise that was passed in the period that [`roll`](Self::roll) has just taken in, and the place it says.
+    pub fn pass(&mut self, time: Timestamp, place: Length) -> PairVerdict {
+        if !place.is_finite() {
+            return PairVerdict::Refused { said: place, low: Length::ZERO, high: Length::ZERO };
+        }
+        let [first, second] = ways(self.counted_before, self.counted).map(|way| way * 0.5);
+        let [first_before, second_before] = self.counted_before;
+        let [first_now, second_now] = self.counted;
+        let here = Passage {
+            place,
+            counted: [(first_before + first_now) * 0.5, (second_before + second_now) * 0.5],
+            within: [first, second],
+            rolled: [true; 2],
+        };
+        let mut refusal = None;
+        for before in [self.trusted, self.doubted].into_iter().flatten() {
+            match self.pair(time, &before, &here) {
+                verdict @ PairVerdict::Refused { .. } => refusal = refusal.or(Some(verdict)),
+                PairVerdict::Accepted => return self.trust(here, PairVerdict::Accepted),
+                PairVerdict::Disturbed => return self.trust(here, PairVerdict::Disturbed),
+                nothing_learnt => return nothing_learnt,
+            }
+        }
+        match refusal {
+            Some(verdict) => {
+                self.doubted = Some(here);
+                verdict
+            }
+            None => self.trust(here, PairVerdict::First),
+        }
+    }
+
+    fn trust(&mut self, here: Passage, verdict: PairVerdict) -> PairVerdict {
+        self.trusted = Some(here);
+        self.doubted = None;
+        verdict
+    }
+
+    /// True diameter over believed diameter of each wheelset, and between which bounds it lies.
+    #[must_use]
+    pub fn scales(&self) -> [WheelScale; 2] {
+        let [first, second] = self.filter.scales();
+        let [first_count, second_count] = self.counts;
+        let [first_date, second_date] = self.dates;
+        let [first_interval, second_interval] = self.intervals;
+        let scale = |(value, uncertainty), count, date, interval| WheelScale {
+            estimate: Estimate { value, uncertainty, count, date },
+            interval,
+        };
+        [
+            scale(first, first_count, first_date, first_interval),
+            scale(second, second_count, second_date, second_interval),
+        ]
+    }
+
+    /// The bounds of both scales, which the distance bounds need in every period.
+    #[must_use]
+    pub fn intervals(&self) -> [ScaleInterval; 2] {
+        self.intervals
+    }
+
+    /// The diameters themselves.
+    #[must_use]
+    pub fn diameters(&self) -> [Estimate<Length>; 2] {
+        let [first, second] = self.scales();
+        let [first_wheel, second_wheel] = self.wheelsets;
+        [
+            first.estimate.scaled(|scale| first_wheel.diameter * scale),
+            second.estimate.scaled(|scale| second_wheel.diameter * scale),
+        ]
+    }
+
+    /// What a way makes less certain, in steps that every period can afford.
+    fn grow(&mut self, counted: [Length; 2]) {
+        self.counted_before = self.counted;
+        self.counted = counted;
+        let [first, second] = ways(self.grown_at, counted);
+        let way = first.max(second).as_m();
+        if way >= GROWS_EVERY_M {
+            self.grown_at = counted;
+            self.filter.wander(way / 1000.0);
+            self.widen(way);
+        }
+    }
+
+    fn widen(&mut self, way_m: f64) {
+        for (interval, wheelset) in self.intervals.iter_mut().zip(&self.wheelsets) {
+            let widened = interval.widened(CHANGES_PER_KM * way_m / 1000.0);
+            let possible = ScaleInterval::of_tolerance(wheelset.diameter_tolerance);
+            *interval = widened.meet(possible).unwrap_or(possible);
+        }
+    }
+
+    /// Learns the ratio of the scales from ways that both wheelsets rolled.
+    fn compare(&mut self, time: Timestamp, [first, second]: [Length; 2]) {
+        let [first_pulse, second_pulse] = self.wheelsets.map(|wheelset| wheelset.pulse_pitch());
+        let pulses = pulse_variance(first_pulse / first) + pulse_variance(second_pulse / second);
+        let variance = COMPARED_DEVIATION * COMPARED_DEVIATION + pulses;
+        self.filter.measure([1.0, -1.0], log(second / first), variance);
+        self.settle(time, [true; 2]);
+        self.compared = true;
+    }
+
+    fn pair(&mut self, time: Timestamp, from: &Passage, to: &Passage) -> PairVerdict {
+        if from.rolled == [false; 2] {
+            return PairVerdict::Disturbed;
+        }
+        let ways = from.ways_to(to);
+        let near = |way: &PairedWay| way.counted.max(way.said.abs()).as_m() < NEAREST_PAIR_M;
+        if ways.iter().filter(|way| way.rolled).all(near) {
+            return PairVerdict::TooNear;
+        }
+        let off = 2.0 * self.balise.bound;
+        let mut met = self.intervals;
+        for ((interval, wheelset), way) in met.iter_mut().zip(&self.wheelsets).zip(&ways) {
+            let pulse = wheelset.pulse_pitch();
+            match way.allows(off, pulse).and_then(|pair| interval.meet(pair)) {
+                _ if !way.rolled => {}
+                Some(both) => *interval = both,
+                None => {
+                    let [low, high] = way.possible(*interval, off, pulse);
+                    return PairVerdict::Refused { said: way.said, low, high };
+                }
+            }
+        }
+        self.intervals = met;
+        self.lengthen(from, to);
+        // In advance, for the way until the next step.
+        self.widen(GROWS_EVERY_M);
+        self.learn(&ways);
+        self.settle(time, from.rolled);
+        PairVerdict::Accepted
+    }
+
+    /// Pairs a balise with the first since which each wheelset has rolled: the longer the way, the less the balises leave open.
+    fn lengthen(&mut self, from: &Passage, to: &Passage) {
+        let off = 2.0 * self.balise.bound;
+        let each = self.origins.iter_mut().zip(&mut self.intervals).zip(&self.wheelsets);
+        for (wheel, ((origin, interval), wheelset)) in each.enumerate() {
+            let has_rolled = |passage: &Passage| passage.rolled.get(wheel) == Some(&true);
+            if !origin.as_ref().is_some_and(has_rolled) {
+                *origin = Some(*from).filter(has_rolled);
+            }
+            let Some(way) = origin.and_then(|origin| origin.ways_to(to).into_iter().nth(wheel)) else {
+                continue;
+            };
+            // The scale has changed on the way.
+            let changed = CHANGES_PER_KM * way.counted.as_m() / 1000.0;
+            let allowed = way.allows(off, wheelset.pulse_pitch()).map(|allowed| allowed.widened(changed));
+            // Where nothing is left, the balises agree in pairs and not over all: one bound was broken by little. Pairs win.
+            *interval = allowed.and_then(|allowed| interval.meet(allowed)).unwrap_or(*interval);
+        }
+    }
+
+    /// Gives a pair to the filter. The error of the balises is the same for both wheelsets and is not counted twice.
+    fn learn(&mut self, [one, other]: &[PairedWay; 2]) {
+        let [first_pulse, second_pulse] = self.wheelsets.map(|wheelset| wheelset.pulse_pitch());
+        let (said, first, second) = (one.said, one.counted, other.counted);
+        // Each end of the pair has its own error, and is at any time of its period: even over the way of the period.
+        let (balise, periods) = (self.balise.deviation / said, one.within / said);
+        let balises = 2.0 * balise * balise + periods * periods / 3.0;
+        let own = |pulse: Length, way: Length| {
+            CREEPAGE_DEVIATION * CREEPAGE_DEVIATION + pulse_variance(pulse / way)
+        };
+        let (of_first, of_second) = (own(first_pulse, first), own(second_pulse, second));
+        match [one.rolled, other.rolled] {
+            [true, true] => {
+                let mean = 0.5 * (log(said / first) + log(said / second));
+                self.filter.measure([0.5, 0.5], mean, balises + 0.25 * (of_first + of_second));
+                if !self.compared {
+                    self.filter.measure([1.0, -1.0], log(second / first), of_first + of_second);
+                }
+            }
+            [true, false] => self.filter.measure([1.0, 0.0], log(said / first), balises + of_first),
+            [false, true] => self.filter.measure([0.0, 1.0], log(said / second), balises + of_second),
+            [false, false] => {}
+        }
+        self.compared = false;
+    }
+
+    fn settle(&mut self, time: Timestamp, learnt: [bool; 2]) {
+        self.filter.hold_within(self.intervals.map(|interval| (interval.low, interval.high)));
+        for ((count, date), learnt) in self.counts.iter_mut().zip(&mut self.dates).zip(learnt) {
+            if learnt {
+                *count = count.saturating_add(1);
+                *date = time;
+            }
+        }
+    }
+}
+
+/// What the pulses at both ends of a way leave open of its logarithm.
+fn pulse_variance(pulse_over_way: f64) -> f64 {
+    2.0 * PULSE_VARIANCE * pulse_over_way * pulse_over_way
+}
+
+/// A scale that belongs to another wheelset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForeignScale {
+    /// Which wheelset it was given for, counted from 1.
+    pub wheelset: usize,
+    /// What was given.
+    pub known: WheelScale,
+    /// What the tolerance of the diameter allows.
+    pub possible: ScaleInterval,
+}
+
+impl fmt::Display for ForeignScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { wheelset, known: WheelScale { estimate, interval }, possible } = self;
+        write!(
+            f,
+            "the scale known of wheelset {wheelset} is {} ± {} and between {} and {}; it should be a number between {} \
+             and {}, with an uncertainty above 0: if the wheelset was changed, start without a known scale",
+            estimate.value, estimate.uncertainty, interval.low, interval.high, possible.low, possible.high
+        )
+    }
+}
+
+impl core::error::Error for ForeignScale {}

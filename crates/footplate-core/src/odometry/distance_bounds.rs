@@ -1,0 +1,191 @@
+//! Between which distances the train must be.
+//!
+//! Two ways to bound a distance, and the better one counts. The bounds of the speed, summed up, are always good and
+//! always wide. The counts of a wheel that is known to turn no faster (or no slower) than the train moves are off by one
+//! pulse over any way; they are used from the moment on at which that is known.
+
+use super::vote::Vote;
+use super::wheels::{Range, larger, smaller};
+
+/// Pulses by which a way by counts can be off: one for the phase at the start and end, and one and a half for a row that
+/// was read so little late that its count surprises nobody.
+const PULSES_OFF: f64 = 2.5;
+
+/// A wheel's counts since it was last known to bound the distance from one side.
+#[derive(Debug, Clone, Copy)]
+struct Anchor {
+    /// The bound at which it was anchored (m).
+    bound: f64,
+    /// What it has counted since, in pulses, weighted with the pitch (m).
+    counted: f64,
+    set: bool,
+    /// Since it was anchored there was a time when it could only loosen the bound.
+    only_loosens: bool,
+}
+
+impl Anchor {
+    const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false, only_loosens: false };
+
+    /// The bound after `way` more (m), if the wheel held it for the whole period and before.
+    fn bound(&mut self, holds: bool, loosens: bool, way: f64, off: f64) -> Option<f64> {
+        self.set &= holds;
+        self.only_loosens |= loosens;
+        self.counted += way;
+        self.set.then_some(self.bound + self.counted + off)
+    }
+
+    fn anchor(&mut self, holds: bool, loosens: bool, bound: f64) {
+        if holds && (!self.set || (self.only_loosens && !loosens)) {
+            *self = Self { bound, counted: 0.0, set: true, only_loosens: loosens };
+        }
+    }
+}
+
+/// What one wheel turned in a period, and which bound of the distance that holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counted {
+    /// Signed pulses in the direction of travel.
+    pub(super) pulses: f64,
+    /// By how many of them the count may be wrong.
+    pub(super) doubt: f64,
+    /// It may loosen the bound from below, but not set it: its sensor is in doubt, or traction may turn it faster.
+    pub(super) loosens_low: bool,
+    /// The same from above: its sensor is in doubt, or the brake may hold it back.
+    pub(super) loosens_high: bool,
+    /// Pitch (m).
+    pub(super) pitch: Range,
+    /// The train moved at least as far.
+    pub(super) at_least: bool,
+    /// The train moved at most as far.
+    pub(super) at_most: bool,
+}
+
+/// Follows the bounds of the distance in the direction of travel, from where it began.
+#[derive(Debug, Clone)]
+pub(super) struct DistanceBounds {
+    distance: Range,
+    low: [Anchor; 2],
+    high: [Anchor; 2],
+}
+
+impl DistanceBounds {
+    pub(super) const fn new(distance: Range) -> Self {
+        Self { distance, low: [Anchor::NONE; 2], high: [Anchor::NONE; 2] }
+    }
+
+    pub(super) fn distance(&self) -> Range {
+        self.distance
+    }
+
+    /// The train has moved for `t` seconds, its speed from within `before` to within `now`, its acceleration within
+    /// `acceleration`.
+    pub(super) fn moved(
+        &mut self,
+        before: Range,
+        now: Range,
+        acceleration: Range,
+        wheels: &[Counted; 2],
+        t: f64,
+    ) -> Range {
+        // The mean of a speed with bounded acceleration is off the mean of its ends by at most (b - a) t / 8.
+        let bend = acceleration.width() * t * t * 0.125;
+        let mut low = self.distance.low + 0.5 * (before.low + now.low) * t - bend;
+        let mut high = self.distance.high + 0.5 * (before.high + now.high) * t + bend;
+        // Where both wheels bound the same side the looser bound counts: no single sensor can break it.
+        let (mut by_low, mut by_high) = (Vote::NONE, Vote::NONE);
+        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+            let (short, long) = if wheel.pulses < 0.0 {
+                (wheel.pitch.high, wheel.pitch.low)
+            } else {
+                (wheel.pitch.low, wheel.pitch.high)
+            };
+            let off = PULSES_OFF * wheel.pitch.high;
+            let doubt = wheel.doubt * wheel.pitch.high;
+            if let Some(bound) =
+                low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
+            {
+                by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
+            }
+            if let Some(bound) =
+                high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
+            {
+                by_high = by_high.also(bound, high_anchor.only_loosens, larger);
+            }
+        }
+        low = by_low.outcome().map_or(low, |bound| larger(low, bound));
+        high = by_high.outcome().map_or(high, |bound| smaller(high, bound));
+        if low > high {
+            // Something taken for granted is not so; the speeds alone are left.
+            (low, high) = (
+                (self.distance.low + before.low.min(now.low) * t).min(low),
+                (self.distance.high + before.high.max(now.high) * t).max(low),
+            );
+            self.low = [Anchor::NONE; 2];
+            self.high = [Anchor::NONE; 2];
+        }
+        self.distance = Range { low, high };
+        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+            low_anchor.anchor(wheel.at_least, wheel.loosens_low, low);
+            high_anchor.anchor(wheel.at_most, wheel.loosens_high, high);
+        }
+        self.distance
+    }
+
+    /// The train is known to be within `place` (m from the start, in the direction of travel).
+    pub(super) fn relocate(&mut self, place: Range) {
+        *self = Self::new(place);
+    }
+
+    /// The bounds seen in the opposite direction, as the train turns round.
+    pub(super) fn reverse(&mut self) {
+        *self = Self::new(self.distance.reversed());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(pulses: f64) -> Counted {
+        Counted {
+            pulses,
+            doubt: 0.0,
+            loosens_low: false,
+            loosens_high: false,
+            pitch: Range::around(0.027, 0.001),
+            at_least: true,
+            at_most: true,
+        }
+    }
+
+    fn after(wheels: [Counted; 2], periods: usize) -> Range {
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let speed = Range { low: 19.0, high: 21.0 };
+        for _ in 0..periods {
+            bounds.moved(speed, speed, Range { low: -1.0, high: 1.0 }, &wheels, 0.05);
+        }
+        bounds.distance()
+    }
+
+    #[test]
+    fn counts_bound_a_long_way_by_their_pitch_and_a_pulse() {
+        // 37 pulses of 27 mm in 50 ms: 19.98 m/s.
+        let distance = after([counted(37.0), counted(37.0)], 2000);
+        let way = 2000.0 * 37.0 * 0.027;
+        assert!(distance.low < way && way < distance.high);
+        assert!(distance.width() < way * 0.002 + 0.3, "{distance:?}: the speeds alone leave 200 m");
+    }
+
+    #[test]
+    fn a_sensor_that_loses_pulses_does_not_break_the_bounds() {
+        let distance = after([counted(36.0), counted(37.0)], 2000);
+        assert!(distance.high > 2000.0 * 37.0 * 0.027, "{distance:?}");
+    }
+
+    #[test]
+    fn a_wheel_in_doubt_loosens_and_does_not_set() {
+        let doubted = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
+        let alone = after([doubted, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
+        assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
+    }
+}

@@ -1,0 +1,298 @@
+//! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
+
+use super::arrivals::{Arrivals, arrivals};
+use super::evidence::{Compared, STEADY_S, evidence};
+use super::filters::Filters;
+use super::interval::interval;
+use super::lanes::Lanes;
+use super::rates::{Transitions, transitions};
+use super::scene::{Scene, WheelScene};
+use super::touch::Touch;
+use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
+
+/// Density of the train's jerk while a wheel tells its speed (m²/s⁵): 0.14 m/s² in a second, what a driver's hand does
+/// to a cruising train; while none does, the acceleration is known to 0.3 m/s² after a few seconds.
+const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
+/// The same beyond that where no command is recorded that would announce it.
+const UNANNOUNCED: f64 = 0.06;
+/// How long brakes and motors take to do what is commanded (s), and how much of it a train whose wheels roll can be expected
+/// to do: the rest is left to gradients, resistance and the state of the brakes.
+const BUILD_UP_S: f64 = 1.5;
+const EXPECTED: f64 = 0.5;
+/// By how much the acceleration changes when wheels that slipped have their grip again (m/s²).
+const REGAINS: f64 = 0.4;
+/// Hypotheses that trust a counter: one (or zero) for each.
+const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+/// Hypotheses in which no wheel tells the speed.
+const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+/// Variance of what is at rest (m²/s², m²/s⁴): none, but for rounding.
+const AT_REST: f64 = 1e-6;
+const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
+/// How long the error of a followed wheel lasts (s).
+const FOLLOWED_S: f64 = 0.15;
+/// The ratio of the diameters wanders by this much a second (part).
+const RATIO_WANDERS: f64 = 2e-5;
+/// Slower than this it is not learnt (m/s), and creepage under effort disturbs it (part).
+const RATIO_ABOVE: f64 = 3.0;
+const RATIO_CREEPAGE: f64 = 0.008;
+/// How long that keeps its sign: a whole run of a driven wheel beside one that is not (s).
+const CREEPAGE_FOR_S: f64 = 200.0;
+/// Share of a driven wheel in traction beside one that is not: its creepage is a bias, the other has none.
+const CREEPING_SHARE: f64 = 0.05;
+/// Least probability: far below what any interval minds.
+const LEAST: f64 = 1e-30;
+/// Time over which the acceleration is smoothed that tells braking from motoring without a command (s).
+const SIDE_S: f64 = 1.0;
+/// Speed at which half of all slips can begin (m/s), and at which steady creep can be told from rolling.
+const SLIPS_ABOVE: f64 = 0.5;
+const CREEPS_ABOVE: f64 = 5.0;
+/// A train that stops does so from below this speed (m/s).
+const STOPS_BELOW: f64 = 0.15;
+
+/// Filters and probabilities of all hypotheses.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Bank {
+    probability: Lanes,
+    pub(super) filters: Filters,
+    /// How far each hypothesis puts the train ahead of the estimate (m).
+    ahead: Lanes,
+    /// How far the train ran in the last period by each hypothesis (m).
+    ways: Lanes,
+    /// First over second wheel speed when both roll, less 1, and its variance.
+    pub(super) ratio: f64,
+    ratio_variance: f64,
+    /// Mean acceleration, smoothed (m/s²), and that of the wheels.
+    trend: f64,
+    wheels_a: f64,
+    /// The commanded acceleration as far as brakes and motors follow it (m/s²).
+    acted: f64,
+    /// 1 while wheels may turn slower than the train, −1 while they may turn faster.
+    pub(super) side: f64,
+    /// Whether each wheel has been turned up to the speed of the train.
+    pub(super) touches: [Touch; 2],
+    /// What came out of the last period.
+    speed: f64,
+    acceleration: f64,
+    variance: f64,
+}
+
+impl Bank {
+    /// A train met at a speed (m/s) with a variance.
+    pub(in super::super) fn new(speed: f64, variance: f64, wheelsets: &[Wheelset; 2]) -> Self {
+        let mut filters = Filters::new(speed, variance);
+        filters.v *= MOVES;
+        let variances =
+            wheelsets.map(|wheelset| wheelset.diameter_tolerance * wheelset.diameter_tolerance / 3.0);
+        Self {
+            probability: Lanes([0.9, 1e-3, 1e-3, 1e-6, 1e-9, 0.1, LEAST, LEAST]),
+            filters,
+            ahead: Lanes::all(0.0),
+            ways: Lanes::all(0.0),
+            ratio: 0.0,
+            ratio_variance: variances.iter().sum(),
+            trend: 0.0,
+            wheels_a: 0.0,
+            acted: 0.0,
+            side: 1.0,
+            touches: [Touch::new(); 2],
+            speed,
+            acceleration: 0.0,
+            variance,
+        }
+    }
+
+    /// Speed (m/s), acceleration (m/s²) and the variance of the speed, over all hypotheses.
+    pub(in super::super) fn motion(&self) -> (f64, f64, f64) {
+        (self.speed, self.acceleration, self.variance)
+    }
+
+    /// The probability of every hypothesis, in the order of [`HYPOTHESES`](super::HYPOTHESES).
+    pub(in super::super) fn probabilities(&self) -> [f64; 8] {
+        self.probability.0
+    }
+
+    /// Whether wheels may turn slower than the train now, and not faster.
+    pub(in super::super) fn holds_back(&self) -> bool {
+        self.side > 0.0
+    }
+
+    /// The train has turned round.
+    pub(in super::super) fn reverse(&mut self) {
+        self.filters.reverse();
+        self.ahead = -self.ahead;
+        self.speed = -self.speed;
+        self.acceleration = -self.acceleration;
+        self.trend = -self.trend;
+        self.wheels_a = -self.wheels_a;
+    }
+
+    /// Takes in a period of `t` seconds; how far the train went (m).
+    pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
+        self.side = self.next_side(scene, t);
+        let [first, second] = &scene.wheels;
+        let wheels_a = 0.5 * (first.acceleration + second.acceleration);
+        self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
+        let wheels = self.compared(scene);
+        self.mix(scene, &wheels, t);
+        let (ways, surprise) = self.run(scene, t);
+        self.ahead += ways;
+        self.ways = ways;
+        self.pull(scene, &wheels, t);
+        let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
+        let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
+        self.probability = weights * (1.0 / weights.sum());
+        self.learn_ratio(scene, t);
+        self.summed_up(scene.top_speed)
+    }
+
+    /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
+    pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+        interval(&self.probability, &self.filters, &self.ways, scene, risk, t)
+    }
+
+    /// Which way wheels that lose their grip turn.
+    fn next_side(&mut self, scene: &Scene, t: f64) -> f64 {
+        self.trend += (self.acceleration - self.trend) * smaller(t / SIDE_S, 1.0);
+        match scene.commanded {
+            Some(commanded) if commanded < 0.0 => 1.0,
+            Some(commanded) if commanded > 0.0 => -1.0,
+            // What was last commanded may still act.
+            Some(_) => self.side,
+            None if self.trend < 0.0 => 1.0,
+            None => -1.0,
+        }
+    }
+
+    /// The wheels with the ratio of their diameters taken out.
+    fn compared(&self, scene: &Scene) -> [Compared; 2] {
+        let [first, second] = &scene.wheels;
+        let of = |wheel: &WheelScene, scale: f64| {
+            let speed = wheel.speed * scale;
+            let ratio = 0.25 * self.ratio_variance * speed * speed;
+            Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio }
+        };
+        let [one, other] = self.scales(scene);
+        [of(first, one), of(second, other)]
+    }
+
+    /// Lets hypotheses end and begin.
+    fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+        let Transitions { ends, after_rolling, after_others } = transitions(scene, t);
+        // What cannot begin now leaves its probability where it is.
+        let may = self.may_begin();
+        let (after_rolling, after_others) = (after_rolling * may, after_others * may);
+        let [rolling, ..] = self.probability.0;
+        let rest = self.probability * ends * NOT_ROLLING;
+        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, rest, after_others);
+        let leaves = rest * (Lanes::all(after_others.sum()) - stays_lost)
+            + BOTH_ROLL * (rolling * after_rolling.sum());
+        let [first, second] = &scene.wheels;
+        let pitch = larger(first.pitch, second.pitch);
+        let mut pool = self.filters.pooled(leaves, pitch * pitch);
+        pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
+        let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
+        let arrives = after_rolling * rolling + after_others * others;
+        let stays = self.probability - leaves;
+        let next = (stays + arrives).at_least(LEAST);
+        let share = arrives * next.inverse();
+        self.filters.mix(&pool, share);
+        self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
+        self.probability = next * (1.0 / next.sum());
+        // A train at rest stays there.
+        let Filters { v, a, pvv, pva, paa, .. } = &mut self.filters;
+        *v *= MOVES;
+        *a *= MOVES;
+        *pva *= MOVES;
+        *pvv = *pvv * MOVES + STANDS * AT_REST;
+        *paa = *paa * MOVES + STANDS * AT_REST;
+    }
+
+    /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have
+    /// stopped that is slow enough.
+    fn may_begin(&self) -> Lanes {
+        let moves = self.speed * self.speed;
+        let moving = |above: f64| moves / (moves + above * above);
+        let (slips, creeps) = (moving(SLIPS_ABOVE), moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE));
+        let slow = self.variance + STOPS_BELOW * STOPS_BELOW;
+        let stops = libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow);
+        Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
+    }
+
+    /// Runs every filter on and lets the counters correct those that trust one; how far each went, and how
+    /// surprised it was.
+    fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
+        let [first, second] = &scene.wheels;
+        let [one, other] = self.scales(scene);
+        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
+        let both = shares(scene);
+        // A hypothesis that trusts a wheel which is not read is left without.
+        let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
+        let [b1, b2] = both;
+        let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
+        let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
+        let trusted = TRUSTS * (alpha + beta).at_most(1.0);
+        let rest = scene.commanded.map_or(0.0, |commanded| commanded - self.acted);
+        let acts = rest * smaller(t / BUILD_UP_S, 1.0);
+        self.acted += acts;
+        self.filters.a += TRUSTS * (EXPECTED * acts);
+        let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
+        let ways = self.filters.run(t, JERK + TRUSTS * unannounced);
+        self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
+        let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
+        let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
+        let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
+        (ways + moved, surprise)
+    }
+
+    /// What the counts of each wheel are multiplied by so that both say the same while both roll.
+    pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
+        let [one, other] = shares(scene);
+        [1.0 - other * self.ratio, 1.0 + one * self.ratio]
+    }
+
+    /// Learns the ratio of the diameters while both roll.
+    fn learn_ratio(&mut self, scene: &Scene, t: f64) {
+        self.ratio_variance += RATIO_WANDERS * RATIO_WANDERS * t;
+        let [first, second] = &scene.wheels;
+        let [rolling, ..] = self.probability.0;
+        let mean = 0.5 * (first.speed + second.speed);
+        if !(first.read && second.read) || mean.abs() < RATIO_ABOVE || rolling < 0.9 {
+            return;
+        }
+        let measured = (first.speed - second.speed) / mean - self.ratio;
+        let noise = (first.speed_deviation + second.speed_deviation) / mean;
+        let creep = RATIO_CREEPAGE * larger(scene.brake, scene.traction);
+        let variance = noise * noise * (2.0 * FOLLOWED_S / t) + creep * creep * (CREEPAGE_FOR_S / t);
+        let gain = self.ratio_variance / (self.ratio_variance + variance);
+        let most = first.tolerance + second.tolerance;
+        self.ratio = larger(smaller(self.ratio + gain * measured, most), -most);
+        self.ratio_variance *= 1.0 - gain;
+    }
+
+    /// What all hypotheses come to; how far the estimate moved.
+    fn summed_up(&mut self, top: f64) -> f64 {
+        let p = self.probability;
+        let (v, a, way) = ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
+        let dv = self.filters.v - Lanes::all(v);
+        self.variance = (p * (self.filters.pvv + dv * dv)).sum();
+        self.speed = larger(smaller(v, top), -top);
+        self.acceleration = a;
+        self.ahead -= Lanes::all(way);
+        way
+    }
+}
+
+/// The shares of both wheels where both roll.
+fn shares(scene: &Scene) -> [f64; 2] {
+    let [first, second] = &scene.wheels;
+    let weight = |driven: bool, other: bool, pitch: f64, read: bool| {
+        let creeps = if driven && !other && scene.slip { CREEPING_SHARE } else { 1.0 };
+        if read { creeps / (pitch * pitch) } else { 0.0 }
+    };
+    let a = weight(first.driven, second.driven, first.pitch, first.read);
+    let b = weight(second.driven, first.driven, second.pitch, second.read);
+    if a + b > 0.0 { [a / (a + b), b / (a + b)] } else { [0.0; 2] }
+}

@@ -1,0 +1,51 @@
+//! What every hypothesis is asked to explain: one period of two wheelsets and the command.
+
+use crate::odometry::wheels::Range;
+
+/// One wheelset in one period, in the direction of travel.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct WheelScene {
+    /// How far it turned (m).
+    pub(in super::super) counted: f64,
+    /// Its count was read.
+    pub(in super::super) read: bool,
+    /// Its count has stood still, not at zero, for longer than that of a wheel does beside one whose count moves.
+    pub(in super::super) stuck: bool,
+    /// Speed it is followed at (m/s) and its standard deviation.
+    pub(in super::super) speed: f64,
+    pub(in super::super) speed_deviation: f64,
+    /// Acceleration it is followed at (m/s²) and its standard deviation.
+    pub(in super::super) acceleration: f64,
+    pub(in super::super) acceleration_deviation: f64,
+    /// Distance of one pulse (m).
+    pub(in super::super) pitch: f64,
+    /// The true diameter lies within this part of the assumed one.
+    pub(in super::super) tolerance: f64,
+    /// A brake can hold it back.
+    pub(in super::super) braked: bool,
+    /// A motor can turn it faster.
+    pub(in super::super) driven: bool,
+}
+
+/// One period.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Scene {
+    pub(in super::super) wheels: [WheelScene; 2],
+    /// Between which accelerations the train can be (m/s²), whatever the rail carries, and if it carries all.
+    pub(in super::super) acceleration: Range,
+    pub(in super::super) rolling: Range,
+    /// What the command makes the train do where the rail carries it (m/s²); nothing if it is not recorded.
+    pub(in super::super) commanded: Option<f64>,
+    /// How much of the full brake may act, 0 to 1, and how much of full traction.
+    pub(in super::super) brake: f64,
+    pub(in super::super) traction: f64,
+    /// Slides and slips are possible at all.
+    pub(in super::super) slide: bool,
+    pub(in super::super) slip: bool,
+    /// Acceleration that an inertial sensor feels (m/s²).
+    pub(in super::super) felt: Option<f64>,
+    /// Both wheelsets sliding alike can be ruled out.
+    pub(in super::super) independent: bool,
+    /// The highest speed of the train (m/s).
+    pub(in super::super) top_speed: f64,
+}

@@ -1,0 +1,121 @@
+//! What is known of a train while no wheel tells its speed: how it slows down, and wheels that touch its speed.
+//!
+//! Letters as in `filters`; `y` innovation.
+
+use super::bank::Bank;
+use super::evidence::{CREEP, Compared, SILENT};
+use super::filters::State;
+use super::scene::Scene;
+use crate::odometry::wheels::{Range, larger, smaller};
+
+/// The hypotheses in which both wheels slip, each in its own manner and alike.
+const SLIPS: usize = 3;
+const CREEPS: usize = 4;
+/// Those in which the train moves.
+const MOVES: [usize; 7] = [0, 1, 2, SLIPS, CREEPS, 6, 7];
+/// A train in which both wheelsets slide decelerates by this much, or as commanded if that is less (m/s²), and within
+/// this deviation (m/s², part of it); adhesion of 0.02 to 0.08 and the brakes of the other wheelsets.
+const SLIDES_BY: f64 = 0.5;
+const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
+/// How long that stays what it is (s).
+const SLIDES_FOR_S: f64 = 2.0;
+/// How closely wheels that creep alike accelerate with the train (m/s²), and for how long (s).
+const CREEPS_WITHIN: f64 = 0.5;
+const CREEPS_FOR_S: f64 = 3.0;
+/// What is felt is within this of the truth, for as long (m/s²).
+const FELT_WITHIN: f64 = 0.06;
+/// How sharp the limits of steady creep are (part of the speed).
+const CREEP_EDGE: f64 = 0.03;
+/// A wheel faster than the train in a slide pushes it up within this (m/s).
+const PUSHES: f64 = 0.2;
+/// How well a wheel that has reached the speed of the train tells it (m/s): in a slide and in a spin.
+const REACHED: [f64; 2] = [0.35, 0.1];
+/// Square of the deviations at which half of what is level has not reached the train.
+const REACHES_WITHIN: f64 = 2.0;
+/// How long the error of a followed wheel lasts (s).
+const FOLLOWED_S: f64 = 0.15;
+
+impl Bank {
+    /// Lets what is known of sliding trains hold the filters that trust no counter.
+    pub(super) fn pull(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+        let side = self.side;
+        // How fast the train can change its speed with both wheelsets slipping.
+        let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
+        let slides = -side * smaller(larger(-side * wanted, 0.0), SLIDES_BY);
+        let usual = lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S, t);
+        let mut slip = self.filters.state(SLIPS);
+        slip.acceleration(slides - slip.a, usual);
+        self.touch(&mut slip, scene, t);
+        let mut creep = self.filters.state(CREEPS);
+        creep.acceleration(slides - creep.a, usual);
+        creep_alike(&mut creep, scene, wheels, side, t);
+        // A train that slides does not run backwards, and accelerates as a train can.
+        let Range { low, high } = scene.acceleration;
+        for (lane, mut state) in [(SLIPS, slip), (CREEPS, creep)] {
+            state.v = larger(state.v, 0.0);
+            state.a = larger(smaller(state.a, high), low);
+            self.filters.set(lane, state);
+        }
+        if let Some(felt) = scene.felt {
+            for lane in MOVES {
+                let mut state = self.filters.state(lane);
+                state.acceleration(felt - state.a, lasting(FELT_WITHIN, SLIDES_FOR_S, t));
+                self.filters.set(lane, state);
+            }
+        }
+        self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
+        self.filters.keep_sound();
+    }
+
+    /// Lets wheels that touch the speed of the train tell it to a train whose wheels slip.
+    ///
+    /// The wheel that is nearest to the train is no faster than it in a slide: it pushes the train up. A wheel that was
+    /// turned towards the train's speed hard and then goes on level has reached it, as nothing else stops it there but its
+    /// slide control: that tells the speed from above and from below.
+    fn touch(&mut self, train: &mut State, scene: &Scene, t: f64) {
+        let [in_a_slide, in_a_spin] = REACHED;
+        let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
+        let reached = reached * reached;
+        let scales = self.scales(scene);
+        for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
+            let speed = touch.follow(wheel.counted * scale / t, train.a, t);
+            let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
+            if !wheel.read || speed.abs() < SILENT {
+                continue;
+            }
+            let y = speed - train.v;
+            let pushes = if self.side * y > 0.0 { t / (FOLLOWED_S * PUSHES * PUSHES) } else { 0.0 };
+            // What is further off than the train can be was stopped by its slide control.
+            let off = y * y / ((train.pvv + reached) * REACHES_WITHIN);
+            let tells = if has_reached { 1.0 / (reached * (1.0 + off * off)) } else { 0.0 };
+            train.speed(y, pushes + tells);
+        }
+    }
+}
+
+/// Wheels that creep alike creep by what they can, and accelerate with the train.
+fn creep_alike(train: &mut State, scene: &Scene, [a, b]: &[Compared; 2], side: f64, t: f64) {
+    let [first, second] = &scene.wheels;
+    let nearest = match (first.read, second.read) {
+        (true, true) => side * larger(side * a.speed, side * b.speed),
+        (false, true) => b.speed,
+        (true, false) => a.speed,
+        (false, false) => return,
+    };
+    let wheels = 0.5 * (first.acceleration + second.acceleration);
+    let own = lasting(first.acceleration_deviation, FOLLOWED_S, t);
+    let alike = lasting(CREEPS_WITHIN, CREEPS_FOR_S, t);
+    train.acceleration(wheels - train.a, own * alike / (own + alike));
+    let v = larger(train.v, 1.0);
+    let u = (train.v - nearest) * side;
+    let [(least, least_part), (most, most_part)] = CREEP;
+    let out = smaller(u - least_part * v - least, 0.0) + larger(u - most_part * v - most, 0.0);
+    if out != 0.0 {
+        train.speed(-out * side, lasting(CREEP_EDGE * v, CREEPS_FOR_S, t));
+    }
+}
+
+/// Information of a period of `t` seconds about what stays within a deviation for so many seconds.
+fn lasting(deviation: f64, seconds: f64, t: f64) -> f64 {
+    t / (2.0 * seconds * deviation * deviation)
+}

@@ -1,0 +1,142 @@
+//! What one period says: the counts of both wheelsets, the bounds they guarantee, and what hypotheses have to explain.
+
+use super::command_watch::Allowed;
+use super::distance_bounds::Counted;
+use super::guaranteed_speed::WheelBounds;
+use super::hypotheses::{Scene, WheelScene};
+use super::inertia::Inertia;
+use super::odometer::Odometer;
+use super::wheel_channel::WheelChannel;
+use super::wheels::{Count, Direction, Heading, Period, Range, WheelReading};
+
+/// Faster than this a train does not turn round from one period to the next (m/s).
+const CERTAIN_HEADING: f64 = 1.5;
+/// A larger reading is none of an accelerometer (m/s²).
+const LARGEST_READING: f64 = 50.0;
+
+impl Odometer {
+    /// Reads both wheelsets; how far each turned (m).
+    pub(super) fn read(&mut self, period: &Period, allowed: &Allowed, t: f64) -> [f64; 2] {
+        for (wheel, reading) in self.wheels.iter_mut().zip(&period.wheels) {
+            wheel.hear(reading, self.way, t);
+        }
+        // One forward and the other backward: then neither says that the train has turned round.
+        let disputed = {
+            let [first, second] = &self.wheels;
+            first.told.way() * second.told.way() < 0.0
+        };
+        if disputed && self.way < 0.0 {
+            // One of the two is wired the wrong way round; trains that run backward are rarer.
+            self.turn();
+        }
+        let heading = Heading { way: self.way, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
+        let at = (t, self.vehicle.period.as_s());
+        let [first, second] = &mut self.wheels;
+        [first.read(period, 0, at, heading, allowed), second.read(period, 1, at, heading, allowed)]
+    }
+
+    /// Narrows the guaranteed bounds by the counts and by an inertial sensor.
+    pub(super) fn narrow(&mut self, period: &Period, allowed: &Allowed, before: f64, t: f64) -> Range {
+        let [first, second] = &self.wheels;
+        let of = |wheel: &WheelChannel| WheelBounds {
+            turns: wheel.turns(allowed.acceleration),
+            axle: wheel.wheelset.axle,
+        };
+        let wheels = [of(first), of(second)];
+        // Where no sensor tells a direction, a speed is an amount.
+        let tells = |reading: &WheelReading| {
+            reading.direction != Direction::Unknown || matches!(reading.count, Count::Counter(_))
+        };
+        self.signed |= period.wheels.iter().any(tells);
+        let least = if self.signed { -self.vehicle.max_speed.as_m_per_s() } else { 0.0 };
+        let bounded = self.bounds.narrow(&wheels, allowed, self.vehicle.slide_protection, least, t);
+        if self.settings.inertial { self.feel(period, before, bounded, t) } else { bounded }
+    }
+
+    /// What the hypotheses are asked to explain.
+    pub(super) fn scene(&self, [first_counted, second_counted]: [f64; 2], allowed: &Allowed) -> Scene {
+        let of = |wheel: &WheelChannel, other: &WheelChannel, counted: f64| WheelScene {
+            counted,
+            read: wheel.is_read(),
+            stuck: wheel.is_stuck_beside(other),
+            speed: wheel.tracker.speed(),
+            speed_deviation: wheel.tracker.speed_deviation(),
+            acceleration: wheel.tracker.acceleration(),
+            acceleration_deviation: wheel.tracker.acceleration_deviation(),
+            pitch: wheel.pitch,
+            tolerance: wheel.tolerance(),
+            braked: wheel.wheelset.axle.may_slide(),
+            driven: wheel.wheelset.axle.may_slip(),
+        };
+        let [first, second] = &self.wheels;
+        Scene {
+            wheels: [of(first, second, first_counted), of(second, first, second_counted)],
+            acceleration: allowed.acceleration,
+            rolling: allowed.rolling,
+            commanded: allowed.commanded,
+            brake: if allowed.slide { allowed.brake } else { 0.0 },
+            traction: if allowed.slip { allowed.traction } else { 0.0 },
+            slide: allowed.slide,
+            slip: allowed.slip,
+            felt: self.inertia.as_ref().map(Inertia::acceleration),
+            independent: self.vehicle.independent,
+            top_speed: self.vehicle.max_speed.as_m_per_s(),
+        }
+    }
+
+    /// The share of the first wheelset, of the second and of what stands in for them.
+    pub(super) fn shares(&self) -> [f64; 3] {
+        let [both, first_slips, second_slips, slip, creep, standing, first_dead, second_dead] =
+            self.bank.probabilities();
+        let half = 0.5 * (both + standing);
+        let (one, other) = (half + second_slips + second_dead, half + first_slips + first_dead);
+        let total = one + other + slip + creep;
+        [one / total, other / total, (slip + creep) / total]
+    }
+
+    /// Takes in the interval of the stated probability, which the guaranteed bounds narrow.
+    pub(super) fn enclose(&mut self, speed: Range, way: Range, bounded: Range) {
+        let both = speed.and(bounded);
+        self.probable_speed = if both.is_empty() { bounded } else { both };
+        let distance = self.probable_distance;
+        let distance = Range { low: distance.low + way.low, high: distance.high + way.high };
+        let both = distance.and(self.ways.distance());
+        self.probable_distance = if both.is_empty() { self.ways.distance() } else { both };
+    }
+
+    /// What the wheels' counts say about the way of the period, as long as the claims hold.
+    pub(super) fn counted(&self, allowed: &Allowed) -> [Counted; 2] {
+        let [first, second] = &self.wheels;
+        let [first_wrong, second_wrong] = self.bounds.wrong();
+        let of = |wheel: &WheelChannel, other: &WheelChannel, wrong: bool| {
+            let good = wheel.doubt.is_finite() && !wrong && !wheel.is_stuck_beside(other);
+            let (slides, slips) = wheel.may_differ(allowed);
+            Counted {
+                pulses: wheel.pulses,
+                doubt: if good { wheel.doubt } else { 0.0 },
+                loosens_low: slips,
+                loosens_high: slides,
+                pitch: wheel.pitch_range,
+                at_least: good && !slips,
+                at_most: good && !slides,
+            }
+        };
+        [of(first, second, first_wrong), of(second, first, second_wrong)]
+    }
+
+    /// Lets the inertial sensor narrow the bounds; what is left of them.
+    fn feel(&mut self, period: &Period, before: f64, bounded: Range, t: f64) -> Range {
+        let reading = period
+            .acceleration
+            .map(|reading| self.way * reading.as_m_per_s2())
+            .filter(|reading| reading.abs() <= LARGEST_READING);
+        if self.inertia.is_none() && reading.is_some() {
+            self.inertia = Some(Inertia::new(before, self.bounds.speed()));
+        }
+        let Some(inertia) = &mut self.inertia else { return bounded };
+        inertia.read(reading, t);
+        let both = inertia.hold(bounded);
+        self.bounds.set(both);
+        both
+    }
+}

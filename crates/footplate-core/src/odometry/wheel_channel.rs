@@ -1,0 +1,204 @@
+//! One wheelset from its reading to what it shows: speed, acceleration, and the bounds that its counts set.
+
+use super::command_watch::Allowed;
+use super::wheels::{
+    CountWindows, Expected, Heading, Period, Quality, Range, ReportedDirection, Tachometer, Vehicle,
+    WheelReading, WheelTracker, Wheelset,
+};
+
+/// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
+/// acceleration changed meanwhile ...
+const SURPRISE_PULSES: f64 = 2.2;
+/// ... and by which it rarely does.
+const RARE_PULSES: f64 = 1.5;
+/// Accelerations of a wheelset beyond which a count surprises (m/s²): of one that can only roll, and of one that can
+/// slip, slide or regain its grip.
+const ROLLING: f64 = 2.5;
+const SLIPPING: f64 = 30.0;
+/// A count that is the same for longer is hardly that of a wheel (s).
+const STUCK_AFTER_S: f64 = 0.7;
+/// Readings before the tracker knows enough to be surprised.
+const WARM: u32 = 8;
+/// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
+const FASTER_THAN_TRAIN: f64 = 1.2;
+
+/// What one wheelset tells the odometer.
+#[derive(Debug, Clone)]
+pub(super) struct WheelChannel {
+    pub(super) wheelset: Wheelset,
+    /// By the diameter it is believed to have (m) ...
+    pub(super) wheelset_pitch: f64,
+    /// ... and by what was learnt of it.
+    pub(super) pitch: f64,
+    pub(super) pitch_range: Range,
+    /// The inverse of the pitch (1/m).
+    pulses_per_m: f64,
+    pub(super) tracker: WheelTracker,
+    pub(super) quality: Quality,
+    /// Pulses of the period in the direction of travel.
+    pub(super) pulses: f64,
+    pub(super) missing_for: f64,
+    /// How long its count has been the same and not zero (s).
+    same_for: f64,
+    /// By how many pulses its last count may be wrong.
+    pub(super) doubt: f64,
+    doubt_before: f64,
+    /// Which way its sensor lately said it turned.
+    pub(super) told: ReportedDirection,
+    tachometer: Tachometer,
+    windows: CountWindows,
+    readings: u32,
+    most_per_second: f64,
+}
+
+impl WheelChannel {
+    pub(super) fn new(wheelset: Wheelset, vehicle: &Vehicle) -> Self {
+        let pitch = wheelset.pulse_pitch().as_m();
+        let period = vehicle.period.as_s();
+        Self {
+            wheelset,
+            wheelset_pitch: pitch,
+            pitch,
+            pitch_range: Range::around(pitch, wheelset.diameter_tolerance),
+            pulses_per_m: 1.0 / pitch,
+            tracker: WheelTracker::new(pitch, period),
+            quality: Quality::Missing,
+            pulses: 0.0,
+            missing_for: 0.0,
+            same_for: 0.0,
+            doubt: 0.0,
+            doubt_before: 0.0,
+            told: ReportedDirection::default(),
+            tachometer: Tachometer::new(),
+            windows: CountWindows::new(period),
+            readings: 0,
+            most_per_second: FASTER_THAN_TRAIN * vehicle.max_speed.as_m_per_s() / pitch,
+        }
+    }
+
+    /// Takes in a reading, `t` seconds after the last one and `nominal` after by plan; says how far the wheel turned (m).
+    #[inline]
+    pub(super) fn read(
+        &mut self,
+        period: &Period,
+        which: usize,
+        (t, nominal): (f64, f64),
+        heading: Heading,
+        allowed: &Allowed,
+    ) -> f64 {
+        let Some(reading) = period.wheels.get(which) else { return 0.0 };
+        let expected = self.tracker.expected(t) * self.pulses_per_m;
+        let (may_slide, may_slip) = self.may_differ(allowed);
+        let most = if may_slide || may_slip { SLIPPING } else { ROLLING };
+        let warm = self.readings >= WARM;
+        // What an acceleration of 1 m/s² that sets in at once adds to a count.
+        let added = t * t * self.pulses_per_m;
+        let leeway = |acceleration: f64| {
+            if warm { SURPRISE_PULSES + acceleration * added } else { f64::INFINITY }
+        };
+        let expectation = Expected {
+            pulses: expected * heading.way,
+            more: leeway(most),
+            fewer: leeway(most),
+            rolling: RARE_PULSES + ROLLING * added,
+            most: self.most_per_second * t + SURPRISE_PULSES,
+        };
+        let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
+        self.quality = turn.quality;
+        let pulses = turn.pulses * heading.way;
+        self.same_for = if pulses == self.pulses && pulses != 0.0 { self.same_for + t } else { 0.0 };
+        self.pulses = pulses;
+        let counted = self.pulses * self.pitch;
+        self.doubt = turn.doubt;
+        if turn.doubt.is_finite() {
+            // A row that was read late is short of nothing, but the next window may begin with it.
+            self.windows.counted(t, self.pulses, turn.doubt + self.doubt_before);
+            self.doubt_before = turn.doubt;
+        } else {
+            self.doubt_before = 0.0;
+            self.windows.counted(t, self.pulses, 0.0);
+            self.windows.interrupt();
+        }
+        if turn.quality == Quality::Missing {
+            self.missing_for += t;
+            self.readings = 0;
+            self.tracker.turned(self.tracker.expected(t), t);
+            return counted;
+        }
+        if self.readings == 0 {
+            self.tracker.restart(counted / t);
+        }
+        self.missing_for = 0.0;
+        self.readings = self.readings.saturating_add(1);
+        self.tracker.turned(counted, t);
+        counted
+    }
+
+    /// Minds which way the sensor says it turned.
+    pub(super) fn hear(&mut self, reading: &WheelReading, way: f64, t: f64) {
+        self.told.hear(reading, self.tachometer.wiring(), way * self.pulses, t);
+    }
+
+    /// The first reading of a run: only a speed is known from it.
+    pub(super) fn begin(&mut self, period: &Period, which: usize, t: f64) -> Option<f64> {
+        let reading = period.wheels.get(which)?;
+        let most = self.most_per_second * t + SURPRISE_PULSES;
+        let any = f64::INFINITY;
+        let open = Expected { pulses: 0.0, more: any, fewer: any, rolling: any, most };
+        let uncertain = Heading { way: 1.0, certain: false, disputed: false };
+        let turn = self.tachometer.read(reading, 1.0, uncertain, &open);
+        self.quality = turn.quality;
+        if turn.quality == Quality::Missing {
+            return None;
+        }
+        Some(turn.pulses * self.pitch / t)
+    }
+
+    /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
+    pub(super) fn turns(&self, acceleration: Range) -> Range {
+        if self.doubt.is_infinite() {
+            return Range::ANY;
+        }
+        self.windows.speed(self.pitch_range, acceleration)
+    }
+
+    /// Its diameter is so many times the believed one.
+    pub(super) fn rescale(&mut self, scale: f64, bounds: Range) {
+        self.pitch = self.wheelset_pitch * scale;
+        self.pulses_per_m = 1.0 / self.pitch;
+        self.pitch_range =
+            Range { low: self.wheelset_pitch * bounds.low, high: self.wheelset_pitch * bounds.high };
+    }
+
+    /// Its count stands still, where that of a wheel that turns goes to and fro by one.
+    fn is_stuck(&self) -> bool {
+        self.same_for > STUCK_AFTER_S
+    }
+
+    /// The same, while the count of the other wheel moves.
+    pub(super) fn is_stuck_beside(&self, other: &Self) -> bool {
+        self.is_stuck() && other.is_read() && other.pulses != 0.0 && !other.is_stuck()
+    }
+
+    /// The true pitch lies within this part of the assumed one.
+    pub(super) fn tolerance(&self) -> f64 {
+        0.5 * self.pitch_range.width() * self.pulses_per_m
+    }
+
+    /// The train has turned round.
+    pub(super) fn reverse(&mut self) {
+        self.tracker.reverse();
+        self.windows.reverse();
+    }
+
+    /// Whether it may slide and whether it may slip now.
+    pub(super) fn may_differ(&self, allowed: &Allowed) -> (bool, bool) {
+        let axle = self.wheelset.axle;
+        (allowed.slide && axle.may_slide(), allowed.slip && axle.may_slip())
+    }
+
+    /// Its sample was read.
+    pub(super) fn is_read(&self) -> bool {
+        self.quality != Quality::Missing
+    }
+}

@@ -1,0 +1,313 @@
+//! The most likely course of a train: where its laws take it from one command to the next.
+//!
+//! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
+//! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
+//! the laws, `r(t)` share of its change that is done. What is the same whenever the train does it again has letters
+//! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law,
+//! `τ` upwards and downwards, and what ln speed is off by at each of the steps met of late, `s`. With `Δ` the speed before
+//! a change less that after it, the train is at
+//!
+//! ```text
+//! x(t) = b + e^(ε + s) S(t − η) + (ζ + τ Δ) r(t)
+//! ```
+//!
+//! [`MotionFilter`](super::MotionFilter) knows beside it how sure each letter is. What commands not given yet would come to is
+//! asked of a copy: cheap enough to look at thousands of ways to go on within a millisecond.
+#![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
+
+use super::apart::Apart;
+use crate::model::MotionModel;
+pub(crate) use crate::model::SpeedCommand;
+use crate::model::{Pace, Segment};
+
+pub(super) const B: usize = 0;
+pub(super) const E: usize = 1;
+pub(super) const H: usize = 2;
+pub(super) const Z: usize = 3;
+/// Upwards, and behind it downwards.
+pub(super) const LATER: usize = 4;
+/// The first of the steps met.
+const STEPS: usize = 6;
+/// Who keeps to a pace changes between three steps, each reached from below and from above.
+const STEPS_KEPT: usize = 6;
+pub(crate) const N: usize = STEPS + STEPS_KEPT;
+
+/// Commands that can wait for their effect one by one. A start takes up to half a second to take effect, in which a quick
+/// line carries more: see [`FilterState::tell`].
+const MOST_PENDING: usize = 6;
+
+/// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct FilterState {
+    pub(super) segment: Segment,
+    /// What the segment is an answer to.
+    pub(super) step: u8,
+    /// Whether its speed was reached from above.
+    is_above: bool,
+    /// `b`, `ε`, `η`, `ζ`, `τ` and `s`.
+    pub(super) x: [f64; N],
+    /// Which steps `s` are of, and whether reached from above; the one that will be replaced next, and the letter of the one
+    /// run at.
+    met: [(u8, bool); STEPS_KEPT],
+    oldest: usize,
+    is_repeating: bool,
+    pub(super) speed: Option<usize>,
+    /// The letter of the change under way, and its `Δ` (m/s); none of a start or a stop.
+    later: usize,
+    slower: f64,
+    pending: [Option<SpeedCommand>; MOST_PENDING],
+    /// What forecasts keep apart; nothing for a train that is driven.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub(super) apart: Option<Apart>,
+}
+
+impl FilterState {
+    /// At rest at a place.
+    pub(super) fn at_rest(time: f64, place: f64) -> Self {
+        Self {
+            segment: Segment::steady(time, 0.0),
+            step: 0,
+            is_above: false,
+            x: core::array::from_fn(|letter| if letter == B { place } else { 0.0 }),
+            met: [(0, false); STEPS_KEPT],
+            oldest: 0,
+            is_repeating: false,
+            speed: None,
+            later: LATER,
+            slower: 0.0,
+            pending: [None; MOST_PENDING],
+            apart: None,
+        }
+    }
+
+    /// Running steadily at a step for long.
+    pub(super) fn running(model: &MotionModel, time: f64, step: u8, place: f64) -> Self {
+        let speed = model.answers().speed(usize::from(step), false);
+        Self { segment: Segment::steady(time, speed), step, ..Self::at_rest(time, place) }
+    }
+
+    /// The step commanded last, whether it has taken effect or not.
+    pub(crate) fn step(&self) -> u8 {
+        self.pending.iter().flatten().last().map_or(self.step, |commanded| commanded.to)
+    }
+
+    /// A command leaves the line; all that took effect before has been taken in.
+    pub(crate) fn command(&mut self, sent: f64, step: u8) {
+        let from = self.step();
+        if from == step {
+            return;
+        }
+        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
+        if let Some(free) = self.pending.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some(SpeedCommand { sent, from, to: step, at_rest });
+        } else if let Some(last) = self.pending.last_mut() {
+            // The decoder obeys the newest command; the one before it, sent moments ago, has no effect of its own.
+            *last = last.filter(|last| last.from != step).map(|last| SpeedCommand { sent, to: step, ..last });
+        }
+    }
+
+    /// Whether a train that was commanded to stop stands by a time.
+    pub(crate) fn rests_at(&self, time: f64) -> bool {
+        self.step == 0 && time >= self.rest_time()
+    }
+
+    pub(super) fn rest_time(&self) -> f64 {
+        if self.segment.from.speed == 0.0 { self.segment.begins } else { self.segment.settled() }
+    }
+
+    /// What takes effect next, and when; `None` if nothing waits.
+    pub(super) fn next_effect(&self, model: &MotionModel) -> Option<(SpeedCommand, f64)> {
+        let commanded = self.pending[0]?;
+        Some((commanded, commanded.effect(&model.answers()).max(self.segment.begins)))
+    }
+
+    /// Takes all that has taken effect by a time into the state.
+    pub(crate) fn settle(&mut self, model: &MotionModel, time: f64) {
+        while let Some((commanded, begins)) = self.next_effect(model).filter(|(_, begins)| *begins <= time) {
+            let until = if commanded.at_rest { f64::INFINITY } else { begins };
+            let (way, _) = self.way_and_slope(until);
+            self.begin(model, commanded, begins, way);
+        }
+    }
+
+    /// The next segment begins, from a place: the way so far becomes its origin. Returns how fast it was there.
+    pub(super) fn begin(
+        &mut self,
+        model: &MotionModel,
+        commanded: SpeedCommand,
+        begins: f64,
+        way: f64,
+    ) -> f64 {
+        self.pending.rotate_left(1);
+        self.pending[MOST_PENDING - 1] = None;
+        let pace = if commanded.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
+        self.x[B] = way;
+        let apart = self.apart.map(|apart| apart.next(self, &commanded, begins));
+        self.segment = Segment::of(&commanded, &model.answers(), pace);
+        self.segment.begins = begins;
+        (self.step, self.is_above) = (commanded.to, commanded.above());
+        for letter in [H, Z] {
+            self.x[letter] = 0.0;
+        }
+        if commanded.at_rest {
+            self.x[E] = 0.0;
+        }
+        self.later = LATER + usize::from(commanded.above());
+        self.slower = if self.repeats(&commanded) { pace.speed - self.segment.to } else { 0.0 };
+        if commanded.to != 0 {
+            let is_met = self.repeats(&commanded) || apart.is_some();
+            let busy = apart.map_or([0; 2], |apart| apart.letters());
+            self.speed = is_met.then(|| self.meet(commanded.to, commanded.above(), busy));
+        }
+        self.apart = apart;
+        self.linearise(model);
+        pace.speed
+    }
+
+    /// Whether a command is one of many that are alike.
+    const fn repeats(&self, commanded: &SpeedCommand) -> bool {
+        self.is_repeating && commanded.to != 0 && !commanded.at_rest
+    }
+
+    /// Whether it will do the same again and again from now on; what it learnt of that before is forgotten.
+    pub(super) fn repeat(&mut self, is_repeating: bool) {
+        self.is_repeating = is_repeating;
+        if is_repeating {
+            // What it was until now is this run's own.
+            (self.x[E], self.x[Z]) = (libm::log(self.grown()), self.displaced());
+            self.met = [(0, false); STEPS_KEPT];
+            self.x[LATER..].fill(0.0);
+            (self.speed, self.slower) = (None, 0.0);
+        }
+    }
+
+    /// The letter of a step, reached from above or not, if it is kept.
+    pub(super) fn kept(&self, step: u8, above: bool) -> Option<usize> {
+        let at = self.met.iter().position(|met| *met == (step, above))?;
+        Some(STEPS + at)
+    }
+
+    /// Runs at a step, of which nothing is known but what the model says unless it is kept. Letters that are busy are not
+    /// given away.
+    pub(super) fn meet(&mut self, step: u8, above: bool, busy: [usize; 2]) -> usize {
+        self.kept(step, above).unwrap_or_else(|| {
+            while busy.contains(&(STEPS + self.oldest)) {
+                self.oldest = (self.oldest + 1) % STEPS_KEPT;
+            }
+            let at = self.oldest;
+            self.oldest = (at + 1) % STEPS_KEPT;
+            self.met[at] = (step, above);
+            self.x[STEPS + at] = 0.0;
+            STEPS + at
+        })
+    }
+
+    /// The letters of steps in use, each with its step and whether that was reached from above.
+    pub(super) fn steps_met(&self) -> impl Iterator<Item = (usize, u8, bool)> {
+        let met = self.met.into_iter().enumerate().filter(|(_, (step, _))| *step != 0);
+        met.map(|(at, (step, above))| (STEPS + at, step, above))
+    }
+
+    /// Its speed over what the segment under way says of it.
+    pub(super) fn grown(&self) -> f64 {
+        // Where steps are apart the segment has the speed of its step already.
+        let by_step = self.speed.filter(|_| self.apart.is_none()).map_or(0.0, |letter| self.x[letter]);
+        libm::exp(self.x[E] + by_step)
+    }
+
+    /// It has been running steadily for long: ways are counted from here on.
+    pub(super) fn run_on(&mut self, time: f64, way: f64) {
+        self.x[B] = way;
+        self.segment = Segment::steady(time, self.segment.to);
+        self.slower = 0.0;
+        if let Some(apart) = &mut self.apart {
+            apart.run_on(&self.segment);
+        }
+    }
+
+    /// By how much way the change under way differs from its law once it is done.
+    fn displaced(&self) -> f64 {
+        self.x[Z] + self.slower * self.x[self.later]
+    }
+
+    /// Slopes of `x(t)` from those of `b`, `ε`, `η` and `ζ`.
+    fn slope(&self, own: [f64; 4], time: f64) -> [f64; N] {
+        let mut slope = [0.0; N];
+        slope[..4].copy_from_slice(&own);
+        slope[self.later] = self.slower * own[Z];
+        if let Some(apart) = &self.apart {
+            apart.add_slopes(self, time, &mut slope);
+        } else if let Some(letter) = self.speed {
+            slope[letter] = own[E];
+        }
+        slope
+    }
+
+    /// `x(t)` and its slopes; at an infinite time the whole way of a stop.
+    pub(super) fn way_and_slope(&self, time: f64) -> (f64, [f64; N]) {
+        let grown = self.grown();
+        if time.is_infinite() {
+            let way = self.segment.way_to_rest();
+            let place = self.x[B] + grown * way + self.displaced();
+            return (place, self.slope([1.0, grown * way, 0.0, 1.0], time));
+        }
+        let late = time - self.x[H];
+        let way = if self.is_still() { 0.0 } else { self.segment.way(late) + self.learnt_since(time) };
+        let (speed, share) = (self.segment.speed(late), self.segment.share(time));
+        let place = self.x[B] + grown * way + self.displaced() * share;
+        (place, self.slope([1.0, grown * way, -grown * speed, share], time))
+    }
+
+    pub(super) const fn is_still(&self) -> bool {
+        self.segment.from.speed == 0.0 && self.segment.to == 0.0
+    }
+
+    /// Where it is (m), once all that has taken effect by then has been taken in.
+    pub(crate) fn place(&self, time: f64) -> f64 {
+        let is_done = self.rests_at(time) && !self.is_still();
+        let (grown, displaced) = (self.grown(), self.displaced());
+        if is_done {
+            return self.x[B] + grown * self.segment.way_to_rest() + displaced;
+        }
+        let way =
+            if self.is_still() { 0.0 } else { self.segment.way(time - self.x[H]) + self.learnt_since(time) };
+        let change = if displaced == 0.0 { 0.0 } else { displaced * self.segment.share(time) };
+        self.x[B] + grown * way + change
+    }
+
+    /// The speed (m/s) that the change under way has still to make at a time.
+    pub(crate) fn unsettled(&self, time: f64) -> f64 {
+        (self.segment.to - self.segment.speed(time - self.x[H])).abs()
+    }
+
+    /// How fast it is (m/s) then.
+    pub(crate) fn speed(&self, time: f64) -> f64 {
+        self.grown() * self.segment.speed(time - self.x[H])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::{SpeedStep, TrainId};
+    use crate::linalg::Gaussian;
+    use crate::tracking::motion_filter::MotionFilter;
+
+    #[test]
+    fn commands_in_quick_succession_all_count() {
+        // Given a slider that is pushed from 1 to 9 within the delay of the start, and back to 8,
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let begins: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
+        let (mut pushed, mut at_once) = (begins, begins);
+        for (nth, step) in [1, 2, 3, 4, 5, 6, 7, 8, 9, 8].into_iter().enumerate() {
+            pushed.command(&model, 0.02 * nth as f64, step);
+        }
+        at_once.command(&model, 0.0, 8);
+        // the train runs at the last step, as fast as one that was commanded to it at once.
+        assert_eq!(pushed.step(), 8);
+        let [speed, wanted] =
+            [&pushed, &at_once].map(|filter| filter.at(&model, 30.0).speed(&model, 30.0).mean);
+        assert!((speed / wanted - 1.0).abs() < 0.01, "{speed} m/s instead of {wanted} m/s");
+    }
+}

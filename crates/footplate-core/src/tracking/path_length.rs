@@ -1,0 +1,224 @@
+//! Ways in a train's own measure: from contact to contact, to a place on the layout, and back.
+
+use super::locator::WayPoint;
+use super::track_context::TrackContext;
+use crate::ids::{NodeId, SensorId};
+use crate::linalg::Gaussian;
+use crate::model::{FELT, MotionModel};
+use crate::track::{Hop, Landmark, Layout, Position, Reach};
+use crate::units::Length;
+
+/// Contacts that may stay silent in a row before the way is no longer believed.
+const BELIEVED_MISSED: usize = 2;
+/// One contact in so many stays silent, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
+const LOG_MISSED: f64 = -3.9;
+/// The same where trains are distinguished, as ln: 0.3 % on a layout that is looked after (chosen from what course reports
+/// complain about). What a single train is followed past may be more, because nothing else is there to explain it.
+pub(super) const LOG_CHANCE_OF_SILENCE: f64 = -5.809;
+/// Hops that a way to a place may take: more than a lap of any layout in use.
+const MOST_HOPS: usize = 200;
+/// A contact closes within this of where the survey has it, one standard deviation (m): half a pickup's springiness and a
+/// contact track's own length (chosen; tapes laid from contacts agree to it).
+const CONTACT_PLACE_M: f64 = 0.005;
+
+/// A way to a contact, past contacts that stayed silent, as a train feels it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PathReach {
+    /// Its length (m).
+    pub(super) length: Gaussian,
+    /// Contacts on the way that did not report.
+    pub(super) missed: usize,
+}
+
+impl PathReach {
+    /// ln of the chance that those contacts stay silent.
+    pub(super) fn log_chance(&self) -> f64 {
+        LOG_MISSED * self.missed as f64
+    }
+}
+
+/// A hop as a train feels it (m).
+pub(super) fn hop_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
+    let [length, uncertainty] = model.length(context.sections, hop).map(Length::as_m);
+    Gaussian { mean: length, variance: uncertainty * uncertainty }
+}
+
+fn felt(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: &Reach) -> PathReach {
+    let hops = reach.hops().iter().filter_map(|hop| layout.hop(*hop));
+    let length = hops.map(|hop| hop_length(context, model, &hop)).fold(
+        Gaussian { mean: 0.0, variance: 0.0 },
+        |sum, hop| Gaussian { mean: sum.mean + hop.mean, variance: sum.variance + hop.variance },
+    );
+    PathReach { length, missed: reach.missed() }
+}
+
+/// Every way from a node to a sensor that is open as far as the turnouts are known.
+pub(super) fn path_reaches<'g>(
+    context: TrackContext<'g>,
+    model: &'g MotionModel,
+    from: NodeId,
+    sensor: SensorId,
+) -> impl Iterator<Item = PathReach> + 'g {
+    context
+        .layout
+        .reaches(from, context.turnouts, BELIEVED_MISSED)
+        .filter(move |reach| reach.sensor == Some(sensor))
+        .map(move |reach| felt(context, model, context.layout, &reach))
+}
+
+/// The way from a waypoint's node to a place on the layout, as the train feels it and as the turnouts lie; `None` if
+/// none leads there within one lap.
+#[must_use]
+pub fn way_to(context: TrackContext<'_>, model: &MotionModel, from: NodeId, to: Position) -> Option<Length> {
+    let mut way = Length::ZERO;
+    for (count, hop) in context.hops_ahead(from).take(MOST_HOPS).enumerate() {
+        if count > 0 && hop.from == from {
+            return None;
+        }
+        let [felt, _] = model.length(context.sections, &hop);
+        let mut along = Length::ZERO;
+        for id in hop.edges {
+            if *id == to.edge {
+                return Some(way + felt * part(along + to.offset, hop.length));
+            }
+            along += context.layout.edge(*id)?.length;
+        }
+        way += felt;
+    }
+    None
+}
+
+/// The length of a hop as a tape finds it between the two contacts (m): the survey knows it to the errors of its edges and
+/// of where contacts close, the train to what it feels longer or shorter of curves and slopes. Both count by how well they
+/// know it, and the train mostly knows better.
+pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
+    let felt = hop_length(context, model, hop);
+    let surveyed = hop.length.as_m();
+    let survey =
+        context.sections.section(hop.id).map_or(0.0, |section| context.sections.survey_variance(section))
+            + 2.0 * CONTACT_PLACE_M * CONTACT_PLACE_M;
+    let feels = FELT * surveyed;
+    let train = felt.variance + feels * feels;
+    if train <= 0.0 {
+        return Gaussian { mean: surveyed, variance: survey };
+    }
+    let (one, other) = (1.0 / survey, 1.0 / train);
+    Gaussian { mean: (surveyed * one + felt.mean * other) / (one + other), variance: 1.0 / (one + other) }
+}
+
+/// The way from a waypoint's node to a landmark ahead, in lengths as the train feels them: so many millimetres past the
+/// contact of its name, whatever the survey says of the rest of the hop. `None` if none leads there within one lap.
+#[must_use]
+pub fn way_to_landmark(
+    context: TrackContext<'_>,
+    model: &MotionModel,
+    from: NodeId,
+    to: Landmark,
+) -> Option<Length> {
+    let Some((base, before)) = way_to_node(context, model, from, to.node) else {
+        let position = context.layout.locate(to, context.turnouts).ok()?;
+        return way_to(context, model, from, position);
+    };
+    if to.offset < Length::ZERO {
+        return Some(base + to.offset * before);
+    }
+    let (mut way, mut left) = (base, to.offset);
+    for hop in context.hops_ahead(to.node).take(MOST_HOPS) {
+        let felt = hop_length(context, model, &hop).mean;
+        let taped = taped_length(context, model, &hop).mean;
+        if left.as_m() <= taped {
+            return Some(way + left * if taped > 0.0 { felt / taped } else { 1.0 });
+        }
+        (way, left) = (way + Length::from_m(felt), left - Length::from_m(taped));
+    }
+    (left == Length::ZERO).then_some(way)
+}
+
+/// The way to a node at which hops begin or end, and how long a taped length feels on the hop before it.
+fn way_to_node(
+    context: TrackContext<'_>,
+    model: &MotionModel,
+    from: NodeId,
+    to: NodeId,
+) -> Option<(Length, f64)> {
+    if from == to {
+        return Some((Length::ZERO, 1.0));
+    }
+    let mut way = 0.0;
+    for (count, hop) in context.hops_ahead(from).take(MOST_HOPS).enumerate() {
+        if count > 0 && hop.from == from {
+            return None;
+        }
+        let felt = hop_length(context, model, &hop).mean;
+        way += felt;
+        if hop.to == to {
+            let taped = taped_length(context, model, &hop).mean;
+            return Some((Length::from_m(way), if taped > 0.0 { felt / taped } else { 1.0 }));
+        }
+    }
+    None
+}
+
+/// A point of the way as people name it and find it with a tape: from the last contact before it. Whole laps make no
+/// difference to the place.
+#[must_use]
+pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Landmark {
+    let [landmark, _] = taped(context, model, at);
+    landmark
+}
+
+/// How well a point of the way is known as people name it (m), where the train itself knows it without doubt: so far past a
+/// contact nobody knows how long a taped length feels.
+pub(super) fn taping_doubt(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> f64 {
+    let [_, doubt] = taped(context, model, at);
+    doubt.offset.as_m()
+}
+
+/// The landmark of a point on the way, and one standard deviation of its offset in the same form.
+fn taped(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> [Landmark; 2] {
+    let mut from = at.node;
+    let mut left = at.way.as_m();
+    for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
+        let felt = hop_length(context, model, &hop).mean;
+        if left > felt && hop.sensor.is_some() {
+            left -= felt;
+            from = hop.to;
+            continue;
+        }
+        let length = taped_length(context, model, &hop);
+        let scale = if felt > 0.0 && left > 0.0 { length.mean / felt } else { 1.0 };
+        let relative = if length.mean > 0.0 { libm::sqrt(length.variance) / length.mean } else { 0.0 };
+        let offset = Length::from_m(left * scale);
+        return [Landmark { node: from, offset }, Landmark { node: from, offset: offset.abs() * relative }];
+    }
+    [Landmark { node: from, offset: Length::from_m(left) }, Landmark { node: from, offset: Length::ZERO }]
+}
+
+fn part(of: Length, whole: Length) -> f64 {
+    if whole > Length::ZERO { of / whole } else { 0.0 }
+}
+
+/// The place on the layout of a point on the way, as the turnouts lie; for a point behind its node, the node.
+#[must_use]
+pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
+    let mut left = at.way.max(Length::ZERO);
+    for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
+        let [felt, _] = model.length(context.sections, &hop);
+        if left > felt && hop.sensor.is_some() {
+            left -= felt;
+            continue;
+        }
+        let mut along = (hop.length * part(left, felt)).min(hop.length);
+        let mut last = None;
+        for id in hop.edges {
+            let length = context.layout.edge(*id)?.length;
+            if along <= length {
+                return Some(Position { edge: *id, offset: along });
+            }
+            along -= length;
+            last = Some(Position { edge: *id, offset: length });
+        }
+        return last;
+    }
+    None
+}

@@ -1,0 +1,44 @@
+//! What a train moves on, as far as it is known: the layout, its sections and how the turnouts lie.
+
+use crate::ids::{NodeId, SensorId};
+use crate::model::survey::SectionIndex;
+use crate::track::{Hop, Layout, TurnoutStates};
+
+/// The track under a train. Copied freely; it only points.
+#[derive(Debug, Clone, Copy)]
+pub struct TrackContext<'g> {
+    /// The layout.
+    pub layout: &'g Layout,
+    /// Its sections, by which lengths are kept.
+    pub sections: &'g SectionIndex,
+    /// How the turnouts lie.
+    pub turnouts: &'g TurnoutStates,
+}
+
+impl<'g> TrackContext<'g> {
+    /// The one open hop that leads on from a node; `None` where the way forks over a turnout nobody knows of.
+    #[must_use]
+    pub fn hop_from(&self, node: NodeId) -> Option<Hop<'g>> {
+        let mut open = self.layout.open_hops_from(node, self.turnouts);
+        let hop = open.next()?;
+        open.next().is_none().then_some(hop)
+    }
+
+    /// The hops ahead of a node, one after the other, as the turnouts lie: round and round on a circuit, and to where
+    /// the way ends or is not known.
+    pub fn hops_ahead(&self, from: NodeId) -> impl Iterator<Item = Hop<'g>> + use<'g> {
+        let context = *self;
+        let mut node = Some(from);
+        core::iter::from_fn(move || {
+            let hop = context.hop_from(node?)?;
+            node = hop.sensor.map(|_| hop.to);
+            Some(hop)
+        })
+    }
+
+    /// The node of a sensor.
+    #[must_use]
+    pub fn node_of(&self, sensor: SensorId) -> Option<NodeId> {
+        self.layout.sensor_node(sensor)
+    }
+}
