@@ -8,6 +8,7 @@ extern crate alloc;
 
 pub mod dcc_ex;
 pub mod marklin_serial;
+mod news;
 mod queue;
 mod session;
 

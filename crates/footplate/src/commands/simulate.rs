@@ -7,15 +7,13 @@ mod layout;
 mod line;
 mod pacing;
 mod recording;
-mod rehearsal;
-mod seeds;
+mod score_form;
 mod series;
 mod station;
 mod survey;
 mod traffic;
 mod truth;
 mod worlds;
-mod written_scores;
 mod zones;
 
 use std::io::Write;

@@ -18,7 +18,6 @@
 mod address;
 mod board_address;
 mod line;
-mod news;
 mod observed;
 mod open;
 mod port;
@@ -32,7 +31,6 @@ mod tapped;
 
 pub(crate) use address::{Address, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use line::{Heard, Link, Lost};
-pub(crate) use news::news_of;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;

@@ -14,7 +14,6 @@ use super::script_runner::ScriptRunner;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
-use crate::link::news_of;
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
 
@@ -160,7 +159,7 @@ impl Attendant<Witnessed<ScriptRunner>> for Stage {
     }
 
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
-        self.news.extend(news_of(notice));
+        self.news.extend(notice.news());
         if let Some(alarm) = Alarm::of_line(notice) {
             self.alarm(now, &alarm);
         }

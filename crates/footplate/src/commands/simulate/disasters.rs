@@ -1,35 +1,18 @@
 //! `footplate simulate disasters`: something happens to trains, and what becomes of them is scored by the truth.
 
-mod attributed;
-mod figures;
-mod kind;
-mod page;
-mod scene;
-
 use std::io::Write;
 use std::num::NonZeroUsize;
 
-use anyhow::ensure;
 use clap::Args;
-use footplate_core::track::Layout;
-use footplate_core::{TimeSpan, TrainId};
-use footplate_sim::LivingSwitches;
+use footplate_core::TimeSpan;
+use footplate_eval::disasters::{Page, Scored, score};
+use footplate_eval::seeds::Seeds;
 use footplate_store::layout_named;
 
-use self::attributed::{Attributed, attributed};
-use self::kind::Kind;
-use self::page::Page;
-use self::scene::{OTHER, Outcomes, Scene, TRAIN};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::rehearsal::{Rehearsal, Way};
-use super::seeds::Seeds;
-use super::written_scores::ScoreForm;
-use crate::counted::counted;
+use super::score_form::ScoreForm;
 use crate::spread::each;
-
-/// A third train, for telling trains apart.
-const THIRD: TrainId = TrainId(63);
 
 /// Exchange engines, soil wheels, restart the station, lift trains: and see what a watched driver makes of it.
 ///
@@ -54,14 +37,6 @@ pub(super) struct Arguments {
     threads: Option<NonZeroUsize>,
 }
 
-/// All of one seed.
-struct Scored {
-    seed: u64,
-    runs: Vec<(Kind, Outcomes)>,
-    /// With how many trains running.
-    attributed: Vec<(usize, Attributed)>,
-}
-
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
@@ -83,18 +58,9 @@ impl Arguments {
         if self.budget != 240 {
             again += &format!(" --budget {}", self.budget);
         }
-        let failed = scored.runs.iter().filter_map(|(kind, run)| {
-            let what = if run.mishaps > 0 {
-                counted(run.mishaps, "mishap")
-            } else if *kind != Kind::Faultless && run.noticed.is_none() {
-                "not noticed".to_owned()
-            } else {
-                return None;
-            };
-            Some(FailedRun {
-                what: format!("seed {}, {}: {what}", scored.seed, kind.says()),
-                again: again.clone(),
-            })
+        let failed = scored.troubles().into_iter().map(|trouble| FailedRun {
+            what: format!("seed {}, {trouble}", scored.seed),
+            again: again.clone(),
         });
         failed.collect()
     }
@@ -110,23 +76,4 @@ impl Arguments {
         }
         asked
     }
-}
-
-/// Everything that happens to the trains of one seed.
-fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = Way::round(layout);
-    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
-    let trains = [TRAIN, OTHER, THIRD];
-    let stage = Rehearsal::prepare(layout, seed, &trains, &LivingSwitches::well_kept(), budget)?;
-    let mut runs = Vec::new();
-    for (nth, kind) in Kind::ALL.into_iter().enumerate() {
-        let asked = seed.wrapping_mul(Kind::ALL.len() as u64).wrapping_add(nth as u64);
-        runs.push((kind, Scene::new(layout, &stage, &way, asked)?.run(kind, &way, seed)?));
-    }
-    let mut counted = Vec::new();
-    for count in 2..=trains.len() {
-        let running = trains.get(..count).unwrap_or_default();
-        counted.push((count, attributed(&stage, &way, running)?));
-    }
-    Ok(Scored { seed, runs, attributed: counted })
 }

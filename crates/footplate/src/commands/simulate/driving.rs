@@ -1,32 +1,18 @@
 //! `footplate simulate driving`: random trains calibrated and driven in the simulator, and scored by its truth.
 
-pub(super) mod choice;
-mod course_project;
-pub(super) mod figures;
-pub(super) mod known_train;
-mod page;
-pub(super) mod trial;
-
 use std::io::Write;
 use std::num::NonZeroUsize;
 
 use clap::Args;
 use footplate_core::TimeSpan;
-use footplate_core::model::survey::SectionIndex;
-use footplate_core::track::Layout;
-use footplate_core::tracking::TrackContext;
+use footplate_eval::driving::{Page, ScoredTrain, score};
+use footplate_eval::seeds::Seeds;
 use footplate_sim::LawFamily;
 use footplate_store::layout_named;
 
-use self::course_project::CourseProject;
-use self::figures::ScoredTrain;
-use self::page::Page;
-use self::trial::{Counts, Plan, TRAIN, Trial, ahead, world};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::rehearsal::{Calibrated, calibrate};
-use super::seeds::Seeds;
-use super::written_scores::ScoreForm;
+use super::score_form::ScoreForm;
 use crate::counted::counted;
 use crate::link::law_named;
 use crate::spread::each;
@@ -60,8 +46,6 @@ pub(super) struct Arguments {
 
 /// The layout where none is named.
 const TRACK_A: &str = "track-a";
-/// What is asked of each train.
-const COUNTS: Counts = Counts { mid_stops: 16, top_stops: 8, not_beyond: 12, moves: 12 };
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -85,7 +69,7 @@ impl Arguments {
 
     /// What went wrong with a train that we drove: how others drive it is no check of ours.
     fn failure(&self, train: &ScoredTrain) -> Option<FailedRun> {
-        let mishaps = train.by.first().map_or(0, |ours| ours.mishaps);
+        let mishaps = train.mishaps();
         (mishaps > 0).then(|| {
             let (seed, law) = (train.seed, train.law);
             let mut again = format!("simulate driving --seed {seed} --law {law} --budget {}", self.budget);
@@ -111,29 +95,4 @@ impl Arguments {
         }
         asked
     }
-}
-
-/// One train: calibrated, and then the same world driven by each.
-fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow::Result<ScoredTrain> {
-    let sections = SectionIndex::of(layout);
-    let mut line = world(layout, seed, law)?;
-    let calibrated = calibrate(layout, &mut line, TRAIN, budget);
-    // What is asked differs from train to train, and is the same whoever drives.
-    let asked = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
-    let way: Vec<_> = ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
-    let context = TrackContext { layout, sections: &sections, turnouts: &calibrated.turnouts };
-    let knowing = known_train::known(context, line.station.world().truth(), TRAIN, &way)?;
-    let mut by = Vec::new();
-    for model in [calibrated.model.clone(), knowing] {
-        let mut world = line.clone();
-        let known = Calibrated { model, ..calibrated.clone() };
-        let mut trial = Trial::new(layout, &mut world, known, asked);
-        trial.run(COUNTS);
-        by.push(trial.results);
-    }
-    let mut world = line.clone();
-    let plan = Plan::new(&world, asked);
-    by.push(CourseProject::new(layout, &mut world, calibrated.turnouts).run(plan, COUNTS));
-    let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
-    Ok(ScoredTrain { law, seed, calibration_s, ending, by })
 }

@@ -22,8 +22,8 @@ use self::score_page::ScorePage;
 use self::scored_run::{ScoredRun, score};
 use self::world::{Scenarios, World};
 use super::super::Outcome;
-use super::seeds::Seeds;
 use crate::spread::each;
+use footplate_eval::seeds::Seeds;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent), as `footplate odometry` asks for.
 const SPEED_INSIDE_PCT: f64 = 99.99;

@@ -7,8 +7,8 @@ use footplate_core::TimeSpan;
 use footplate_core::track::Layout;
 use footplate_store::layout_named;
 
-use super::seeds::Seeds;
 use crate::spread::each;
+use footplate_eval::seeds::Seeds;
 
 /// What is the same for all jobs.
 #[derive(Debug, Clone, Args)]

@@ -1,22 +1,18 @@
 //! `footplate simulate traffic`: several trains sent to random places for hours, and scored by the simulator's truth.
 
-mod page;
-mod session;
-
 use std::io::Write;
 use std::num::NonZeroUsize;
 
 use clap::Args;
 use footplate_core::TimeSpan;
 use footplate_core::track::Layout;
+use footplate_eval::seeds::Seeds;
+use footplate_eval::traffic::{Asked, Page, Session, Tally};
 use footplate_store::layout_named;
 
-use self::page::Page;
-use self::session::{Asked, Session, Tally};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::seeds::Seeds;
-use super::written_scores::ScoreForm;
+use super::score_form::ScoreForm;
 use crate::spread::each;
 
 /// A train that comes to no destination for so long starves: ten journeys of those that wait longest.

@@ -17,11 +17,11 @@ use self::sessions::{ScoredWorld, score};
 use self::world::WorldName;
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::seeds::Seeds;
-use super::written_scores::ScoreForm;
+use super::score_form::ScoreForm;
 use crate::commands::written_layout::WrittenLayout;
 use crate::counted::counted;
 use crate::spread::each;
+use footplate_eval::seeds::Seeds;
 
 /// Calibrate a train once, then drive sessions of stops in which it goes on learning, in worlds whose physics are drawn
 /// from wide ranges; score each stop against the 95 % promise that was made for it.

@@ -3,8 +3,7 @@
 use serde_json::{Value, json};
 
 use super::sessions::{ScoredStop, ScoredWorld};
-use crate::commands::simulate::driving::figures::binomial_interval;
-use crate::commands::simulate::pacing::figures::quantile;
+use footplate_eval::figures::{binomial_interval, quantile};
 
 /// A session of fewer stops has no share.
 const LEAST_STOPS: usize = 10;

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use super::figures::Figures;
 use super::sessions::ScoredWorld;
 use super::world::WorldName;
-use crate::commands::simulate::pacing::figures::shown;
-use crate::commands::simulate::written_scores::{Rate, WrittenScores};
+use footplate_eval::figures::shown;
+use footplate_eval::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # Promises kept on worlds that differ from ours

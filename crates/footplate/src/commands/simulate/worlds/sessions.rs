@@ -14,11 +14,10 @@ use super::Extent;
 use super::timed::Timed;
 use super::world::WorldName;
 use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
-use crate::commands::simulate::driving::trial::{Plan, TRAIN};
-use crate::commands::simulate::rehearsal::{VirtualLine, calibrate};
 use crate::commands::written_layout::WrittenLayout;
-use crate::link::news_of;
 use crate::witness::Input;
+use footplate_eval::driving::{Plan, TRAIN};
+use footplate_eval::rehearsal::{VirtualLine, calibrate};
 
 /// Stops are asked for from steps whose true speed is at least this, in mm/s (chosen: slower ones may not move at all).
 const SLOWEST_MM_PER_S: f64 = 35.0;
@@ -241,7 +240,7 @@ impl Driven<'_, '_> {
     ) -> Option<Spoken> {
         loop {
             let spoken = self.line.drive_hearing(machine, until, |machine, now, notice| {
-                if let Some(news) = news_of(notice) {
+                if let Some(news) = notice.news() {
                     machine.handle_word(now, &Input::Link(news));
                 }
             })?;

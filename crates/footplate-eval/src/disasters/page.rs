@@ -1,0 +1,181 @@
+//! The table of disasters: for people, for the documentation, and for machines.
+
+use std::io::{self, Write};
+
+use serde_json::{Value, json};
+
+use super::Scored;
+use super::attributed::Attributed;
+use super::figures::{Figures, both};
+use super::kind::Kind;
+use super::scene::Outcomes;
+use crate::written_scores::{Rate, WrittenScores};
+
+const HEAD: &str = "\
+# What becomes of trains that something happens to
+
+Random simulated trains, calibrated over the bytes of a virtual 6051 and driven round and round under a watchdog, beside
+another train that stands. Contacts and turnouts fail now and then. Then something happens, of which the program is told
+nothing. The simulator's truth is used for these figures alone.
+";
+
+const LEGEND: &str = "\
+*Noticed* is from what happened until the train is told to stand for it, and how far it ran in between; *known again* until
+the train stands, is located again and measured, and may be ordered again: as it was before, its model rescaled, or learnt
+anew. *Stops* are at random places, from the step with about 280 mm/s, as far from there as the truth says (mm, median /
+95th percentile), before and afterwards. *Grief* counts collisions, derailments and trains that ran past the end of
+their track.
+";
+
+/// All that was scored.
+pub struct Page<'r> {
+    /// What every seed came to.
+    pub scored: &'r [Scored],
+    /// What was asked for, as on the command line.
+    pub asked: String,
+}
+
+impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "disasters";
+
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate disasters {}`.\n\n{LEGEND}", self.asked)
+    }
+
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| what happened | runs | noticed | after s | way mm | known again | after s | as before | rescaled | \
+             anew | person | power off | stops before | mm | stops after | mm | grief |\n\
+             | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
+             ---: | ---: | ---: |"
+        )?;
+        for figures in self.figures() {
+            let [as_before, rescaled, anew] = figures.outcomes;
+            writeln!(
+                output,
+                "| {} | {} | {} | {} | {} | {} | {} | {as_before} | {rescaled} | {anew} | {} | {} | {} | {} | {} | {} | {} |",
+                figures.kind.says(),
+                figures.runs,
+                figures.noticed.len(),
+                shown(both(figures.noticed.iter().map(|[seconds, _]| *seconds))),
+                shown(both(figures.noticed.iter().map(|[_, mm]| *mm))),
+                figures.recovered.len(),
+                shown(both(figures.recovered.iter().copied())),
+                figures.needed_person,
+                figures.powered_off,
+                figures.before.len(),
+                shown(both(figures.before.iter().copied())),
+                figures.after.len(),
+                shown(both(figures.after.iter().copied())),
+                figures.mishaps,
+            )?;
+        }
+        let (alarms, hours) = self.alarms();
+        writeln!(
+            output,
+            "\nFalse alarms: {alarms} in {hours:.1} hours of running with nothing but the usual faults of contacts and \
+             turnouts.\n\n## Who is where\n"
+        )?;
+        writeln!(
+            output,
+            "| trains running | contacts closed by them | laid to the right one | to another | to nobody | closed by \
+             themselves | of these laid to a train |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+        )?;
+        for (trains, counted) in self.attributed() {
+            let Attributed { right, wrong, rejected, taken, spurious } = counted;
+            let all = right + wrong + rejected;
+            writeln!(
+                output,
+                "| {trains} | {all} | {} | {} | {} | {} | {taken} |",
+                share(right, all),
+                share(wrong, all),
+                share(rejected, all),
+                taken + spurious,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+        let kinds: Vec<Value> = self.figures().map(|figures| figures.json()).collect();
+        let runs =
+            self.scored.iter().flat_map(|scored| scored.runs.iter().map(move |run| (scored.seed, run)));
+        let runs = runs.map(|(seed, (kind, run))| {
+            json!({
+                "seed": seed, "kind": kind.key(), "noticed": run.noticed, "recovered": run.recovered,
+                "needed_person": run.needed_person, "false_alarms": run.false_alarms, "mishaps": run.mishaps,
+                "before_mm": run.before, "after_mm": run.after, "said": run.said,
+            })
+        });
+        let attributed: Vec<Value> = self
+            .attributed()
+            .into_iter()
+            .map(|(trains, counted)| {
+                json!({
+                    "trains": trains, "right": counted.right, "wrong": counted.wrong,
+                    "rejected": counted.rejected, "taken": counted.taken, "spurious": counted.spurious,
+                })
+            })
+            .collect();
+        let (false_alarms, hours) = self.alarms();
+        let all = json!({
+            "kinds": kinds, "false_alarms": false_alarms, "hours": hours, "attributed": attributed,
+            "runs": runs.collect::<Vec<Value>>(),
+        });
+        writeln!(output, "{all}")
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let runs = || self.scored.iter().flat_map(|scored| &scored.runs);
+        let happened = || self.figures();
+        let [events, noticed, persons] = happened().fold([0; 3], |[all, noticed, persons], figures| {
+            [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_person]
+        });
+        vec![
+            Rate::grief(runs().filter(|(_, run)| run.mishaps > 0).count(), runs().count()),
+            Rate::new("not noticed", events - noticed, events),
+            Rate::new("needed a person", persons, events),
+        ]
+    }
+}
+
+impl Page<'_> {
+    fn runs(&self, kind: Kind) -> Vec<&Outcomes> {
+        self.scored
+            .iter()
+            .flat_map(|scored| &scored.runs)
+            .filter(|(of, _)| *of == kind)
+            .map(|(_, run)| run)
+            .collect()
+    }
+
+    fn figures(&self) -> impl Iterator<Item = Figures> {
+        let happened = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Faultless);
+        happened.map(|kind| Figures::of(kind, &self.runs(kind)))
+    }
+
+    fn alarms(&self) -> (usize, f64) {
+        let runs = || self.scored.iter().flat_map(|scored| &scored.runs).map(|(_, run)| run);
+        (runs().map(|run| run.false_alarms).sum(), runs().map(|run| run.watched_s).sum::<f64>() / 3600.0)
+    }
+
+    fn attributed(&self) -> Vec<(usize, Attributed)> {
+        let mut sums: Vec<(usize, Attributed)> = Vec::new();
+        for (trains, counted) in self.scored.iter().flat_map(|scored| &scored.attributed) {
+            match sums.iter_mut().find(|(known, _)| known == trains) {
+                Some((_, sum)) => sum.add(*counted),
+                None => sums.push((*trains, *counted)),
+            }
+        }
+        sums
+    }
+}
+
+fn shown(of: Option<[f64; 2]>) -> String {
+    of.map_or_else(|| "–".to_owned(), |[middle, high]| format!("{middle:.1} / {high:.1}"))
+}
+
+fn share(of: usize, all: usize) -> String {
+    if all == 0 { "–".to_owned() } else { format!("{of} ({:.2} %)", 100.0 * of as f64 / all as f64) }
+}

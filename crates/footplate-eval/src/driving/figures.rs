@@ -1,0 +1,151 @@
+//! What many trains come to: medians, high percentiles, shares with their intervals.
+
+use footplate_sim::LawFamily;
+use serde_json::{Value, json};
+
+use super::trial::{NOT_BEYOND_PERCENT, Results};
+use crate::figures::{binomial_interval, quantile};
+
+/// One train driven by everybody.
+pub struct ScoredTrain {
+    /// How it changes its speed.
+    pub law: LawFamily,
+    /// The seed.
+    pub seed: u64,
+    /// Track time that the calibration took, in s.
+    pub(super) calibration_s: f64,
+    /// Why it ended.
+    pub(super) ending: String,
+    /// In the order of [`Driven::ALL`].
+    pub(super) by: Vec<Results>,
+}
+
+impl ScoredTrain {
+    /// How often it came to grief while we drove it.
+    #[must_use]
+    pub fn mishaps(&self) -> usize {
+        self.by.first().map_or(0, |ours| ours.mishaps)
+    }
+}
+
+/// Who drove.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Driven {
+    /// By what the calibration found.
+    Calibrated,
+    /// By the truth.
+    Knowing,
+    /// As the published course projects do.
+    CourseProject,
+}
+
+impl Driven {
+    pub(super) const ALL: [Self; 3] = [Self::Calibrated, Self::Knowing, Self::CourseProject];
+
+    pub(super) const fn key(self) -> &'static str {
+        match self {
+            Self::Calibrated => "footplate",
+            Self::Knowing => "oracle",
+            Self::CourseProject => "course project",
+        }
+    }
+}
+
+/// Figures over several trains by one driver.
+pub(super) struct Figures {
+    /// Median and 95th percentile of the absolute errors of stops, in mm.
+    pub(super) mid: Option<[f64; 2]>,
+    pub(super) top: Option<[f64; 2]>,
+    /// The same of short moves.
+    pub(super) moves: Option<[f64; 2]>,
+    /// Moves within 8 mm or 5 %, and all.
+    pub(super) good_moves: [usize; 2],
+    /// Overruns and stops by allowed probability.
+    pub(super) beyond: [[usize; 2]; 2],
+    /// The median of where such stops ended, short of the target if negative, in mm.
+    pub(super) held_short: [Option<f64>; 2],
+    /// Looks at the position, and those within the interval.
+    pub(super) looks: [u64; 2],
+    pub(super) stops: [usize; 2],
+    pub(super) failed: u32,
+    pub(super) mishaps: usize,
+}
+
+/// What a short move may be off: this, or this share of it.
+const GOOD_MOVE_MM: f64 = 8.0;
+const GOOD_MOVE_SHARE: f64 = 0.05;
+
+impl Figures {
+    pub(super) fn of(results: &[&Results]) -> Self {
+        let results = results.iter().copied();
+        let all = |each: fn(&Results) -> &Vec<f64>| -> Vec<f64> {
+            results.clone().flat_map(|results| each(results).iter().map(|error| error.abs())).collect()
+        };
+        let moves: Vec<[f64; 2]> =
+            results.clone().flat_map(|results| results.moves.iter().copied()).collect();
+        let is_good =
+            |[asked, gone]: &&[f64; 2]| (gone - asked).abs() <= GOOD_MOVE_MM.max(GOOD_MOVE_SHARE * asked);
+        let beyond = |nth: usize| {
+            let ends = results.clone().flat_map(move |results| results.not_beyond[nth].iter().copied());
+            ends.collect::<Vec<f64>>()
+        };
+        let (mid, top) = (all(|results| &results.mid), all(|results| &results.top));
+        let overruns = |ends: &[f64]| [ends.iter().filter(|end| **end > 0.0).count(), ends.len()];
+        let sum = |each: fn(&Results) -> u64| results.clone().map(each).sum::<u64>();
+        Self {
+            stops: [mid.len(), top.len()],
+            mid: median_and_high(&mid),
+            top: median_and_high(&top),
+            moves: median_and_high(
+                &moves.iter().map(|[asked, gone]| (gone - asked).abs()).collect::<Vec<_>>(),
+            ),
+            good_moves: [moves.iter().filter(is_good).count(), moves.len()],
+            beyond: [overruns(&beyond(0)), overruns(&beyond(1))],
+            held_short: [quantile(beyond(0).into_iter(), 0.5), quantile(beyond(1).into_iter(), 0.5)],
+            looks: [sum(|results| u64::from(results.looks[0])), sum(|results| u64::from(results.looks[1]))],
+            failed: results.clone().map(|results| results.failed).sum(),
+            mishaps: results.clone().map(|results| results.mishaps).sum(),
+        }
+    }
+
+    /// The share of looks within the interval, in percent.
+    pub(super) fn covered_pct(&self) -> Option<f64> {
+        (self.looks[0] > 0).then(|| 100.0 * self.looks[1] as f64 / self.looks[0] as f64)
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let beyond: Vec<Value> = NOT_BEYOND_PERCENT
+            .iter()
+            .zip(self.beyond)
+            .map(|(allowed, [over, of])| {
+                let [low, high] = binomial_interval(over, of);
+                json!({
+                    "allowed_pct": allowed, "overruns": over, "stops": of, "low_pct": 100.0 * low,
+                    "high_pct": 100.0 * high,
+                })
+            })
+            .collect();
+        json!({
+            "mid_stop_mm": self.mid, "mid_stops": self.stops[0], "top_stop_mm": self.top,
+            "top_stops": self.stops[1], "move_mm": self.moves, "moves": self.good_moves[1],
+            "moves_within_8_mm_or_5_pct": self.good_moves[0], "not_beyond": beyond,
+            "position_inside_pct": self.covered_pct(), "failed": self.failed, "mishaps": self.mishaps,
+        })
+    }
+}
+
+fn median_and_high(errors: &[f64]) -> Option<[f64; 2]> {
+    let at = |part| quantile(errors.iter().copied(), part);
+    Some([at(0.5)?, at(0.95)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_values_that_were_there() {
+        assert_eq!(median_and_high(&(0..=100).rev().map(f64::from).collect::<Vec<_>>()), Some([50.0, 95.0]));
+        assert_eq!(median_and_high(&[]), None);
+    }
+}

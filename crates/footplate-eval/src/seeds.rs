@@ -1,0 +1,154 @@
+//! The seeds of runs, as a person gives them or as a commit draws them.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use anyhow::{anyhow, bail};
+
+use crate::choice::Choice;
+
+/// More runs of a scenario say nothing new; a slip of the finger does.
+const MOST_SEEDS: u64 = 100_000;
+/// What stands before the number of seeds that a commit draws.
+pub const FRESH: &str = "fresh:";
+/// Digits of a commit's hash that its seeds are drawn from.
+const HASH_DIGITS: usize = 12;
+/// Behind a hash where the files differ from the commit.
+const CHANGED: &str = "+changes";
+/// Fresh seeds lie between these: above every seed that was ever chosen by hand, and short enough to be typed.
+const FRESH_SEEDS: [f64; 2] = [1e6, 1e7];
+
+/// One seed, all from one to another, or as many as are asked for that nobody chose.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds {
+    all: Vec<u64>,
+    written: String,
+}
+
+impl Seeds {
+    /// Reads `7`, `1..100` with both ends, `fresh:64` for seeds that the current commit draws, or `fresh:64@5731edca1f20`
+    /// for those of another one.
+    ///
+    /// # Errors
+    /// When the text is none of these, with what would be right; and where no commit is found.
+    pub fn parse(text: &str) -> anyhow::Result<Self> {
+        match text.trim().strip_prefix(FRESH) {
+            Some(fresh) => Self::fresh(fresh),
+            None => Self::chosen(text),
+        }
+    }
+
+    fn chosen(text: &str) -> anyhow::Result<Self> {
+        let number = |text: &str| {
+            text.trim().parse::<u64>().map_err(|_| {
+                anyhow!(
+                    "`{text}` is no seed; it should be a whole number such as 7, a range such as 1..100, or fresh:64"
+                )
+            })
+        };
+        let seeds = match text.split_once("..") {
+            Some((first, last)) => number(first)?..=number(last.trim_start_matches('='))?,
+            None => {
+                let seed = number(text)?;
+                seed..=seed
+            }
+        };
+        if seeds.is_empty() {
+            bail!("the range ends before it begins; it should be {}..{}", seeds.end(), seeds.start());
+        }
+        if seeds.end() - seeds.start() >= MOST_SEEDS {
+            bail!("the range should have at most {MOST_SEEDS} seeds");
+        }
+        let (first, last) = (seeds.start(), seeds.end());
+        let written = if first == last { first.to_string() } else { format!("{first}..{last}") };
+        Ok(Self { all: seeds.collect(), written })
+    }
+
+    fn fresh(text: &str) -> anyhow::Result<Self> {
+        let (count, commit) = match text.split_once('@') {
+            Some((count, commit)) => (count, commit.to_owned()),
+            None => (text, current_commit()?),
+        };
+        let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MOST_SEEDS).contains(count)) else {
+            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MOST_SEEDS}");
+        };
+        let digits = commit.trim_end_matches(CHANGED);
+        let Some(hash) = digits.get(..HASH_DIGITS).and_then(|hash| u64::from_str_radix(hash, 16).ok()) else {
+            bail!("`{commit}` is no commit; write at least {HASH_DIGITS} digits of its hash");
+        };
+        let mut choice = Choice::new(hash);
+        let mut drawn = BTreeSet::new();
+        while (drawn.len() as u64) < count {
+            drawn.insert(choice.between(FRESH_SEEDS[0], FRESH_SEEDS[1]) as u64);
+        }
+        let written = format!("{FRESH}{count}@{commit}");
+        Ok(Self { all: drawn.into_iter().collect(), written })
+    }
+
+    /// In order.
+    pub fn iter(&self) -> impl Iterator<Item = u64> + Clone + use<> {
+        self.all.clone().into_iter()
+    }
+
+    /// As it is given on the command line; fresh seeds with the commit that drew them.
+    pub fn written(&self) -> &str {
+        &self.written
+    }
+}
+
+/// The hash of the commit that the files around are of, marked where they differ from it.
+fn current_commit() -> anyhow::Result<String> {
+    let git = |arguments: &[&str]| {
+        let said = Command::new("git").args(arguments).output().ok().filter(|said| said.status.success());
+        said.and_then(|said| String::from_utf8(said.stdout).ok()).ok_or_else(|| {
+            anyhow!(
+                "fresh seeds are drawn from the commit, and git names none here: run inside the repository, or name \
+                 the commit, as fresh:64@5731edca1f20"
+            )
+        })
+    };
+    let mut commit = git(&["rev-parse", "HEAD"])?;
+    commit.truncate(HASH_DIGITS);
+    if !git(&["status", "--porcelain", "--untracked-files=no"])?.trim().is_empty() {
+        eprintln!("the files differ from commit {commit}: these figures are not those of the commit");
+        commit += CHANGED;
+    }
+    Ok(commit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seeds(text: &str) -> Vec<u64> {
+        Seeds::parse(text).unwrap().iter().collect()
+    }
+
+    #[test]
+    fn a_range_has_both_ends() {
+        assert_eq!(seeds("7"), [7]);
+        assert_eq!(seeds("1..3"), [1, 2, 3]);
+        assert_eq!(seeds("1..=3"), [1, 2, 3]);
+        assert_eq!(Seeds::parse("1..100").unwrap().written(), "1..100");
+    }
+
+    #[test]
+    fn a_commit_draws_the_same_seeds_for_ever_and_another_commit_draws_others() {
+        let of_commit = seeds("fresh:64@5731edca1f20");
+        assert_eq!(of_commit.len(), 64);
+        assert_eq!(of_commit, seeds("fresh:64@5731edca1f20+changes"));
+        assert!(of_commit.iter().all(|seed| (1_000_000..10_000_000).contains(seed)), "{of_commit:?}");
+        assert!(seeds("fresh:64@c6ca86b00000").iter().all(|seed| !of_commit.contains(seed)));
+        assert_eq!(Seeds::parse("fresh:2@5731edca1f20").unwrap().written(), "fresh:2@5731edca1f20");
+    }
+
+    #[test]
+    fn what_is_no_seed_is_said_with_what_would_be_right() {
+        let refusal = |text| Seeds::parse(text).unwrap_err().to_string();
+        assert!(refusal("x..3").starts_with("`x` is no seed"));
+        assert_eq!(refusal("9..1"), "the range ends before it begins; it should be 1..9");
+        assert!(refusal("0..18446744073709551615").contains("at most 100000 seeds"));
+        assert!(refusal("fresh:many@5731edca1f20").contains("write fresh:64"));
+        assert!(refusal("fresh:64@main").contains("at least 12 digits"));
+    }
+}

@@ -1,0 +1,139 @@
+//! The table of how trains fare in traffic: for people, for the documentation, and for machines.
+
+use std::io::{self, Write};
+
+use footplate_sim::MishapKind;
+use serde_json::{Value, json};
+
+use super::session::Tally;
+use crate::written_scores::{Rate, WrittenScores};
+
+const HEAD: &str = "\
+# How several trains fare on one layout
+
+Random simulated trains, each calibrated from nothing while the others were lifted, then sent to one random place after the
+other: a contact and an offset past it, from whichever side. Contacts are missed, stick and close by themselves, turnouts
+fail, at the rates of a well-kept laboratory. The simulator's truth is used for these figures alone.
+";
+
+const LEGEND: &str = "\
+*Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted, of
+which one in a thousand may end beyond its track as it was reserved.
+*Waited* is from the order until the way was set, *took* until arrival (mean). *Nowhere* is the longest time that a train
+came to no destination. *Mistaken*: of all rests past a contact those at which the train stood further than four standard
+deviations from where it was believed to. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
+near to the end of a track, for which another was drawn. *By blocks*: the same trains, ways and stops, but whatever lies
+between contacts is reserved as a whole, with all its turnouts, as block systems do.
+";
+
+/// No train should come to no destination for longer than this (s).
+const LONGEST_NOWHERE_S: f64 = 900.0;
+
+/// All that was scored.
+pub struct Page<'r> {
+    /// What every seed came to.
+    pub tallies: &'r [Tally],
+    /// The same seeds with whole blocks reserved, if that was asked for.
+    pub by_blocks: &'r [Tally],
+    /// What was asked for, as on the command line.
+    pub asked: String,
+}
+
+impl WrittenScores for Page<'_> {
+    const SCORER: &'static str = "traffic";
+
+    fn head(&self) -> String {
+        format!("{HEAD}\nMade by `footplate simulate traffic {}`.\n\n{LEGEND}", self.asked)
+    }
+
+    fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(
+            output,
+            "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
+             collisions | derailments | overruns | intrusions | mistaken | wrong legs | lost | hands | no way |\n\
+             | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
+             ---: | ---: | ---: |"
+        )?;
+        for tally in self.tallies {
+            row(output, &tally.seed.to_string(), &[tally])?;
+        }
+        if self.tallies.len() > 1 {
+            row(output, "all", &self.tallies.iter().collect::<Vec<_>>())?;
+        }
+        if self.by_blocks.is_empty() {
+            return Ok(());
+        }
+        row(output, "all, by blocks", &self.by_blocks.iter().collect::<Vec<_>>())
+    }
+
+    fn write_json(&self, output: &mut dyn Write) -> io::Result<()> {
+        writeln!(output, "{}", json!({ "seeds": seeds(self.tallies), "by_blocks": seeds(self.by_blocks) }))
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let mishaps = self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()).count();
+        let sum = |of: fn(&Tally) -> usize| self.tallies.iter().map(of).sum::<usize>();
+        let runs = sum(|tally| tally.routes as usize + tally.turns);
+        let stuck = self.tallies.iter().filter(|tally| tally.starved > LONGEST_NOWHERE_S).count();
+        vec![
+            Rate::grief(mishaps, self.tallies.len()),
+            Rate::new("runs onto track of others", sum(|tally| tally.intrusions.len()), runs),
+            Rate::new("sessions with a train nowhere for more than 900 s", stuck, self.tallies.len()),
+            Rate::new("trains lost that needed a person", sum(|tally| tally.hands as usize), runs),
+        ]
+    }
+}
+
+/// What is to be said of each seed.
+fn seeds(tallies: &[Tally]) -> Value {
+    let one = |tally: &Tally| {
+        json!({
+                "seed": tally.seed, "hours": tally.hours, "trains": tally.trains, "arrivals": tally.arrivals,
+                "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
+                "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
+                "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost,
+                "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
+                "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
+                    .collect::<Vec<Value>>(),
+                "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
+        })
+    };
+    tallies.iter().map(one).collect()
+}
+
+fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()> {
+    let sum = |of: fn(&Tally) -> usize| tallies.iter().map(|tally| of(tally)).sum::<usize>();
+    let train_hours: f64 = tallies.iter().map(|tally| tally.hours * tally.trains as f64).sum();
+    let arrivals = sum(|tally| tally.arrivals as usize);
+    let longest = tallies.iter().map(|tally| tally.starved).fold(0.0, f64::max);
+    let mean = |of: fn(&Tally) -> &Vec<f64>| {
+        let all = || tallies.iter().flat_map(|tally| of(tally));
+        all().sum::<f64>() / all().count().max(1) as f64
+    };
+    writeln!(
+        output,
+        "| {name} | {:.1} | {arrivals} | {:.1} | {:.1} | {:.1} | {longest:.0} | {} | {} | {} | {} | {} | {} | \
+         {} of {} | {} | {} | {} | {} |",
+        tallies.iter().map(|tally| tally.hours).sum::<f64>(),
+        arrivals as f64 / train_hours.max(1e-9),
+        mean(|tally| &tally.waits),
+        mean(|tally| &tally.took),
+        sum(|tally| tally.routes as usize + tally.turns),
+        sum(|tally| tally.aside as usize),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Collision { .. })) / 2),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Derailment { .. }))),
+        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Overrun))),
+        sum(|tally| tally.intrusions.len()),
+        sum(|tally| tally.mistaken as usize),
+        sum(|tally| tally.beliefs as usize),
+        sum(|tally| tally.diverged as usize),
+        sum(|tally| tally.lost as usize),
+        sum(|tally| tally.hands as usize),
+        sum(|tally| tally.refused.values().sum::<u32>() as usize),
+    )
+}
+
+/// How many mishaps are of a kind; every collision has two entries.
+fn mishaps(tally: &Tally, is: fn(MishapKind) -> bool) -> usize {
+    tally.mishaps.iter().filter(|mishap| is(mishap.kind)).count()
+}

@@ -1,0 +1,381 @@
+//! Some hours of traffic on one simulated layout, watched by its truth.
+
+use std::collections::BTreeMap;
+
+use anyhow::bail;
+use footplate_core::control::{
+    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
+};
+use footplate_core::track::{Landmark, Layout, Position};
+use footplate_core::tracking::WayPoint;
+use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
+use footplate_sim::{LivingSwitches, Mishap};
+
+use crate::choice::Choice;
+use crate::rehearsal::Rehearsal;
+
+/// How often the truth is compared with what trains hold.
+const LOOK: TimeSpan = TimeSpan::from_ms(50);
+/// Rounding of places that are told in true lengths and in surveyed ones.
+const ROUNDING: Length = Length::from_mm(1.0);
+/// What a person measured of the engines: the longer overhang and the pickup, rounded up to a centimetre.
+const LENGTHS: TrainLengths =
+    TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
+/// How well a person reads off where a train stands.
+const HAND: Length = Length::from_mm(12.0);
+/// No train should be further from where it is believed to stand, in standard deviations: one time in 15 000.
+const CERTAIN: f64 = 4.0;
+/// Who is so far from where it is believed to stand was counted from a contact that it passed the other way.
+const FAR: Length = Length::from_mm(1_000.0);
+/// A person comes to the help of a lost train after this long.
+const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
+/// Where trains stand past a contact in the beginning.
+const PAST: Length = Length::from_mm(150.0);
+/// Places tried for a train in the beginning.
+const TRIES: usize = 1_000;
+
+/// What is asked of a session.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked {
+    /// How many trains.
+    pub trains: usize,
+    /// Track time.
+    pub time: TimeSpan,
+    /// Track time that the calibration of each train may take.
+    pub budget: TimeSpan,
+    /// Whether the track between contacts is reserved as a whole.
+    pub by_blocks: bool,
+}
+
+/// What came of one.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// The seed.
+    pub seed: u64,
+    /// Track time, in hours.
+    pub hours: f64,
+    /// How many trains.
+    pub trains: usize,
+    /// Destinations reached.
+    pub arrivals: u32,
+    /// Destinations to which there is no way, and orders that were given up.
+    pub refused: BTreeMap<String, u32>,
+    /// Grants that the driver could not run and that were taken back.
+    pub withdrawn: BTreeMap<String, u32>,
+    /// Routes that were set, and reversals on them.
+    pub routes: u32,
+    /// Reversals on these routes.
+    pub turns: usize,
+    /// Trains sent out of the way of others.
+    pub aside: u32,
+    /// Trains at rest in each other's way.
+    pub deadlocks: u32,
+    /// Trains that were elsewhere than they should be.
+    pub diverged: u32,
+    /// Trains whose position became unknown.
+    pub lost: u32,
+    /// Interventions of a person.
+    pub hands: u32,
+    /// Trains that touched, derailed or ran off the track.
+    pub mishaps: Vec<Mishap>,
+    /// Times that a train came to be on track that it did not hold.
+    pub intrusions: Vec<(Timestamp, TrainId)>,
+    /// How long trains waited for their routes, in s.
+    pub waits: Vec<f64>,
+    /// How long journeys took, in s.
+    pub took: Vec<f64>,
+    /// The longest time that a train came nowhere, in s.
+    pub starved: f64,
+    /// Rests past a contact, and those at which a train was further from where it was believed than ever should be.
+    pub beliefs: u32,
+    /// Of these, those that were wrong.
+    pub mistaken: u32,
+    /// Errors of arrivals as believed, in mm.
+    pub errors: Vec<f64>,
+}
+
+/// Some hours of traffic.
+pub struct Session<'l> {
+    layout: &'l Layout,
+    rehearsal: Rehearsal<'l>,
+    dispatcher: Dispatcher,
+    choice: Choice,
+    tally: Tally,
+    trains: Vec<TrainId>,
+    is_inside: BTreeMap<TrainId, bool>,
+    /// Since when each train has been on its way to nowhere.
+    since: BTreeMap<TrainId, Timestamp>,
+    waits: BTreeMap<TrainId, Timestamp>,
+    lost: BTreeMap<TrainId, Timestamp>,
+    talk: bool,
+}
+
+impl<'l> Session<'l> {
+    /// Draws trains and rails from the seed, and calibrates the trains; `talk` prints everything that happens.
+    ///
+    /// # Errors
+    /// When there is no room for the trains.
+    pub fn new(layout: &'l Layout, seed: u64, asked: Asked, talk: bool) -> anyhow::Result<Self> {
+        let trains: Vec<TrainId> =
+            [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
+        let switches = LivingSwitches::well_kept();
+        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut choice = Choice::new(seed);
+        let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+        for nth in 0..trains.len() {
+            let mut is_put = false;
+            for _ in 0..TRIES {
+                let Some(node) = choice.of(&sensors) else { break };
+                if rehearsal.put(trains[nth], *node, PAST).is_err() {
+                    continue;
+                }
+                let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
+                let holds = |train: &TrainId| dispatcher.holds(*train);
+                let is_apart = trains[..nth].iter().all(|other| {
+                    holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
+                });
+                let is_off_turnouts =
+                    holds(&trains[nth]).is_some_and(|held| held.turnouts().next().is_none());
+                // Hardly a block has none.
+                if is_apart && (is_off_turnouts || asked.by_blocks) {
+                    is_put = true;
+                    break;
+                }
+            }
+            if !is_put {
+                bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
+            }
+        }
+        let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
+        let began = rehearsal.line.now();
+        let tally =
+            Tally { seed, trains: trains.len(), hours: asked.time.as_s() / 3600.0, ..Tally::default() };
+        Ok(Self {
+            layout,
+            rehearsal,
+            dispatcher,
+            choice,
+            tally,
+            is_inside: trains.iter().map(|train| (*train, true)).collect(),
+            since: trains.iter().map(|train| (*train, began)).collect(),
+            trains,
+            waits: BTreeMap::new(),
+            lost: BTreeMap::new(),
+            talk,
+        })
+    }
+
+    /// Runs for so long.
+    pub fn run(mut self, time: TimeSpan) -> Tally {
+        let began = self.rehearsal.line.now();
+        let end = began + time;
+        let before = self.rehearsal.world().mishaps().len();
+        for train in self.trains.clone() {
+            self.send(train);
+        }
+        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
+            let until = end.min(self.rehearsal.line.now() + LOOK);
+            let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
+            match notice {
+                Some(notice) => self.hear(&notice),
+                None => self.look(),
+            }
+        }
+        let now = self.rehearsal.line.now();
+        self.tally.hours = (now - began).as_s() / 3600.0;
+        for train in self.trains.clone() {
+            self.came_somewhere(train, now);
+        }
+        self.tally.mishaps = self.rehearsal.world().mishaps().iter().skip(before).copied().collect();
+        for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
+            eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
+        }
+        self.trains.iter().filter(|_| self.talk).for_each(|train| self.tell_truth(*train));
+        self.tally
+    }
+
+    fn hear(&mut self, notice: &DispatchNotice) {
+        let now = self.rehearsal.line.now();
+        if self.talk && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_))) {
+            eprintln!("{:9.2} {notice:?}", now.as_s());
+        }
+        match notice {
+            DispatchNotice::Arrived { train, error, took, .. } => {
+                self.tally.arrivals += 1;
+                self.tally.took.push(took.as_s());
+                self.tally.errors.extend(error.map(Length::as_mm));
+                self.came_somewhere(*train, now);
+                self.send(*train);
+            }
+            DispatchNotice::Drive(DriveNotice::GivenUp { train, why, .. })
+                if self.dispatcher.journey(*train).is_none() =>
+            {
+                *self.tally.refused.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
+                self.send(*train);
+            }
+            DispatchNotice::RouteSet { train, turns, .. } => {
+                self.tally.routes += 1;
+                self.tally.turns += turns;
+                if let Some(since) = self.waits.remove(train) {
+                    self.tally.waits.push((now - since).as_s());
+                }
+            }
+            DispatchNotice::Withdrawn { train, why } => {
+                if self.talk {
+                    self.tell_truth(*train);
+                }
+                *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
+            }
+            DispatchNotice::Drive(DriveNotice::Done(finished)) => self.check_belief(finished),
+            DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
+            DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
+            DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
+            DispatchNotice::HeldAsUnknown { train } => {
+                self.tally.lost += 1;
+                self.lost.insert(*train, now);
+            }
+            _ => {}
+        }
+    }
+
+    fn came_somewhere(&mut self, train: TrainId, now: Timestamp) {
+        if let Some(since) = self.since.insert(train, now) {
+            self.tally.starved = self.tally.starved.max((now - since).as_s());
+        }
+    }
+
+    /// Sends a train to a random place.
+    fn send(&mut self, train: TrainId) {
+        let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
+        for _ in 0..TRIES {
+            let Some(node) = self.choice.of(&sensors).copied() else { return };
+            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let offset =
+                Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
+            let journey = Journey::to(Landmark { node, offset });
+            let now = self.rehearsal.line.now();
+            if self.dispatcher.go(now, train, journey).is_ok() {
+                self.waits.insert(train, now);
+                return;
+            }
+        }
+    }
+
+    /// Compares what trains are on with what they hold, and helps those that are lost.
+    fn look(&mut self) {
+        let now = self.rehearsal.line.now();
+        for train in self.trains.clone() {
+            let is_inside = self.is_inside(train);
+            if let Some(was) = self.is_inside.insert(train, is_inside)
+                && was
+                && !is_inside
+            {
+                self.tally.intrusions.push((now, train));
+                if self.talk {
+                    eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
+                    self.tell_truth(train);
+                }
+            }
+            if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
+                self.help(train, now);
+            }
+        }
+    }
+
+    fn is_inside(&self, train: TrainId) -> bool {
+        let truth = self.rehearsal.world().truth();
+        let Some(held) = self.dispatcher.holds(train) else { return false };
+        truth.under(train).all(|(id, part)| {
+            let Some(edge) = self.layout.edge(id) else { return false };
+            let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);
+            let [from, to] = part.map(|at| at * scale);
+            let span = if id < id.twin() {
+                Span { from, to }
+            } else {
+                Span { from: edge.length - to, to: edge.length - from }
+            };
+            held.covers(id.stretch(), span, ROUNDING)
+        })
+    }
+
+    /// Compares where a train stands with where it is believed to.
+    fn check_belief(&mut self, finished: &Finished) {
+        let truth = self.rehearsal.world().truth();
+        let Some(achieved) = finished.achieved else { return };
+        let sensor = self.layout.sensor_at(achieved.at.node);
+        let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
+        let error = past - achieved.at.offset;
+        // Who has turned around since did not come from that contact.
+        if error.abs() > FAR {
+            return;
+        }
+        let sigmas = error / achieved.uncertainty;
+        self.tally.beliefs += 1;
+        if sigmas.abs() > CERTAIN {
+            self.tally.mistaken += 1;
+            if self.talk {
+                let (train, mm) = (finished.train, error.as_mm());
+                eprintln!("{:9.2} train {train} is {mm:.0} mm ({sigmas:.1} sd) beyond", finished.time.as_s());
+            }
+        }
+    }
+
+    /// What a train and the turnouts really do, where that is not what is believed.
+    fn tell_truth(&self, train: TrainId) {
+        let (truth, driver) = (self.rehearsal.world().truth(), self.dispatcher.driver());
+        let name = |edge| {
+            let edge = self.layout.edge(edge)?;
+            Some([edge.from, edge.to].map(|node| self.layout.node_name(node)).join(" to "))
+        };
+        let place = |place: Position| {
+            format!("{:.0} mm from {}", place.offset.as_mm(), name(place.edge).unwrap_or_default())
+        };
+        let really = truth.train(train).and_then(|train| train.position).map(place);
+        let believed = driver.position(train, self.rehearsal.line.now()).map(place);
+        let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
+        let journey = journey.map(|to| to.to_string());
+        eprintln!("          {train} wants to {journey:?}, is really {really:?}, believed {believed:?}");
+        let under = driver.turnouts_under(train, self.rehearsal.line.now()).into_iter();
+        let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
+        eprintln!("          on turnouts {under:?}");
+        for (turnout, _) in self.layout.turnouts() {
+            let (lies, known) = (self.rehearsal.world().lies(turnout), driver.turnouts().get(turnout));
+            if lies != known {
+                eprintln!("          turnout {turnout} lies {lies:?}, believed {known:?}");
+            }
+        }
+    }
+
+    /// A person reads off where a train stands.
+    fn help(&mut self, train: TrainId, now: Timestamp) {
+        self.lost.remove(&train);
+        if self.dispatcher.driver().position(train, now).is_some() {
+            return;
+        }
+        let truth = self.rehearsal.world().truth();
+        let Some(position) = truth.train(train).and_then(|truth| truth.position) else { return };
+        let Some(edge) = self.layout.edge(position.edge) else { return };
+        let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
+        self.tally.hands += 1;
+        let at = WayPoint { node: edge.from, way: position.offset * scale };
+        self.dispatcher.place(now, train, at, HAND);
+    }
+}
+
+fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
+    let now = rehearsal.line.now();
+    let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    if by_blocks {
+        dispatcher.reserve_blocks();
+    }
+    let trains: Vec<TrainId> = dispatcher.driver().trains().collect();
+    for train in trains {
+        dispatcher.set_lengths(now, train, LENGTHS);
+    }
+    dispatcher
+}
+
+/// The name of what was refused, without its numbers.
+fn kind_of(refusal: &str) -> String {
+    refusal.trim_start_matches("Some(").split([' ', '(', '{']).next().unwrap_or_default().to_owned()
+}

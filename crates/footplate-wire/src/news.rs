@@ -1,0 +1,22 @@
+//! What a watchdog wants to know of all that is heard of a line.
+
+use footplate_core::control::LinkNews;
+
+use crate::session::LinkNotice;
+
+impl LinkNotice {
+    /// Whether the station has fallen silent or answers again, or which train may face either way; most of what is heard
+    /// says nothing of the kind.
+    #[must_use]
+    pub const fn news(&self) -> Option<LinkNews> {
+        match self {
+            // After a reset, too, it is not known what of the last commands was heard; it answers when it has been asked everything.
+            Self::Silent { .. } | Self::NotReady { .. } | Self::Restarted => Some(LinkNews::Silent),
+            Self::Answers => Some(LinkNews::Answers),
+            Self::ReverseInDoubt { train } | Self::OtherThrottle { train, reversed: true } => {
+                Some(LinkNews::ReverseInDoubt { train: *train })
+            }
+            _ => None,
+        }
+    }
+}
