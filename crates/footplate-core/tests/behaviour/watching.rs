@@ -138,7 +138,7 @@ fn dirty_wheels_are_noticed_measured_and_made_up_for() {
     watched.run(20.0);
     assert!(watched.world.trains[0].speed_mm_per_s > 100.0);
     // and stops where it should.
-    let target = watched.dog.layout().landmark("A1+150mm").expect("a place");
+    let target = watched.dog.driver().layout().landmark("A1+150mm").expect("a place");
     watched.dog.order(watched.world.now, Order::Stop(StopOrder::at(FIRST, target))).expect("ahead");
     watched.run(60.0);
     assert!(watched.world.beyond_mm("A1+150mm").abs() < 60.0, "{}", watched.world.beyond_mm("A1+150mm"));
@@ -216,7 +216,7 @@ fn the_power_goes_off_when_a_train_does_not_stop() {
     watched.go(FIRST, 0);
     watched.run(6.0);
     // It should stand, and the contact ahead of it closes.
-    let ahead = watched.dog.contact_ahead(FIRST, watched.world.now).expect("a contact");
+    let ahead = watched.dog.driver().contact_ahead(FIRST, watched.world.now).expect("a contact");
     watched.world.close(ahead);
     watched.run(0.2);
     assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));
@@ -276,7 +276,7 @@ fn a_train_that_is_alone_and_could_not_be_brought_back_is_found_by_letting_it_ru
     watched.go(FIRST, 8);
     watched.run(12.0);
     assert!(!watched.dog.is_held(FIRST));
-    let believed = watched.dog.position(FIRST, watched.world.now).expect("it is located");
+    let believed = watched.dog.driver().position(FIRST, watched.world.now).expect("it is located");
     let truth = watched.world.train().at;
     assert_eq!(believed.edge, truth.edge);
     let off = (believed.offset - truth.offset).as_mm();

@@ -164,11 +164,11 @@ impl<'l> Scene<'l> {
 
     /// One stop somewhere ahead: how far beyond it the train came to rest, in mm.
     fn stop(&mut self) -> Option<f64> {
-        let located = self.watchdog.locate(TRAIN, self.now())?;
+        let located = self.watchdog.driver().locate(TRAIN, self.now())?;
         let mut ahead: Vec<(NodeId, Length)> = Vec::new();
         let mut node = located.at.node;
         for _ in 0..12 {
-            let hop = self.layout.open_hops_from(node, self.watchdog.turnouts()).next()?;
+            let hop = self.layout.open_hops_from(node, self.watchdog.driver().turnouts()).next()?;
             hop.sensor?;
             ahead.push((hop.from, hop.length));
             node = hop.to;

@@ -43,8 +43,8 @@ impl Dispatcher {
     /// A train that was driven by hand and stands, with nothing more to do, holds no more than where it stands; whether it
     /// does.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
-        let is_done = self.driver.stands(id, now) && self.driver.busy(id).is_none();
-        let is_known = self.driver.locate(id, now).is_some();
+        let is_done = self.watchdog.driver().stands(id, now) && self.watchdog.driver().busy(id).is_none();
+        let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
             self.halted(now, id, true);
         }
@@ -60,22 +60,31 @@ impl Dispatcher {
     /// Takes more of the track ahead, and lets go of what is behind.
     pub(super) fn drive_by_hand(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
-        let (Some(place), Some(located)) = (self.driver.position(id, now), self.driver.locate(id, now))
+        let (Some(place), Some(located)) =
+            (self.watchdog.driver().position(id, now), self.watchdog.driver().locate(id, now))
         else {
             return;
         };
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let room = self.room(now, train);
-        let ahead = self.driver.rest_if_stopped(id, now + TOLD_AFTER).map_or(AHEAD[1], |rest| {
+        let ahead = self.watchdog.driver().rest_if_stopped(id, now + TOLD_AFTER).map_or(AHEAD[1], |rest| {
             let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
-        let (way, at) =
-            Way::around(layout, self.driver.turnouts(), place, &train.came, room.behind, ahead + room.ahead);
+        let (way, at) = Way::around(
+            layout,
+            self.watchdog.driver().turnouts(),
+            place,
+            &train.came,
+            room.behind,
+            ahead + room.ahead,
+        );
         // Who follows another train shares its track, and that of whom it follows in turn: the driver keeps gaps safe.
         let mut row = alloc::vec![id];
-        while let Some(leader) =
-            row.last().and_then(|last| self.driver.leader(*last)).filter(|leader| !row.contains(leader))
+        while let Some(leader) = row
+            .last()
+            .and_then(|last| self.watchdog.driver().leader(*last))
+            .filter(|leader| !row.contains(leader))
         {
             row.push(leader);
         }
@@ -91,21 +100,22 @@ impl Dispatcher {
         let end = end.max(at);
         if !is_free(end) {
             // Not even where it stands: it keeps what it held, and stays.
-            self.driver.set_limit(now, id, Some(located.at));
+            self.watchdog.set_limit(now, id, Some(located.at));
             return;
         }
         let mut held = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
-        if self.driver.is_in_doubt(id) {
+        if self.watchdog.driver().is_in_doubt(id) {
             held.add(layout, &train.held);
         }
         // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:
         // whoever drives by hand sees it.
         let limit = (end < reach).then(|| {
-            let limit = way.place(end).and_then(|place| self.driver.way_point(id, located.at.node, place));
+            let limit =
+                way.place(end).and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
             limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
         });
-        self.driver.set_limit(now, id, limit);
+        self.watchdog.set_limit(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

@@ -57,15 +57,16 @@ impl Dispatcher {
         let crawlers: Vec<TrainId> = self.crawlers.iter().copied().collect();
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
-            let moves =
-                |other: &TrainId| !self.driver.is_in_danger(*other) && !self.driver.stands(*other, now);
+            let moves = |other: &TrainId| {
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+            };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);
                 let free = self.all_that_is_free(id);
                 if let Some(train) = self.trains.get_mut(&id) {
                     train.held = free;
                 }
-                self.driver.permit(now, id);
+                self.watchdog.permit(now, id);
                 is_let = true;
             }
         }
@@ -74,7 +75,7 @@ impl Dispatcher {
 
     /// All that nobody else holds: a train that is let crawl may come onto any of it, and nobody else sets out.
     fn all_that_is_free(&self, id: TrainId) -> Reservation {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let others = || self.trains.values().filter(|other| other.id != id);
         let mut free = Reservation::empty();
         for (edge, known) in layout.edges().filter(|(edge, _)| *edge < edge.twin()) {

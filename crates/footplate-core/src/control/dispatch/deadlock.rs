@@ -199,11 +199,11 @@ impl Dispatcher {
     }
 
     fn both_ways(&self, place: Position) -> Vec<Position> {
-        [Some(place), self.driver.layout().reversed(place)].into_iter().flatten().collect()
+        [Some(place), self.watchdog.driver().layout().reversed(place)].into_iter().flatten().collect()
     }
 
     fn node_before(&self, place: Position) -> crate::ids::NodeId {
-        self.driver.layout().edge(place.edge).map_or(crate::ids::NodeId(0), |edge| edge.from)
+        self.watchdog.driver().layout().edge(place.edge).map_or(crate::ids::NodeId(0), |edge| edge.from)
     }
 
     /// Moves after which a train has a free way.
@@ -217,11 +217,11 @@ impl Dispatcher {
     ) -> Option<Vec<(TrainId, Position)>> {
         let resting = self.trains.values().filter(|train| train.rests());
         let standers = resting.filter_map(|train| {
-            let place = self.driver.position(train.id, now)?;
+            let place = self.watchdog.driver().position(train.id, now)?;
             Some(Stander { id: train.id, place, held: train.held.clone() })
         });
         let mut fixed = Obstacles::default();
-        let is_placed = |train: &DispatchedTrain| self.driver.position(train.id, now).is_some();
+        let is_placed = |train: &DispatchedTrain| self.watchdog.driver().position(train.id, now).is_some();
         let moving = || self.trains.values().filter(|train| !train.rests() || !is_placed(train));
         moving().for_each(|train| fixed.add(&train.held, f64::INFINITY));
         let is_fixed_free = |taken: &Reservation| moving().all(|train| !train.held.meets(taken));
@@ -288,7 +288,7 @@ impl Dispatcher {
         let others = || scene.standers.iter().filter(|other| other.id != mover.id);
         others().for_each(|other| obstacles.add(&other.held, f64::INFINITY));
         let reached = self.search(&start, &obstacles).from(Some(start.place), self.turned(&start));
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
         let room = ClearanceEnvelope::of(train.lengths, PARKED, start.room.overrun);
         let room = ClearanceEnvelope { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
@@ -300,7 +300,7 @@ impl Dispatcher {
             let Some(seconds) = soonest else { continue };
             let held = self.reserved(standing(
                 layout,
-                self.driver.turnouts(),
+                self.watchdog.driver().turnouts(),
                 place,
                 &OccupiedPath::default(),
                 room,
@@ -350,7 +350,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
-        let turned = self.driver.turned_place_at(stander.place);
+        let turned = self.watchdog.driver().turned_place_at(stander.place);
         Some(Start {
             place: stander.place,
             room,

@@ -35,7 +35,7 @@ const MOST_ROUNDS: usize = 50;
 /// Keeps trains apart, and sends them on their ways.
 #[derive(Debug, Clone)]
 pub struct Dispatcher {
-    pub(super) driver: Watchdog,
+    pub(super) watchdog: Watchdog,
     /// Trains that were in danger and wait to be let crawl.
     pub(super) crawlers: BTreeSet<TrainId>,
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
@@ -73,13 +73,14 @@ impl Dispatcher {
         Self::over(now, watchdog)
     }
 
-    fn over(now: Timestamp, driver: Watchdog) -> Self {
-        let layout = driver.layout();
-        let lies = |turnout| Some((turnout, TurnoutCommand::sure(now, driver.turnouts().get(turnout)?)));
+    fn over(now: Timestamp, watchdog: Watchdog) -> Self {
+        let layout = watchdog.driver().layout();
+        let lies =
+            |turnout| Some((turnout, TurnoutCommand::sure(now, watchdog.driver().turnouts().get(turnout)?)));
         let commanded = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
-        let ids: Vec<TrainId> = driver.trains().collect();
+        let ids: Vec<TrainId> = watchdog.driver().trains().collect();
         let mut dispatcher = Self {
-            driver,
+            watchdog,
             crawlers: BTreeSet::new(),
             trains: BTreeMap::new(),
             commanded,
@@ -100,11 +101,11 @@ impl Dispatcher {
 
     /// Says how long a train is. Until then it is taken for a long locomotive.
     pub fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
-        self.driver.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
+        self.watchdog.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
         let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
         known.lengths = lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, Length::ZERO);
-        let places = parking_places(self.driver.layout(), room);
+        let places = parking_places(self.watchdog.driver().layout(), room);
         if let Some(known) = self.trains.get_mut(&train) {
             known.parking = places;
         }
@@ -116,7 +117,7 @@ impl Dispatcher {
     /// Takes the track between contacts as a whole from now on, with all turnouts there, as block systems do. Without this,
     /// and better, trains take what they need to the millimetre.
     pub fn reserve_blocks(&mut self) {
-        self.blocks = Some(Blocks::of(self.driver.layout()));
+        self.blocks = Some(Blocks::of(self.watchdog.driver().layout()));
     }
 
     /// Whether no other train holds any of what a train would take.
@@ -127,21 +128,21 @@ impl Dispatcher {
     /// What is taken for a train that needs this.
     pub(super) fn reserved(&self, needed: Reservation) -> Reservation {
         match &self.blocks {
-            Some(blocks) => blocks.around(self.driver.layout(), &needed),
+            Some(blocks) => blocks.around(self.watchdog.driver().layout(), &needed),
             None => needed,
         }
     }
 
     /// What drives the trains.
     #[must_use]
-    pub fn driver(&self) -> &Driver {
-        &self.driver
+    pub const fn driver(&self) -> &Driver {
+        self.watchdog.driver()
     }
 
     /// See [`Watchdog::is_interrupted`].
     #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
-        self.driver.is_interrupted(now, train)
+        self.watchdog.is_interrupted(now, train)
     }
 
     /// What a train holds: nobody else is let onto it.
@@ -158,12 +159,12 @@ impl Dispatcher {
 
     /// See [`Driver::set_model`].
     pub fn set_model(&mut self, model: MotionModel) {
-        self.driver.set_model(model);
+        self.watchdog.set_model(model);
     }
 
     /// A person put a train there, or read off where it stands.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
-        self.driver.place(now, train, at, uncertainty);
+        self.watchdog.place(now, train, at, uncertainty);
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
             known.seen_since_turn = false;
@@ -180,11 +181,13 @@ impl Dispatcher {
     /// # Errors
     /// Why it can never go there.
     pub fn go(&mut self, now: Timestamp, train: TrainId, journey: Journey) -> Result<OrderId, Refusal> {
-        let layout = self.driver.layout();
-        let place = layout.locate(journey.target, self.driver.turnouts()).map_err(Refusal::Place)?;
+        let layout = self.watchdog.driver().layout();
+        let place =
+            layout.locate(journey.target, self.watchdog.driver().turnouts()).map_err(Refusal::Place)?;
         let Some(known) = self.trains.get(&train) else { return Err(Refusal::UnknownTrain { train }) };
-        let is_nowhere =
-            |known: &DispatchedTrain| known.held.is_empty() && self.driver.locate(known.id, now).is_none();
+        let is_nowhere = |known: &DispatchedTrain| {
+            known.held.is_empty() && self.watchdog.driver().locate(known.id, now).is_none()
+        };
         if is_nowhere(known) {
             return Err(Refusal::Lost { train });
         }
@@ -192,7 +195,7 @@ impl Dispatcher {
             return Err(Refusal::OtherNowhere { train, other: other.id });
         }
         self.give_back(now, train);
-        let order = self.driver.driver_mut().number();
+        let order = self.watchdog.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
             known.asked = Some(Asked { order, journey, place, since: now, queues: now });
             known.waits_said = false;
@@ -205,13 +208,13 @@ impl Dispatcher {
 
     /// A person takes the power from the track, or gives it back; see [`Watchdog::switch_power`].
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
-        self.driver.switch_power(now, on);
+        self.watchdog.switch_power(now, on);
         self.settle(now);
     }
 
     /// What is heard of the station's line; see [`Watchdog::handle_link`].
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
-        self.driver.handle_link(now, news);
+        self.watchdog.handle_link(now, news);
         self.settle(now);
     }
 
@@ -238,7 +241,7 @@ impl Dispatcher {
         if let Some(train) = order.train() {
             self.take_over(now, train)?;
         }
-        let taken = self.driver.order(now, order);
+        let taken = self.watchdog.order(now, order);
         if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken) {
             self.note_turned(train);
         }
@@ -248,7 +251,7 @@ impl Dispatcher {
 
     /// The room that a train needs, with what is not known of its place now.
     pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> ClearanceEnvelope {
-        let located = self.driver.locate(train.id, now);
+        let located = self.watchdog.driver().locate(train.id, now);
         let uncertainty = located.map_or(Length::ZERO, |located| located.uncertainty);
         ClearanceEnvelope::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
     }
@@ -257,10 +260,11 @@ impl Dispatcher {
     pub(super) fn stand(&mut self, now: Timestamp, id: TrainId) {
         self.free_anchors(now, id);
         let Some(train) = self.trains.get(&id) else { return };
-        let Some(place) = self.driver.position(id, now) else { return };
+        let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let room = self.room(now, train);
-        let layout = self.driver.layout();
-        let mut held = self.reserved(standing(layout, self.driver.turnouts(), place, &train.came, room));
+        let layout = self.watchdog.driver().layout();
+        let mut held =
+            self.reserved(standing(layout, self.watchdog.driver().turnouts(), place, &train.came, room));
         self.take_anchors(now, id, place, &mut held);
         // What is another's is not taken for a doubt that has grown: the train is within what it held.
         let is_free = self.is_free_for(id, &held);
@@ -274,7 +278,7 @@ impl Dispatcher {
     /// A train is counted from a contact behind it: turnouts in between decide where it is, as far as is known, and are
     /// not thrown.
     pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Reservation) {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         // What was asked for it will be told, whatever it is asked to do since.
         let asked_for =
             self.throwing.iter().filter(|(_, (train, _))| *train == id).map(|(turnout, _)| *turnout);
@@ -285,22 +289,22 @@ impl Dispatcher {
 
     /// A train at rest that was seen needs no turnouts behind it but the one whose leg it stands on.
     pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
-        let Some(place) = self.driver.position(id, now) else { return };
-        let own = self.driver.layout().needs_of(place.edge).filter(|need| need.facing).count();
-        if self.driver.unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
-            self.driver.count_from_behind(now, id);
+        let Some(place) = self.watchdog.driver().position(id, now) else { return };
+        let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
+        if self.watchdog.driver().unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+            self.watchdog.count_from_behind(now, id);
         }
     }
 
     /// The turnouts from whose toes the way leads on to a train at a place, from where it is counted.
     pub(super) fn anchors(&self, now: Timestamp, id: TrainId, place: Position) -> BTreeSet<TurnoutId> {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let mut anchors = BTreeSet::new();
-        let Some(mut node) = self.driver.locate(id, now).map(|located| located.at.node) else {
+        let Some(mut node) = self.watchdog.driver().locate(id, now).map(|located| located.at.node) else {
             return anchors;
         };
         for _ in 0..layout.edges().len() {
-            let ahead = super::way::edge_from(layout, self.driver.turnouts(), node);
+            let ahead = super::way::edge_from(layout, self.watchdog.driver().turnouts(), node);
             let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { break };
             anchors.extend(layout.needs_of(edge).filter(|need| need.facing).map(|need| need.turnout));
             if edge == place.edge {
@@ -322,7 +326,7 @@ impl Dispatcher {
         }
         for _ in 0..MOST_ROUNDS {
             self.follow(now);
-            while let Some(output) = self.driver.poll_output() {
+            while let Some(output) = self.watchdog.poll_output() {
                 match output {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                     Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
@@ -338,7 +342,7 @@ impl Dispatcher {
             if self.let_crawl(now) {
                 continue;
             }
-            if core::mem::take(&mut self.is_stirred) && !self.driver.has_danger() {
+            if core::mem::take(&mut self.is_stirred) && !self.watchdog.has_danger() {
                 self.arranged = Some(now);
                 self.arrange(now);
                 continue;
@@ -354,9 +358,9 @@ impl Dispatcher {
 
     /// Takes note of how trains came to where they are.
     fn follow(&mut self, now: Timestamp) {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         for train in self.trains.values_mut() {
-            if let Some(place) = self.driver.position(train.id, now) {
+            if let Some(place) = self.watchdog.driver().position(train.id, now) {
                 train.came.follow(layout, place);
             }
         }
@@ -364,7 +368,7 @@ impl Dispatcher {
 
     /// Tells a train to stop at once.
     pub(super) fn halt(&mut self, now: Timestamp, id: TrainId) {
-        let _ = self.driver.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
+        let _ = self.watchdog.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
         self.gives_up(id);
     }
 
@@ -383,12 +387,12 @@ impl Machine for Dispatcher {
     type Notice = DispatchNotice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
-        self.driver.handle_event(now, event);
+        self.watchdog.handle_event(now, event);
         self.settle(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        self.driver.handle_timeout(now);
+        self.watchdog.handle_timeout(now);
         self.settle(now);
     }
 
@@ -397,6 +401,6 @@ impl Machine for Dispatcher {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        [self.driver.next_timeout(), self.looks_at].into_iter().flatten().min()
+        [self.watchdog.next_timeout(), self.looks_at].into_iter().flatten().min()
     }
 }

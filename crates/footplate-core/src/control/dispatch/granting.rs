@@ -110,7 +110,7 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.driver.unseen(id, now).is_none() {
+                if self.watchdog.driver().unseen(id, now).is_none() {
                     self.cannot_go(now, id, self.no_way(id));
                 } else if !self.begins_to_look_back(id) {
                     self.lose(now, id);
@@ -172,29 +172,29 @@ impl Dispatcher {
     /// The places at which a train would have arrived.
     pub(super) fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
         let asked = self.trains.get(&id)?.asked?;
-        let other = self.driver.layout().reversed(asked.place).filter(|_| !asked.journey.faces);
+        let other = self.watchdog.driver().layout().reversed(asked.place).filter(|_| !asked.journey.faces);
         Some([Some(asked.place), other].into_iter().flatten().collect())
     }
 
     /// Where a train at rest begins.
     pub(super) fn start(&self, now: Timestamp, id: TrainId) -> Option<Start> {
         let train = self.trains.get(&id)?;
-        let place = self.driver.position(id, now)?;
+        let place = self.watchdog.driver().position(id, now)?;
         let room = self.room(now, train);
         let as_it_lies = |turnout| {
-            let leg = self.driver.turnouts().get(turnout)?;
+            let leg = self.watchdog.driver().turnouts().get(turnout)?;
             Some(TurnoutNeed { turnout, leg, facing: true })
         };
-        let mut near = self.driver.turnouts_under(id, now);
+        let mut near = self.watchdog.driver().turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
         let looks_back = train.looks_back;
         if looks_back || !train.seen_since_start {
             near.extend(train.held.turnouts());
         }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let is_sure = self.driver.unseen(id, now).is_none() || looks_back;
+        let is_sure = self.watchdog.driver().unseen(id, now).is_none() || looks_back;
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.driver.turned_place(id, now).filter(|_| may_turn);
+        let turned = self.watchdog.driver().turned_place(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         let may_back_away = train.seen_since_turn;
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })
@@ -222,7 +222,8 @@ impl Dispatcher {
     }
 
     pub(super) fn proposal(&self, start: &Start, itinerary: Itinerary) -> Option<Proposal> {
-        let mut runs = granted(self.driver.layout(), self.driver.turnouts(), &itinerary, start)?;
+        let mut runs =
+            granted(self.watchdog.driver().layout(), self.watchdog.driver().turnouts(), &itinerary, start)?;
         for run in &mut runs {
             run.taken = self.reserved(core::mem::take(&mut run.taken));
         }
@@ -232,11 +233,11 @@ impl Dispatcher {
     pub(super) fn search<'a>(&'a self, start: &'a Start, obstacles: &'a Obstacles) -> Search<'a> {
         let clears = start.room.rear + start.room.overrun;
         Search {
-            layout: self.driver.layout(),
+            layout: self.watchdog.driver().layout(),
             pace: start.pace,
             clears,
             beyond: start.room.overrun + start.room.front,
-            turnouts: self.driver.turnouts(),
+            turnouts: self.watchdog.driver().turnouts(),
             obstacles,
             frozen: &start.frozen,
             points_give_way: true,
@@ -246,11 +247,11 @@ impl Dispatcher {
     /// Where the leading end of the pickup would be if the train turned around; `None` where it would back over points
     /// that lie for the other leg. They gave way when it came, and would not when it goes.
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let turned = start.turned?;
         let (way, at) = Way::around(
             layout,
-            self.driver.turnouts(),
+            self.watchdog.driver().turnouts(),
             turned,
             &OccupiedPath::default(),
             start.room.behind,
@@ -319,7 +320,7 @@ impl Dispatcher {
     }
 
     pub(super) fn no_way(&self, id: TrainId) -> Refusal {
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let display = |landmark: Landmark| alloc::format!("{}", layout.display(landmark));
         let target = self.journey(id).map_or_else(Default::default, |(_, journey)| display(journey.target));
         Refusal::Unreachable { train: id, target }
@@ -329,7 +330,7 @@ impl Dispatcher {
     /// The place is no surer then than now if no contact comes on the way.
     pub(super) fn overrun(&self, id: TrainId, uncertainty: Length) -> Length {
         let place = PLACE.max(uncertainty).as_m();
-        let widest = self.driver.widest_stop(id);
+        let widest = self.watchdog.driver().widest_stop(id);
         let widest = widest.map(|widest| Length::from_m(libm::hypot(widest.as_m(), place)));
         let usual = widest.map_or(OVERRUNS[1], |widest| (widest * OVERRUN).max(OVERRUNS[0]).min(OVERRUNS[1]));
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
@@ -343,7 +344,7 @@ impl Dispatcher {
         way: Length,
         is_sure: impl Fn(Length) -> bool,
     ) -> Option<SpeedStep> {
-        let model = self.driver.model(id)?;
+        let model = self.watchdog.driver().model(id)?;
         let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
         let lively = || steps(model).filter(|step| speed(*step) >= CRAWL && speed(*step) <= FASTEST);
         let spread = |step: SpeedStep| {
@@ -360,7 +361,7 @@ impl Dispatcher {
 
     /// How long a train takes for what.
     fn pace(&self, id: TrainId) -> Pace {
-        let Some(model) = self.driver.model(id) else {
+        let Some(model) = self.watchdog.driver().model(id) else {
             return Pace { cruise: SLOWEST, start_s: 1.0, stop_s: 1.0, turn_s: TURN_S };
         };
         // Stops are surest from the middle of the steps.

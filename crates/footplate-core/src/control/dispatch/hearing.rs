@@ -25,7 +25,7 @@ impl Dispatcher {
             DriveNotice::Thrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
             DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
                 self.turnout_shown(now, *turnout, *curved);
-                if !self.driver.is_in_danger(*train) {
+                if !self.watchdog.is_in_danger(*train) {
                     self.diverged(now, *train);
                 }
             }
@@ -34,7 +34,7 @@ impl Dispatcher {
                     train.seen_since_turn = true;
                     train.seen_since_start = true;
                 }
-                let node = self.driver.layout().sensor_node(passed.sensor);
+                let node = self.watchdog.driver().layout().sensor_node(passed.sensor);
                 let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));
                 let state = self.trains.get(train).map(|train| train.state);
                 let has_strayed = matches!(state, Some(State::Halting { strayed: true, .. }));
@@ -87,7 +87,7 @@ impl Dispatcher {
     /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
-        if self.driver.unseen(id, now).is_none()
+        if self.watchdog.driver().unseen(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();
@@ -105,14 +105,15 @@ impl Dispatcher {
     fn diverged(&mut self, now: Timestamp, id: TrainId) {
         self.halt(now, id);
         let Some(train) = self.trains.get(&id) else { return };
-        let Some(place) = self.driver.position(id, now) else { return };
+        let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let room = self.room(now, train);
-        let layout = self.driver.layout();
-        let rest = self.driver.rest_if_stopped(id, now + TimeSpan::from_ms(100));
-        let located = self.driver.locate(id, now);
+        let layout = self.watchdog.driver().layout();
+        let rest = self.watchdog.driver().rest_if_stopped(id, now + TimeSpan::from_ms(100));
+        let located = self.watchdog.driver().locate(id, now);
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
-        let (way, at) = Way::around(layout, self.driver.turnouts(), place, &train.came, room.behind, ahead);
+        let (way, at) =
+            Way::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
         let taken = self.reserved(way.reservation(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();

@@ -20,11 +20,11 @@ impl Dispatcher {
     pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
         let found = || {
             let known = self.trains.get(&train)?;
-            let limit = self.driver.position_at(train, self.driver.limit(train)?)?;
-            let layout = self.driver.layout();
+            let limit = self.watchdog.driver().position_at(train, self.watchdog.driver().limit(train)?)?;
+            let layout = self.watchdog.driver().layout();
             let room = self.room(now, known);
             let ahead = room.ahead + BEYOND;
-            let turnouts = self.driver.turnouts();
+            let turnouts = self.watchdog.driver().turnouts();
             let (way, at) = Way::around(layout, turnouts, limit, &known.came, Length::ZERO, ahead);
             let taken = way.reservation(layout, at, at + ahead);
             let others = self.trains.values().filter(|other| other.id != train && other.held.meets(&taken));

@@ -44,7 +44,7 @@ impl Dispatcher {
         let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
             return false;
         };
-        let place = self.driver.position(id, now);
+        let place = self.watchdog.driver().position(id, now);
         let anchors = place.map(|place| self.anchors(now, id, place)).unwrap_or_default();
         let needs: Vec<TurnoutNeed> =
             run.needs.iter().filter(|need| !self.gives_way(now, train, need, &anchors)).copied().collect();
@@ -61,7 +61,7 @@ impl Dispatcher {
         if !train.seen_since_start {
             frozen.extend(train.kept.turnouts());
         }
-        let mut held_down = self.driver.turnouts_under(id, now);
+        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
         held_down.extend(&frozen);
         if self.is_in_its_own_way(now, id, &missing, &held_down) {
             return false;
@@ -78,7 +78,7 @@ impl Dispatcher {
             let taken = if frozen.contains(&need.turnout) {
                 Err(Refusal::TurnoutOccupied { turnout: need.turnout, train: id })
             } else {
-                self.driver.order(now, order)
+                self.watchdog.order(now, order)
             };
             match taken {
                 Ok(_) => {
@@ -112,7 +112,7 @@ impl Dispatcher {
         if missing.iter().any(|need| self.is_being_thrown(now, need.turnout)) {
             return false;
         }
-        let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
+        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         let blocked =
             missing.iter().find(|need| need.facing && held_down.contains(&need.turnout) && !lies(need));
         let Some(turnout) = blocked.map(|need| need.turnout) else { return false };
@@ -137,17 +137,22 @@ impl Dispatcher {
         if need.facing {
             return false;
         }
-        let partner = self.partner(need).filter(|partner| !self.driver.turnouts().allow(*partner));
+        let partner = self.partner(need).filter(|partner| !self.watchdog.driver().turnouts().allow(*partner));
         let is_held_down = |turnout| {
-            anchors.contains(&turnout) || self.driver.turnouts_under(train.id, now).contains(&turnout)
+            anchors.contains(&turnout)
+                || self.watchdog.driver().turnouts_under(train.id, now).contains(&turnout)
         };
         train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_held_down(partner.turnout))
     }
 
     /// How the turnout in the same place has to lie.
     fn partner(&self, need: &TurnoutNeed) -> Option<TurnoutNeed> {
-        let turnout =
-            self.driver.layout().never_curved_with(need.turnout).filter(|_| need.leg.is_curved())?;
+        let turnout = self
+            .watchdog
+            .driver()
+            .layout()
+            .never_curved_with(need.turnout)
+            .filter(|_| need.leg.is_curved())?;
         Some(TurnoutNeed { turnout, leg: Leg::Straight, facing: true })
     }
 

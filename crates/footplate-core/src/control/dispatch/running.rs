@@ -39,15 +39,22 @@ impl Dispatcher {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed, .. } if self.driver.stands(id, now) => {
+                State::Halting { confirmed, .. } if self.watchdog.driver().stands(id, now) => {
                     self.halted(now, id, confirmed);
                 }
-                State::Lost if self.driver.stands(id, now) && self.driver.position(id, now).is_some() => {
+                State::Lost
+                    if self.watchdog.driver().stands(id, now)
+                        && self.watchdog.driver().position(id, now).is_some() =>
+                {
                     self.halted(now, id, true);
                 }
-                State::Lost if self.driver.position(id, now).is_some() => self.found_by_hand(now, id),
+                State::Lost if self.watchdog.driver().position(id, now).is_some() => {
+                    self.found_by_hand(now, id);
+                }
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
-                State::Resting if self.is_somewhere(id) && self.driver.position(id, now).is_none() => {
+                State::Resting
+                    if self.is_somewhere(id) && self.watchdog.driver().position(id, now).is_none() =>
+                {
                     self.set_state(id, State::Lost);
                     self.say(DispatchNotice::HeldAsUnknown { train: id });
                 }
@@ -59,7 +66,7 @@ impl Dispatcher {
     /// A train was not seen where it should have been, and there is no way on which it could be found: a person has to say
     /// where it stands.
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
-        self.driver.lose(now, id);
+        self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
         self.say(DispatchNotice::HeldAsUnknown { train: id });
     }
@@ -95,7 +102,7 @@ impl Dispatcher {
                 return self.need_more(now, id, need);
             }
             let turn = Order::Reverse { train: id, then: crate::ids::SpeedStep::STAND };
-            match self.driver.order(now, turn) {
+            match self.watchdog.order(now, turn) {
                 Ok(order) => {
                     self.set_state(id, State::Turning { order });
                     self.note_turned(id);
@@ -110,15 +117,15 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
     /// stand on another edge than was planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.driver.turned_place(id, now)?;
-        let lies = |need: &TurnoutNeed| self.driver.turnouts().get(need.turnout) == Some(need.leg);
-        self.driver.layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
+        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
+        self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
 
     /// A run needs one more turnout, if nobody else holds that.
     fn need_more(&mut self, now: Timestamp, id: TrainId, need: TurnoutNeed) {
         let is_held = self.trains.values().any(|other| other.id != id && other.held.takes(need.turnout));
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let run = self.trains.get_mut(&id).and_then(|train| train.course.front_mut());
         let Some(run) = run.filter(|run| !is_held && !run.needs.contains(&need)) else {
             return self.withdraw(now, id, None);
@@ -135,22 +142,22 @@ impl Dispatcher {
         let Some(train) = self.trains.get(&id) else { return };
         let Some(run) = train.course.front() else { return };
         let room = self.room(now, train);
-        let located = self.driver.locate(id, now);
-        let place = self.driver.position(id, now);
+        let located = self.watchdog.driver().locate(id, now);
+        let place = self.watchdog.driver().position(id, now);
         let from = run.start - room.behind;
         let found = located.zip(place).and_then(|(located, place)| {
             let at = run.way.find(place, from)?;
             let limit = run.way.place(run.limit)?;
-            let limit = self.driver.way_point_ahead(id, located.at, limit)?;
+            let limit = self.watchdog.driver().way_point_ahead(id, located.at, limit)?;
             let stop = run.way.place(run.stop)?;
-            let direct = self.driver.way_point(id, located.at.node, stop)?.way - located.at.way;
+            let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
             // The way may go round to a place at which it stands already.
             let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
         let Some((at, limit, (stop, next_round))) = found else { return self.withdraw(now, id, None) };
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let Some(edge) = layout.edge(stop.edge) else { return self.withdraw(now, id, None) };
         let target = Landmark { node: edge.from, offset: stop.offset };
         let is_last = train.course.len() == 1 && train.purpose == Purpose::Journey;
@@ -158,9 +165,9 @@ impl Dispatcher {
         // Where a train only turns around or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round };
-        self.driver.set_limit(now, id, Some(limit));
-        let taken = self.driver.order(now, Order::Stop(stop));
-        let retried = |_| self.driver.order(now, Order::Stop(StopOrder { step: None, ..stop }));
+        self.watchdog.set_limit(now, id, Some(limit));
+        let taken = self.watchdog.order(now, Order::Stop(stop));
+        let retried = |_| self.watchdog.order(now, Order::Stop(StopOrder { step: None, ..stop }));
         match if step.is_some() { taken.or_else(retried) } else { taken } {
             Ok(order) => {
                 // It has not moved since, whatever turning around makes of what is known of its place.
@@ -182,7 +189,7 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.driver.is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
@@ -194,7 +201,7 @@ impl Dispatcher {
         }
         if train.course.is_empty() {
             train.state = State::Resting;
-            self.driver.set_limit(now, id, None);
+            self.watchdog.set_limit(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
             self.arrived(now, id, error);
         } else {
@@ -202,7 +209,7 @@ impl Dispatcher {
             train.skipped.clear();
             // What it came over it might still be on, if no contact said otherwise.
             if let (false, Some(run)) = (confirmed, ended) {
-                let layout = self.driver.layout();
+                let layout = self.watchdog.driver().layout();
                 train.kept.add(layout, &run.taken);
             }
             self.hold(now, id);
@@ -212,7 +219,7 @@ impl Dispatcher {
 
     /// A train that was commanded to stop stands.
     pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
-        let is_sure = self.driver.position(id, now).is_some();
+        let is_sure = self.watchdog.driver().position(id, now).is_some();
         if let Some(train) = self.trains.get_mut(&id) {
             train.course.clear();
             train.state = if is_sure { State::Resting } else { State::Lost };
@@ -221,7 +228,7 @@ impl Dispatcher {
             train.not_before = now + AFTER_HALT;
             train.unobstructed_s = None;
         }
-        self.driver.set_limit(now, id, None);
+        self.watchdog.set_limit(now, id, None);
         if !is_sure {
             self.say(DispatchNotice::HeldAsUnknown { train: id });
         } else if confirmed {
@@ -234,7 +241,7 @@ impl Dispatcher {
     /// A train that was stopped on its last run and rests near its destination has arrived.
     fn forgive(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get_mut(&id).and_then(|train| train.last_run.take()) else { return };
-        let Some(rest) = self.driver.position(id, now) else { return };
+        let Some(rest) = self.watchdog.driver().position(id, now) else { return };
         let error = run.way.find(rest, run.start).map(|at| at - run.stop);
         if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
             self.arrived(now, id, Some(error));
@@ -243,10 +250,10 @@ impl Dispatcher {
 
     /// Whether a train at rest is on points that lie for another leg than it came from: they gave way to it.
     pub(super) fn is_on_points_that_gave_way(&self, now: Timestamp, id: TrainId) -> bool {
-        let place = self.driver.position(id, now);
+        let place = self.watchdog.driver().position(id, now);
         let Some((train, place)) = self.trains.get(&id).zip(place) else { return false };
         let room = self.room(now, train);
-        let (layout, turnouts) = (self.driver.layout(), self.driver.turnouts());
+        let (layout, turnouts) = (self.watchdog.driver().layout(), self.watchdog.driver().turnouts());
         let (way, at) = Way::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
         let mut trailed = way.trailed(layout, at - room.behind, at + room.ahead);
         trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
@@ -259,11 +266,11 @@ impl Dispatcher {
             self.free_anchors(now, id);
         }
         let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
-        let Some(place) = self.driver.position(id, now) else { return };
+        let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let room = self.room(now, train);
         // The way may come round to where it began.
         let Some(at) = run.way.find(place, rear) else { return };
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         // What was let go is somebody else's by now.
         let from = (at - room.behind).max(rear);
         let mut held = self.reserved(run.way.reservation(layout, from, (at + room.ahead).min(run.end)));
@@ -286,7 +293,7 @@ impl Dispatcher {
             train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
-        self.driver.set_limit(now, id, None);
+        self.watchdog.set_limit(now, id, None);
         self.hold_again(now, id);
         self.say(DispatchNotice::Withdrawn { train: id, why });
         // Whoever asked for it has to know.
@@ -309,7 +316,7 @@ impl Dispatcher {
     fn hold_again(&mut self, now: Timestamp, id: TrainId) {
         let kept = self.trains.get_mut(&id).map(|train| core::mem::take(&mut train.kept));
         self.stand(now, id);
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         if let (Some(train), Some(kept)) = (self.trains.get_mut(&id), kept) {
             train.held.add(layout, &kept);
         }
@@ -330,7 +337,7 @@ impl Dispatcher {
     /// Holds what the runs of a train take from where its rear end certainly is, and nothing else.
     pub(super) fn hold(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let mut held = train.kept.clone();
         for (nth, run) in train.course.iter().enumerate() {
             match train.state {
@@ -341,7 +348,7 @@ impl Dispatcher {
                 _ => held.add(layout, &run.taken),
             }
         }
-        if let Some(place) = self.driver.position(id, now) {
+        if let Some(place) = self.watchdog.driver().position(id, now) {
             self.take_anchors(now, id, place, &mut held);
         }
         if let Some(train) = self.trains.get_mut(&id)
@@ -357,10 +364,10 @@ impl Dispatcher {
         let Some(train) = self.trains.get(&id) else { return true };
         let State::Running { order, rear, .. } = train.state else { return true };
         let Some(run) = train.course.front() else { return true };
-        let layout = self.driver.layout();
+        let layout = self.watchdog.driver().layout();
         let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
         // It may have been somebody else, or nobody.
-        if self.driver.is_in_doubt(id) {
+        if self.watchdog.driver().is_in_doubt(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);

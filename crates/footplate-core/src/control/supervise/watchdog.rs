@@ -2,7 +2,6 @@
 
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
-use core::ops::Deref;
 
 use crate::control::drive::{DriveNotice, Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
@@ -101,6 +100,12 @@ impl Watchdog {
     #[must_use]
     pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
         Self { is_watching: false, ..Self::new(driver, now) }
+    }
+
+    /// What it watches over, for looking only: orders pass through the watchdog.
+    #[must_use]
+    pub const fn driver(&self) -> &Driver {
+        &self.driver
     }
 
     /// The driver itself, for what the watchdog does not look at. Whoever orders trains there does so unwatched.
@@ -435,15 +440,6 @@ impl Watchdog {
         };
         let stop = model.stop(located.step, crate::event::Approach::Above);
         left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
-    }
-}
-
-/// What it watches over, for looking only: whatever is told to it passes through the watchdog.
-impl Deref for Watchdog {
-    type Target = Driver;
-
-    fn deref(&self) -> &Driver {
-        &self.driver
     }
 }
 
