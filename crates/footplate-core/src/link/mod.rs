@@ -11,11 +11,13 @@ mod period_search;
 mod poll_regression;
 mod poll_rhythm;
 mod poll_timing;
+mod time_model;
 mod truncated_normal;
 mod uniform_normal;
 
 pub use contact_window::ContactWindow;
 pub use poll_rhythm::PollRhythm;
 pub use poll_timing::{PollTiming, PollTimingEstimator};
+pub use time_model::TimeModel;
 pub use truncated_normal::TruncatedNormal;
 pub use uniform_normal::UniformNormal;

@@ -27,7 +27,7 @@ const GATE: f64 = 1e-5;
 const REOPENED: f64 = 0.05;
 /// How much longer a section feels to one train than to another: 8 mm over ten sections and five published trains.
 const OWN_LENGTH_M: f64 = 0.008;
-/// Decoders of the 6051, and of most published trains, have 14 steps; others 28 or 126.
+/// Most published trains have decoders of 14 steps; others 28 or 126.
 const DECODERS: [u8; 3] = [14, 28, SpeedStep::HIGHEST];
 
 /// A train is placed by a report whose window is at most this many poll periods wide.

@@ -3,8 +3,9 @@
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
+use footplate_core::link::TimeModel;
 use footplate_core::tracking::WayPoint;
-use footplate_core::{Command, Length, Ratio, SensorId, TrainId, TurnoutId};
+use footplate_core::{Command, Length, Ratio, SensorId, TimeSpan, TrainId, TurnoutId};
 
 use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};
 
@@ -105,6 +106,31 @@ fn a_running_train_stops_without_slowing_down_first_and_one_too_near_is_told_so(
     driver.order(world.now, Order::Stop(next)).expect("the next round");
     assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
     assert!(world.beyond_mm("B1+100mm").abs() < 30.0, "{} mm", world.beyond_mm("B1+100mm"));
+}
+
+#[test]
+fn a_quick_link_lets_a_train_stop_sooner_by_what_it_runs_meanwhile() {
+    // Given a train that runs at step 10, and a stop that is refused,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
+    world.run_until(&mut driver, 30.0, |world| (20.0..40.0).contains(&world.beyond_mm("B1")));
+    let missed_by = |driver: &mut Driver| {
+        let stop = stop_at(driver, "B1+100mm");
+        match driver.order(world.now, Order::Stop(stop)).expect_err("nearer than it can stop") {
+            Refusal::TooNear { beyond, .. } => beyond,
+            refused => panic!("{refused}"),
+        }
+    };
+    let over_the_slowest = missed_by(&mut driver);
+    // when the command leaves within 6 ms instead of 66 ms,
+    driver.set_link(TimeModel { soonest: TimeSpan::from_ms(6), ..TimeModel::POLLED_2400_BAUD });
+    let sooner = over_the_slowest - missed_by(&mut driver);
+    // then it stops sooner by what it runs in 60 ms.
+    let speed = driver.locate(TRAIN, world.now).expect("a place").speed;
+    let runs = speed * TimeSpan::from_ms(60);
+    assert!(runs > Length::from_mm(15.0), "{runs:?}");
+    assert!((sooner - runs).abs() < Length::from_mm(1.0), "{sooner:?} instead of {runs:?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! Measured on firmware 5.6.0 under a cycle-accurate simulator in real time, 8 sensors defined. The source agrees: each sensor
 //! is read every 10 ms at most, and a change counts when the next scan confirms it.
 
+use footplate_core::link::TimeModel;
 use footplate_core::{TimeSpan, Timestamp};
 
 /// The shortest time from a sensor being occupied until the host has the message (20 samples; median 16.8 ms).
@@ -16,6 +17,16 @@ pub const ANSWER_SHORTEST: TimeSpan = TimeSpan::from_us(600);
 
 /// The longest of the same samples.
 pub const ANSWER_LONGEST: TimeSpan = TimeSpan::from_us(9_100);
+
+/// The times that planners need. A command counts as gone when it is written; requests go 50 ms apart at the most crowded,
+/// and a tenth more is allowed; a stop waits for one request of 10 ms only, behind the slowest report.
+pub const TIME_MODEL: TimeModel = TimeModel {
+    command: TimeSpan::ZERO,
+    usual_wait: TimeSpan::from_ms(4),
+    soonest: TimeSpan::from_ms(55),
+    reaction: TimeSpan::from_ms(40),
+    report_window: TimeSpan::from_ms(20),
+};
 
 /// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
 ///

@@ -4,6 +4,7 @@
 //! poll for the command before it.
 
 use footplate_core::TimeSpan;
+use footplate_core::link::TimeModel;
 
 /// The speed of the line (Märklin, instructions of the 6050).
 const BITS_PER_S: i64 = 2400;
@@ -24,6 +25,9 @@ pub const SOLENOID_HOLD_SHORTEST: TimeSpan = TimeSpan::from_ms(100);
 /// The longest time a solenoid may be powered; forgetting to switch it off burns its coil (same source).
 pub const SOLENOID_HOLD_LONGEST: TimeSpan = TimeSpan::from_ms(500);
 
+/// The times that planners need: those of a polled line of this speed.
+pub const TIME_MODEL: TimeModel = TimeModel::POLLED_2400_BAUD;
+
 /// How long a number of bytes occupies the line when they follow one another without a gap.
 #[must_use]
 pub const fn time_on_line(bytes: u32) -> TimeSpan {
@@ -33,6 +37,14 @@ pub const fn time_on_line(bytes: u32) -> TimeSpan {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_time_model_is_that_of_this_line() {
+        // Two bytes a command: 22 bits at 2400 baud. The longest poll, a command and a tenth: 1.1 (50.417 + 9.167) ms.
+        assert!((TIME_MODEL.command - time_on_line(2)).abs() < TimeSpan::from_us(1));
+        let soonest = (time_on_line(11) + time_on_line(2)).as_ms() * 1.1;
+        assert!((TIME_MODEL.soonest.as_ms() - soonest).abs() < 0.5, "{soonest}");
+    }
 
     #[test]
     fn a_poll_of_five_modules_takes_fifty_milliseconds() {

@@ -23,7 +23,9 @@ mod silence;
 mod solenoid;
 
 pub use codec::{EncodeError, Frame, Message};
-pub use line::{BYTE_TIME, REPLY_BYTE_SPACING, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST, time_on_line};
+pub use line::{
+    BYTE_TIME, REPLY_BYTE_SPACING, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST, TIME_MODEL, time_on_line,
+};
 pub use module_reads::ModuleReads;
 pub use pacing::Pace;
 pub use s88::{CONTACTS_PER_MODULE, ModuleState, ReplyError, decode_reply};

@@ -205,6 +205,7 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
+            link: self.railway.link.time_model(),
         })
     }
 

@@ -28,6 +28,7 @@ mod simulated_station;
 mod station_session;
 mod stream;
 mod tapped;
+mod time_models;
 
 pub(crate) use address::{Address, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use line::{Heard, Link, Lost};

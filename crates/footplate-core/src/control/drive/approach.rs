@@ -10,7 +10,7 @@ use crate::tracking::{Located, TrackContext, WayPoint};
 use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};
-use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::driven_train::DrivenTrain;
 use super::path_length::contacts_until;
 use super::refusal::Refusal;
 use super::task::Destination;
@@ -19,8 +19,6 @@ use super::task::Destination;
 const SHORTEST_RUN: TimeSpan = TimeSpan::from_ms(80);
 /// A move that takes longer than this is not worth its last millimetre.
 const MOVE_LIMIT: TimeSpan = TimeSpan::from_s(30.0);
-/// A report changes a plan within this long (a missed poll, the next, and the command).
-const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
 /// A train that is looked for runs about as fast as this, slow enough to be stopped anywhere.
 const FINDING_SPEED: Speed = Speed::from_mm_per_s(150.0);
 /// A stop that scatters by so many times as much as the surest one is worth the time that a faster step saves ...
@@ -156,7 +154,7 @@ impl DrivenTrain {
         let stop = self.model.stop(step, Approach::Below);
         // No start is faster than its final speed.
         let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
-        let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * REPORT_TIME;
+        let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
         at.node == located.at.node
             && contacts_until(context, &self.model, at.node, last).any(|(_, way)| way > settled)
     }
@@ -169,7 +167,7 @@ impl DrivenTrain {
         step: SpeedStep,
         destination: &Destination,
     ) -> CommandTime {
-        let start = now + LINE_TIME;
+        let start = now + self.link.command;
         command_time(start + SHORTEST_RUN, |stop| {
             let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
             Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))

@@ -2,6 +2,7 @@
 
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
@@ -19,8 +20,6 @@ use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
 use super::turnout_guard::TRAIN_REACH;
 
-/// A command of two bytes takes this long on a line of 2400 baud with eleven bits a byte (Märklin 6050).
-pub(super) const LINE_TIME: TimeSpan = TimeSpan::from_us(9_167);
 /// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
 /// then.
 const REST_MARGIN: TimeSpan = TimeSpan::from_ms(300);
@@ -60,10 +59,12 @@ pub(super) struct DrivenTrain {
     pub(super) pacing: Option<Pacing>,
     /// When it came by the contacts behind it, for who follows it.
     pub(super) passages: Passages,
+    /// How long the link to the station takes.
+    pub(super) link: TimeModel,
 }
 
 impl DrivenTrain {
-    pub(super) fn new(model: MotionModel, locator: Locator) -> Self {
+    pub(super) fn new(model: MotionModel, locator: Locator, link: TimeModel) -> Self {
         Self {
             locator,
             widest_stop: widest_stop(&model),
@@ -77,6 +78,7 @@ impl DrivenTrain {
             speed_supervision: SpeedSupervision::default(),
             pacing: None,
             passages: Passages::default(),
+            link,
         }
     }
 
@@ -331,7 +333,7 @@ impl DrivenTrain {
     /// When it wants to look at the clock.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         let phase = match self.task.map(|task| task.phase) {
-            Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - LINE_TIME),
+            Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
             Some(Phase::Settling { until, .. }) => Some(until),
             Some(Phase::Finding { since }) => Some(since + FIND_LIMIT),
             _ => None,
@@ -358,7 +360,7 @@ impl DrivenTrain {
 
     fn go_on(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
-            Phase::Running { plan: Some(plan) } if plan.leaves - LINE_TIME <= now => {
+            Phase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
             }
             Phase::Finding { since } if now - since >= FIND_LIMIT => {

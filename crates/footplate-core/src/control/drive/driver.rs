@@ -7,6 +7,7 @@ use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::link::ContactWindow;
+use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
@@ -15,7 +16,7 @@ use crate::units::Length;
 
 use super::attribution::{Attribution, Decided, Verdict};
 use super::doubt::Branch;
-use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::driven_train::DrivenTrain;
 use super::hypotheses::{Closure, Explanation};
 use super::known_track::KnownTrack;
 use super::notice::DriveNotice;
@@ -25,8 +26,6 @@ use super::refusal::Refusal;
 use super::task::Phase;
 use super::turnout_guard::train_on;
 
-/// The poll interval where a report does not carry one: the longest measured on this line (70 ms).
-const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
 /// A contact that is seen closed again within this long was never open: wheels bounce, and no train follows so soon.
 const HELD: TimeSpan = TimeSpan::from_ms(300);
 /// The line is watched for one contact only this long before its report decides a stop.
@@ -50,6 +49,7 @@ pub struct Driver {
     pub(super) orders: u32,
     /// When the contact to be watched changes.
     pub(super) watch_changes: Option<Timestamp>,
+    link: TimeModel,
 }
 
 impl Driver {
@@ -65,7 +65,14 @@ impl Driver {
             attribution: Attribution::default(),
             orders: 0,
             watch_changes: None,
+            link: TimeModel::default(),
         }
+    }
+
+    /// How long the link to the station takes, from now on; without it the slowest one is supposed.
+    pub fn set_link(&mut self, link: TimeModel) {
+        self.link = link;
+        self.trains.values_mut().for_each(|train| train.link = link);
     }
 
     /// Drives a train that moves like this, and of which nobody knows where it stands. Replaces what was known of it.
@@ -77,7 +84,7 @@ impl Driver {
     /// Drives a train that somebody else has followed until now.
     pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
         self.attribution.forget(model.train());
-        self.trains.insert(model.train(), DrivenTrain::new(model, locator));
+        self.trains.insert(model.train(), DrivenTrain::new(model, locator, self.link));
     }
 
     /// What is known of how a train moves.
@@ -285,7 +292,7 @@ impl Driver {
 
     fn report(&mut self, now: Timestamp, time: Timestamp, report: Report) {
         let sensor = report.sensor;
-        let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs();
+        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
         let window = ContactWindow { after: time - interval, until: time };
         let before = self.closed.insert(sensor, time);
         if before.is_some_and(|before| time - before <= HELD.max(interval)) {
@@ -384,7 +391,7 @@ impl Driver {
             .map(|(sensor, _)| sensor)
             .find(|sensor| triggers().any(|trigger| trigger == *sensor));
         let guard = self.trains.values().filter_map(DrivenTrain::guard);
-        let hold = next.map(|plan| plan.leaves - LINE_TIME).into_iter().chain(guard).min();
+        let hold = next.map(|plan| plan.leaves - self.link.command).into_iter().chain(guard).min();
         // Asked in any case: it also says when to look again, and a time that stays behind would be waited for for ever.
         let paced = self.due_of_paced(now);
         let watched = watched.or(paced);

@@ -6,7 +6,7 @@ use crate::tracking::{DueContact, TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
-use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::driven_train::DrivenTrain;
 use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
@@ -174,13 +174,13 @@ impl DrivenTrain {
     fn end_guard(&self) -> Option<Timestamp> {
         let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
         let (leaves, _) = self.expected.end.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
-        Some(leaves - LINE_TIME)
+        Some(leaves - self.link.command)
     }
 
     /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
     fn limit_guard(&self) -> Option<Timestamp> {
         let leaves = self.expected.limit.filter(|_| self.commanded > SpeedStep::STAND)?;
-        Some(leaves - LINE_TIME)
+        Some(leaves - self.link.command)
     }
 
     /// Stops the train where the track ends ahead of it, or what it may enter.
@@ -220,7 +220,7 @@ impl DrivenTrain {
         if self.commanded == SpeedStep::STAND {
             return None;
         }
-        let earliest = now + LINE_TIME;
+        let earliest = now + self.link.command;
         let found = command_time(earliest, |leaves| {
             let rest = self.locator.rest_if_stopped(context, &self.model, leaves)?;
             Some((rest, self.aimed_beyond(context, &rest, at, Aim::NotBeyond(NEARER))?))

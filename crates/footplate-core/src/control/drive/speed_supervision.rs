@@ -25,7 +25,6 @@ use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::restricted_stretch::RestrictedStretch;
-use super::stop_planning::SOONEST;
 use super::task::{Destination, Goal, Phase};
 
 /// How often a train may come to a zone nearer than is believed, and how often it may be faster there: in one case of a
@@ -214,7 +213,8 @@ impl DrivenTrain {
                     && self.is_worth_it(context, now, *step)
             })
         });
-        let next = by.map(|(by, _)| by - SOONEST).into_iter().chain(leaves.filter(|_| wanted.is_some()));
+        let next =
+            by.map(|(by, _)| by - self.link.soonest).into_iter().chain(leaves.filter(|_| wanted.is_some()));
         let next = next.chain(Some(now + AGAIN)).min().unwrap_or(now).max(now + TICK);
         self.speed_supervision.look = Some(next);
         if let Some((step, zone)) = slower {
@@ -253,7 +253,7 @@ impl<'t> Lookahead<'t> {
         let here = train.locator.reachable_set();
         let [ahead, behind] = train.reach.map(Length::as_m);
         let ends = [here.place(&train.model, now, k) + ahead, here.place(&train.model, now, -k) - behind];
-        let beyond = here.unsettled(&train.model, now + SOONEST);
+        let beyond = here.unsettled(&train.model, now + train.link.soonest);
         let slows_down = train.commanded.get() < here.step() || beyond > SETTLED;
         let changes = slows_down || train.commanded.get() != here.step() || beyond < -SETTLED;
         Self { train, here, now, usable: train.usable_steps(), k, slows_down, changes, ends }
@@ -261,7 +261,7 @@ impl<'t> Lookahead<'t> {
 
     /// When a command can leave at the latest.
     fn start(&self) -> Timestamp {
-        self.now + SOONEST
+        self.now + self.train.link.soonest
     }
 
     /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
@@ -278,7 +278,7 @@ impl<'t> Lookahead<'t> {
         let model = &self.train.model;
         let step = step.max(self.train.commanded);
         let slowest = self.usable.first().copied().unwrap_or(step);
-        let soon = SOONEST + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
+        let soon = self.train.link.soonest + WORTHWHILE + AGAIN + model.settles_within(step, slowest);
         let [front, rear] = self.ends;
         let ahead = front + (model.steady_speed(step, Approach::Above) * soon).as_m() * (1.0 + SPARED);
         let ways = RestrictedStretch::about(context, model, node, -rear, ahead);

@@ -9,7 +9,7 @@ use crate::tracking::{Located, Rest, TrackContext, WayPoint, landmark_of, way_to
 use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};
-use super::driven_train::{DrivenTrain, LINE_TIME};
+use super::driven_train::DrivenTrain;
 use super::notice::{DriveNotice, PlannedStop, Promise};
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
@@ -17,12 +17,6 @@ use super::path_length::{contacts_until, counted_from, lap, unknown_turnout, way
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Plan, Task};
 
-/// An order can only be kept if the command may wait for a poll that is on the line: eleven bytes of 4.583 ms, the
-/// command's own two, and a tenth more.
-pub(super) const SOONEST: TimeSpan = TimeSpan::from_ms(66);
-/// From when a contact closes until what it says has changed a plan: a poll that just missed it, the next one, and the
-/// command's own bytes.
-const REPORT_TIME: TimeSpan = TimeSpan::from_ms(150);
 /// A plan that moved by less is no news.
 const NEWS: TimeSpan = TimeSpan::from_ms(1);
 /// An overshoot that is less than any stop scatters is no news either.
@@ -182,7 +176,7 @@ impl DrivenTrain {
         }
         let at = WayPoint { node, way };
         if !stands {
-            let soonest = self.locator.rest_if_stopped(context, &self.model, now + SOONEST);
+            let soonest = self.locator.rest_if_stopped(context, &self.model, now + self.link.soonest);
             let reached = soonest
                 .and_then(|rest| Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?)));
             if let Some((_, beyond)) = reached.filter(|(_, beyond)| *beyond > Length::ZERO) {
@@ -298,7 +292,7 @@ impl DrivenTrain {
         else {
             return;
         };
-        let found = command_time(now + LINE_TIME, |leaves| {
+        let found = command_time(now + self.link.command, |leaves| {
             let rest = self.locator.rest_if_stopped(context, &self.model, leaves)?;
             Some((rest, self.aimed_beyond(context, &rest, at, aim)?))
         });
@@ -361,7 +355,7 @@ impl DrivenTrain {
         let (Some(here), Some(there)) = (self.located(context, now), self.located(context, leaves)) else {
             return [None; 2];
         };
-        let last = there.at.way - there.speed * REPORT_TIME;
+        let last = there.at.way - there.speed * self.link.reaction;
         let mut triggers = [None; 2];
         for (sensor, way) in contacts_until(context, &self.model, here.at.node, last) {
             if way > here.at.way {

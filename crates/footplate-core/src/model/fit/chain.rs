@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use super::trip::{MeasuredRest, Trip, TripContact};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::link::TimeModel;
 use crate::model::parameters::Answers;
 use crate::model::segment::SpeedCommand;
 use crate::model::survey::SectionIndex;
@@ -12,8 +13,8 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Length;
 
-/// A poll whose interval nobody recorded: a slow 6051.
-const USUAL_INTERVAL: TimeSpan = TimeSpan::from_ms(70);
+/// A poll whose interval nobody recorded: one of the slowest link.
+const USUAL_INTERVAL: TimeSpan = TimeModel::POLLED_2400_BAUD.report_window;
 /// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
 const BETWEEN_RUNS: f64 = 60.0;
 /// Contacts that may stay silent in a row before the way is no longer believed.

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use footplate_core::control::Driver;
+use footplate_core::link::TimeModel;
 use footplate_core::model::MotionFit;
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Leg, TurnoutStates};
@@ -33,6 +34,9 @@ pub(crate) struct DriveBeginning {
     /// Seconds for which it waits at most, if that was said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) wait_limit_s: Option<f64>,
+    /// How long the link takes; sessions of older versions supposed the slowest.
+    #[serde(default)]
+    pub(super) link: TimeModel,
 }
 
 impl DriveBeginning {
@@ -54,6 +58,7 @@ impl DriveBeginning {
             script: Vec::new(),
             is_complete: false,
             wait_limit_s: None,
+            link: TimeModel::default(),
         }
     }
 
@@ -77,6 +82,7 @@ impl DriveBeginning {
             steps.extend(read.with_context(|| format!("the line `{line}` of the script"))?);
         }
         let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
+        driver.set_link(self.link);
         self.models.into_iter().for_each(|model| driver.add_train(model));
         let mut script_runner =
             ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.giver, steps);

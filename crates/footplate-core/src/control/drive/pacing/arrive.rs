@@ -5,7 +5,7 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 
 use crate::control::drive::command_time::{CommandTime, spread};
-use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::notice::{DriveNotice, PlannedArrival};
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
@@ -23,7 +23,7 @@ use crate::units::{Length, Speed};
 
 use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, CREEPING, Means};
 use super::reference::Reference;
-use super::task::{POLL_WAIT, Pace, Pacing};
+use super::task::{Pace, Pacing};
 
 /// A standing train that has more time than this speed needs waits rather than creeps.
 const UNHURRIED: Speed = Speed::from_mm_per_s(150.0);
@@ -233,7 +233,7 @@ impl DrivenTrain {
         let steps = starts.iter().copied().filter(may_run);
         let runs = steps.filter_map(|step| match self.short_run(context, now, at, step, &destination) {
             CommandTime::At(stop, rest) => {
-                let stands = self.standing_time(&stands, [now + LINE_TIME, stop], step, &rest)?;
+                let stands = self.standing_time(&stands, [now + self.link.command, stop], step, &rest)?;
                 Some((step, stands - now, spread(&rest)))
             }
             _ => None,
@@ -285,7 +285,7 @@ impl DrivenTrain {
         let mut rollout = self.locator.rollout()?;
         let after = self.model.settles_within(SpeedStep::STAND, step).as_s();
         let zero = rollout.seconds(now);
-        rollout.command(&self.model, zero + (LINE_TIME + POLL_WAIT).as_s(), step);
+        rollout.command(&self.model, zero + self.link.usually_left().as_s(), step);
         let [place, speed] = rollout.place_and_speed(&self.model, zero + after);
         Some(Beginning { after, left: at.way.as_m() - place, speed })
     }

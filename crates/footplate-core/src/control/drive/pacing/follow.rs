@@ -12,7 +12,7 @@
 use alloc::collections::BTreeMap;
 
 use crate::control::drive::command_time::spread;
-use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::notice::DriveNotice;
 use crate::control::drive::order::{Aim, Gap, OrderId};
@@ -31,7 +31,7 @@ use super::command_budget::seconds;
 use super::lead_line::LeadLine;
 use super::reference::Reference;
 use super::surveyed_way::SurveyedWay;
-use super::task::{POLL_WAIT, Pace, Pacing};
+use super::task::{Pace, Pacing};
 
 /// From the rear of one train to the front of the next there is never less: a hand's breadth.
 pub(in crate::control) const SAFE: Length = Length::from_mm(50.0);
@@ -211,7 +211,7 @@ impl DrivenTrain {
         let own = stop(self, speed * (1.0 + SLOWS), Aim::NotBeyond(NEARER).margin());
         let ahead = stop(leader, speed, -Aim::NotBeyond(SHORTER).margin());
         let strays = if leader.followed().is_some() { STRAYS + STRAYS } else { STRAYS };
-        (own - ahead + speed * (LINE_TIME + POLL_WAIT) + strays + SAFE).max(SAFE)
+        (own - ahead + speed * self.link.usually_left() + strays + SAFE).max(SAFE)
     }
 
     /// Where a follower should be; `None` while nobody knows where its leader is.
@@ -290,7 +290,7 @@ impl DrivenTrain {
     fn fastest_behind(&self, context: TrackContext<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
         let later = now + FORESEEN;
         let rear = self.rear_of(context, now, leader, later)?;
-        let start = now + LINE_TIME + POLL_WAIT;
+        let start = now + self.link.usually_left();
         let is_safe = |step: &SpeedStep| {
             let rest = self.locator.rest_after_move(context, &self.model, start, *step, later);
             let beyond =
@@ -318,11 +318,12 @@ impl DrivenTrain {
         };
         let rear = self.rear_of(context, now, ahead, now);
         let fastest = self.fastest_behind(context, now, ahead);
-        let soon = now + LINE_TIME + TimeSpan::from_s(LOOK_AGAIN);
+        let soon = now + self.link.command + TimeSpan::from_s(LOOK_AGAIN);
         let stop_by = rear.and_then(|rear| self.last_stop_before(context, now, rear));
         let is_free = rear.is_some_and(|rear| {
             if self.commanded > SpeedStep::STAND {
-                return fastest.is_some() && stop_by.is_none_or(|by| by > now + LINE_TIME + LINE_TIME);
+                return fastest.is_some()
+                    && stop_by.is_none_or(|by| by > now + self.link.command + self.link.command);
             }
             let rest = self.locator.rest_if_stopped(context, &self.model, now);
             let beyond = rest.and_then(|rest| self.beyond(context, rest.at, rear));
@@ -332,7 +333,8 @@ impl DrivenTrain {
         let Some(Pacing { pace: Pace::Follow(following), look, budget, .. }) = &mut self.pacing else {
             return true;
         };
-        *look = Some(stop_by.map_or(soon, |by| (by - LINE_TIME).clamp(now + LINE_TIME, soon)));
+        *look =
+            Some(stop_by.map_or(soon, |by| (by - self.link.command).clamp(now + self.link.command, soon)));
         (following.rear, following.fastest) = (rear, fastest);
         if is_free {
             following.is_held = false;
@@ -362,7 +364,7 @@ impl DrivenTrain {
     ) -> bool {
         let Some(following) = self.followed().filter(|_| step > self.commanded) else { return true };
         let Some(rear) = following.rear else { return false };
-        let start = now + LINE_TIME + POLL_WAIT;
+        let start = now + self.link.usually_left();
         let rest = self.locator.rest_after_move(context, &self.model, start, step, start + UNDONE);
         let beyond = rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
         beyond.is_some_and(|beyond| beyond <= Length::ZERO)

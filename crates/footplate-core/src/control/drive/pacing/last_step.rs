@@ -6,7 +6,7 @@
 //! at is looked at as a whole, up to the standstill.
 
 use crate::control::drive::command_time::{CommandTime, command_time, spread};
-use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
 use crate::ids::SpeedStep;
@@ -15,7 +15,6 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Rest, TrackContext};
 
 use super::command_budget::seconds;
-use super::task::POLL_WAIT;
 
 /// One standard deviation of what is asked for in time (s): 0.3 s at the 95th percentile ...
 const LATE: f64 = 0.15;
@@ -86,8 +85,8 @@ impl DrivenTrain {
         destination: &Destination,
     ) -> Option<(Timestamp, Rest)> {
         let at = destination.at?;
-        let start = now + LINE_TIME + POLL_WAIT;
-        let first = if step == self.commanded { now + LINE_TIME } else { start + FELT };
+        let start = now + self.link.usually_left();
+        let first = if step == self.commanded { now + self.link.command } else { start + FELT };
         let found = command_time(first, |stop| {
             let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
             Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))

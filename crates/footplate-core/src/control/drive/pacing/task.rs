@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use crate::control::drive::driven_train::{DrivenTrain, LINE_TIME};
+use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal};
 use crate::ids::{NodeId, SensorId, SpeedStep};
@@ -19,8 +19,6 @@ use super::reference::GRID;
 use super::step_search::StepSearch;
 use super::surveyed_way::SurveyedWay;
 
-/// A command waits for the poll that is on the line: half of the longest, 58 ms.
-pub(super) const POLL_WAIT: TimeSpan = TimeSpan::from_ms(29);
 /// The module of a contact is watched from this long before the contact is due: three standard deviations of an
 /// expectation, and the poll of all modules that may be on the line then.
 const WATCHED_BEFORE: TimeSpan = TimeSpan::from_ms(180);
@@ -164,7 +162,7 @@ impl DrivenTrain {
             pacing.look = guard.or(pacing.look);
             return;
         };
-        let leaves = (LINE_TIME + POLL_WAIT).as_s();
+        let leaves = self.link.usually_left().as_s();
         let at = rollout.seconds(now);
         let mut here = rollout;
         let behind = reference.now() - way.of_felt(here.place(&self.model, at));

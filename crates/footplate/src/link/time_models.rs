@@ -1,0 +1,26 @@
+//! How long the link to each kind of station takes.
+
+use footplate_core::link::TimeModel;
+use footplate_wire::{dcc_ex, marklin_serial};
+
+use super::address::{Address, StationKind};
+
+impl Address {
+    /// The times of the link behind it, as its station's session has them.
+    pub(crate) const fn time_model(&self) -> TimeModel {
+        match self {
+            Self::Simulated(simulated) => simulated.station.time_model(),
+            Self::Serial(_) => StationKind::Marklin.time_model(),
+            Self::Board(_) => StationKind::DccEx.time_model(),
+        }
+    }
+}
+
+impl StationKind {
+    const fn time_model(self) -> TimeModel {
+        match self {
+            Self::Marklin => marklin_serial::TIME_MODEL,
+            Self::DccEx => dcc_ex::TIME_MODEL,
+        }
+    }
+}
