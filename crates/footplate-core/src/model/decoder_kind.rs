@@ -21,10 +21,7 @@ use alloc::vec::Vec;
 
 use super::motion_model::MotionModel;
 use super::parameters::{DOWN, NODES, PRIOR, SPEEDS, STOP_NODES};
-use super::priors::whitened;
-
-/// Part of a change's displacement by which no shape for all decoders is true in its middle.
-pub(super) const SHAPE_ERROR: f64 = 0.04;
+use super::priors::{SHAPE_ERROR, whitened};
 
 /// Places of lag, `κ` and `ρ` on the way down.
 const LAG: usize = DOWN + 1;

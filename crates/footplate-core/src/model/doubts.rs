@@ -8,11 +8,7 @@ use super::motion_model::MotionModel;
 use super::parameters::{
     Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
 };
-
-/// Nobody sees the last centimetres of a stop: dry friction and gears end it elsewhere than any law, the same way each time, and
-/// a start that seems later makes up for it. Healthy trains of two simulators that were written by other equations rested 5 to
-/// 8 mm further than believed (m).
-pub(crate) const END_OF_STOP: f64 = 0.0035;
+use super::priors::END_OF_STOP;
 
 /// By how much more than it is thought to a single change differs from its law in forecasts: shapes of decoders that the law
 /// does not have (chosen on simulated decoders of six laws, so that nine in ten intervals of 90 % hold).

@@ -4,8 +4,8 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::doubts::END_OF_STOP;
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
+use super::priors::END_OF_STOP;
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, SpeedCommand};

@@ -1,7 +1,7 @@
 //! What a train does between one command's effect and the next: a change of speed and the run behind it.
 
-use super::decoder_kind::SHAPE_ERROR;
 use super::parameters::Answers;
+use super::priors::SHAPE_ERROR;
 use crate::kinematics::RampedLag;
 
 /// What a command asks of a train in the state it is in.

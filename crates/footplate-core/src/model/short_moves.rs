@@ -1,10 +1,10 @@
 //! Short moves by the motion model: "go, wait, stop", with the stop commanded before the speed is reached.
 
-use super::doubts::END_OF_STOP;
 use super::doubts::OTHER_SHAPES;
 use super::expected_information::{start_to, time_of};
 use super::motion_model::MotionModel;
 use super::parameters::Answers;
+use super::priors::END_OF_STOP;
 use super::segment::{Segment, SpeedCommand};
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;

@@ -1,6 +1,6 @@
 //! How fast a run is and how fast each of its steps, kept apart: what forecasts of a train hardly known begin with.
 //!
-//! A [`MotionFilter`] of a train that is driven knows its steps well, and has one letter for what its speed is off by: `ε`.
+//! A [`MotionFilter`](super::MotionFilter) of a train that is driven knows its steps well, and has one letter for what its speed is off by: `ε`.
 //! Before a train is known a step may be off by a tenth or by half, which says nothing of the next one, and of a change of
 //! speed only what the new speed has made of the way so far. So each step has a letter of its own, `s`, and a change from
 //! one to another goes
@@ -15,15 +15,13 @@
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::filter_state::{E, FilterState, H, N};
-use super::motion_filter::MotionFilter;
 use crate::model::MotionModel;
-use crate::model::run_variance;
 use crate::model::{Pace, Segment, SpeedCommand};
 
 /// By so much, as ln, speeds differ between which slopes are taken.
 const STEP: f64 = 1e-3;
 /// When a step is reached again its ln speed differs by so much: repeats of one run differ by 0.3 to 0.8 %. Only forecasts
-/// count it, which are held to their intervals; who drives learns such differences ([`MotionFilter::repeat`]).
+/// count it, which are held to their intervals; who drives learns such differences (`MotionFilter::repeat`).
 pub(super) const STEP_AGAIN: f64 = 0.006;
 /// Bounds of what a run, or a step, may differ from what is known, as ln: beyond, the model is wrong.
 const FARTHEST_DEVIATION: f64 = 1.5;
@@ -113,19 +111,6 @@ impl Apart {
         for (letter, by) in self.before {
             slope[letter] += grown * by * (way(&self.away) - here);
         }
-    }
-}
-
-impl<const L: usize> MotionFilter<L> {
-    /// From now on what is learnt of its run and of each step's speed is kept apart: for forecasts of a train that may be
-    /// hardly known.
-    pub(crate) fn keep_apart(mut self, model: &MotionModel) -> Self {
-        if let Some(letter) = self.course.keep_apart() {
-            let variance = model.ln_speed_variance(self.course.step, false);
-            self.p[E][E] = run_variance(variance);
-            self.p[letter][letter] = variance;
-        }
-        self
     }
 }
 
@@ -227,6 +212,7 @@ mod tests {
     use super::*;
     use crate::ids::{SpeedStep, TrainId};
     use crate::linalg::Gaussian;
+    use crate::tracking::motion_filter::MotionFilter;
 
     #[test]
     fn what_a_step_is_off_by_is_not_taken_along_to_the_next() {

@@ -450,6 +450,19 @@ impl<const L: usize> MotionFilter<L> {
     }
 }
 
+impl<const L: usize> MotionFilter<L> {
+    /// From now on what is learnt of its run and of each step's speed is kept apart: for forecasts of a train that may be
+    /// hardly known.
+    pub(crate) fn keep_apart(mut self, model: &MotionModel) -> Self {
+        if let Some(letter) = self.course.keep_apart() {
+            let variance = model.ln_speed_variance(self.course.step, false);
+            self.p[E][E] = run_variance(variance);
+            self.p[letter][letter] = variance;
+        }
+        self
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,6 +4,7 @@
 //! Each test lists everything that breaks its promise, with file and line, and says what would be right.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test may stop at the first surprise")]
 
+mod circles;
 mod files;
 mod layers;
 mod links;

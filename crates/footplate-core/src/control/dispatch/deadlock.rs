@@ -13,7 +13,8 @@ use crate::track::{Landmark, Position};
 
 use super::dispatched_train::{DispatchedTrain, Purpose};
 use super::dispatcher::Dispatcher;
-use super::granting::{Proposal, Start};
+use super::granting::Proposal;
+use super::movement_authority::Start;
 use super::movement_authority::{ClearanceEnvelope, standing};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;

@@ -21,7 +21,7 @@ use super::movement_authority::{ClearanceEnvelope, standing};
 use super::notice::DispatchNotice;
 use super::parking::{PARKED, parking_places};
 use super::reservation::Reservation;
-use super::route_setting::TurnoutCommand;
+use super::turnout_command::TurnoutCommand;
 
 /// How often it looks what can be done while something waits to be.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);

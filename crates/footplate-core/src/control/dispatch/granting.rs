@@ -14,7 +14,7 @@ use crate::units::{Length, Speed};
 use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::itinerary::{Itinerary, Pace, Search};
-use super::movement_authority::{ClearanceEnvelope, MovementAuthority, granted};
+use super::movement_authority::{MovementAuthority, Start, granted};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
@@ -62,24 +62,6 @@ impl Proposal {
     pub(super) fn meets(&self, held: &Reservation) -> bool {
         self.runs.iter().any(|run| run.taken.meets(held))
     }
-}
-
-/// Where a train begins to look for a way, and what it needs.
-#[derive(Debug, Clone)]
-pub(super) struct Start {
-    pub(super) place: Position,
-    pub(super) came: OccupiedPath,
-    pub(super) room: ClearanceEnvelope,
-    pub(super) pace: Pace,
-    /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
-    pub(super) frozen: Vec<TurnoutNeed>,
-    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead,
-    /// and behind only if that leads nowhere: it may have come less far, and nothing is thrown then of all that it holds.
-    /// Who stands on points that gave way to it goes on: they would not give way to it when it comes back.
-    pub(super) turned: Option<Position>,
-    /// Whether it may back away from turnouts that it stands too near to throw: not twice without a contact between, or its
-    /// place would become ever less sure.
-    pub(super) may_back_away: bool,
 }
 
 impl Dispatcher {

@@ -23,6 +23,7 @@ mod parking;
 mod reservation;
 mod route_setting;
 mod running;
+mod turnout_command;
 mod way;
 
 pub use dispatcher::Dispatcher;

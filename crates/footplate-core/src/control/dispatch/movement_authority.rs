@@ -5,12 +5,30 @@ use alloc::vec::Vec;
 use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
-use super::granting::Start;
+use super::itinerary::Pace;
 use super::itinerary::{Itinerary, Run};
 use super::journey::TrainLengths;
 use super::occupied_path::OccupiedPath;
 use super::reservation::Reservation;
 use super::way::Way;
+
+/// Where a train begins to look for a way, and what it needs.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    pub(super) place: Position,
+    pub(super) came: OccupiedPath,
+    pub(super) room: ClearanceEnvelope,
+    pub(super) pace: Pace,
+    /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
+    pub(super) frozen: Vec<TurnoutNeed>,
+    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead,
+    /// and behind only if that leads nowhere: it may have come less far, and nothing is thrown then of all that it holds.
+    /// Who stands on points that gave way to it goes on: they would not give way to it when it comes back.
+    pub(super) turned: Option<Position>,
+    /// Whether it may back away from turnouts that it stands too near to throw: not twice without a contact between, or its
+    /// place would become ever less sure.
+    pub(super) may_back_away: bool,
+}
 
 /// How much more of the track is taken than a train is believed to need: contacts are off their places by 5 mm, edges
 /// by 10 mm, and trains were measured to a centimetre or two.

@@ -10,32 +10,14 @@ use crate::track::{Leg, TurnoutNeed};
 
 use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
+use super::turnout_command::{SURE, TurnoutCommand};
 
-/// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
-/// hang together; those that do show when a train takes the other leg.
-pub(super) const SURE: u8 = 2;
 /// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
 const MOVES: TimeSpan = TimeSpan::from_ms(350);
 /// A line that works tells a turnout within this: two polls, and the solenoids of a dozen others before it.
 const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 /// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
-
-/// How a turnout was set.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TurnoutCommand {
-    leg: Leg,
-    /// How many times in a row.
-    times: u8,
-    last: Timestamp,
-}
-
-impl TurnoutCommand {
-    /// A turnout of which somebody knows how it lies.
-    pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
-        Self { leg, times: SURE, last: now }
-    }
-}
 
 impl Dispatcher {
     /// Throws what the present run of a train needs; whether all of it lies right by now.

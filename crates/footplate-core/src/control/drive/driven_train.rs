@@ -1,24 +1,23 @@
 //! One train: where it is, how it moves, what it was told and what it is busy with.
 
+use alloc::string::String;
+
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
+use crate::tracking::{DueContact, Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::units::Length;
 
-use super::expectation::Expectation;
 use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path_length::contacts_until;
 use super::refusal::Refusal;
-use super::speed_supervision::SpeedSupervision;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
-use super::turnout_guard::TRAIN_REACH;
 
 /// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
 /// then.
@@ -34,6 +33,10 @@ const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
 const SHOULD_HAVE_PASSED: f64 = 2.0;
 /// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
 const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
+
+/// From the pickup to either end of a train, which nobody has measured: a long locomotive of the gauge, or a short one
+/// with a wagon.
+pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 
 /// A train that is driven.
 #[derive(Debug, Clone)]
@@ -61,6 +64,36 @@ pub(super) struct DrivenTrain {
     pub(super) passages: Passages,
     /// How long the link to the station takes.
     pub(super) link: TimeModel,
+}
+
+/// What is expected of a train, as of when something was last known.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Expectation {
+    /// The next contact.
+    pub(super) due: Option<DueContact>,
+    pub(super) since: Timestamp,
+    pub(super) overdue_said: bool,
+    /// Contacts in a row that should have reported the train.
+    pub(super) silent: u8,
+    /// A contact that should have reported it, and nothing has reported it since.
+    pub(super) unseen: Option<SensorId>,
+    /// When it is lost if nothing reports it until then; only once a contact is overdue.
+    pub(super) lost_by: Option<Timestamp>,
+    /// When it has to be commanded to stop because the track ends, and where.
+    pub(super) end: Option<(Timestamp, NodeId)>,
+    /// When it has to be commanded to stop so that it stays within its limit.
+    pub(super) limit: Option<Timestamp>,
+}
+
+/// What a train would run at if it were allowed to.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SpeedSupervision {
+    /// The step that was asked for, while the train has been told a slower one.
+    pub(super) wanted: Option<SpeedStep>,
+    /// When the zones about it are looked at next.
+    pub(super) look: Option<Timestamp>,
+    /// The zone that was said to slow it down.
+    pub(super) said: Option<String>,
 }
 
 impl DrivenTrain {

@@ -2,11 +2,11 @@
 
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{DueContact, TrackContext, WayPoint};
+use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
-use super::driven_train::DrivenTrain;
+use super::driven_train::{DrivenTrain, Expectation};
 use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
@@ -31,25 +31,6 @@ const LOST_WITHOUT: TimeSpan = TimeSpan::from_s(40.0);
 const BEFORE_END: Length = Length::from_mm(200.0);
 /// How often a train that is stopped for the end of the track may come nearer than that, or pass its limit.
 const NEARER: Ratio = Ratio::from_percent(0.1);
-
-/// What is expected of a train, as of when something was last known.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Expectation {
-    /// The next contact.
-    pub(super) due: Option<DueContact>,
-    since: Timestamp,
-    overdue_said: bool,
-    /// Contacts in a row that should have reported the train.
-    silent: u8,
-    /// A contact that should have reported it, and nothing has reported it since.
-    pub(super) unseen: Option<SensorId>,
-    /// When it is lost if nothing reports it until then; only once a contact is overdue.
-    lost_by: Option<Timestamp>,
-    /// When it has to be commanded to stop because the track ends, and where.
-    end: Option<(Timestamp, NodeId)>,
-    /// When it has to be commanded to stop so that it stays within its limit.
-    limit: Option<Timestamp>,
-}
 
 impl DrivenTrain {
     /// A contact that should have reported it long ago: it may never have come there.

@@ -9,7 +9,6 @@
 //! x(t) + k σ_x + front = zone   ⇒   v(t) + k σ_v ≤ limit          until   x(t) − k σ_x − rear ≥ end of the zone
 //! ```
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::event::Approach;
@@ -47,17 +46,6 @@ const AGAIN: TimeSpan = TimeSpan::from_ms(1_000);
 const TICK: TimeSpan = TimeSpan::from_ms(20);
 /// Halvings of a few seconds that leave less than a look takes.
 const HALVINGS: usize = 8;
-
-/// What a train would run at if it were allowed to.
-#[derive(Debug, Clone, Default)]
-pub(super) struct SpeedSupervision {
-    /// The step that was asked for, while the train has been told a slower one.
-    wanted: Option<SpeedStep>,
-    /// When the zones about it are looked at next.
-    look: Option<Timestamp>,
-    /// The zone that was said to slow it down.
-    said: Option<String>,
-}
 
 /// From where a train is judged: when a command can leave, how far it reaches and how it moves.
 struct Lookahead<'t> {

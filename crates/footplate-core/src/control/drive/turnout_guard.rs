@@ -12,9 +12,6 @@ use crate::units::Length;
 use super::driven_train::DrivenTrain;
 use super::path_length::nodes_of_turnout;
 
-/// From the pickup to either end of a train, which nobody has measured: a long locomotive of the gauge, or a short one
-/// with a wagon.
-pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 /// A train is within this many standard deviations of where it is believed to be, but for one time in 15 000.
 const CERTAIN: f64 = 4.0;
 /// From the order until the points lie: a poll and the command on the line, and the solenoid.

@@ -7,10 +7,10 @@ use alloc::vec::Vec;
 use super::robust::RobustWeight;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
-use crate::model::decoder_kind::SHAPE_ERROR;
 use crate::model::parameters::{
     Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
 };
+use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;

@@ -21,9 +21,9 @@ use crate::track::Landmark;
 use crate::tracking::{Located, TrackContext, WayPoint};
 use crate::units::{Length, Speed};
 
-use super::arrival_plan::{ArrivalPlan, ArrivalProfile, Beginning, CREEPING, Means};
+use super::arrival_plan::{ArrivalProfile, Beginning, CREEPING, Means};
+use super::pace::{Arriving, Pace, Pacing};
 use super::reference::Reference;
-use super::task::{Pace, Pacing};
 
 /// A standing train that has more time than this speed needs waits rather than creeps.
 const UNHURRIED: Speed = Speed::from_mm_per_s(150.0);
@@ -31,18 +31,6 @@ const UNHURRIED: Speed = Speed::from_mm_per_s(150.0);
 const START_LOSS: f64 = 1.1;
 /// On a circuit a train that has time for it goes round so many times.
 const MOST_ROUNDS: u8 = 20;
-
-/// Where it goes, and how.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::control::drive) struct Arriving {
-    destination: Destination,
-    /// `None` for a way so short that it takes one step and the stop.
-    plan: Option<ArrivalPlan>,
-    /// What the times of the plan count from.
-    since: Timestamp,
-    /// For a train that stands: the step to start with, which it is commanded when the times begin to count.
-    start: Option<SpeedStep>,
-}
 
 /// What to do of all that could be done.
 struct Found {

@@ -29,9 +29,9 @@ use crate::units::{Length, Ratio, Speed};
 
 use super::command_budget::seconds;
 use super::lead_line::LeadLine;
+use super::pace::{Following, Pace, Pacing};
 use super::reference::Reference;
 use super::surveyed_way::SurveyedWay;
-use super::task::{Pace, Pacing};
 
 /// From the rear of one train to the front of the next there is never less: a hand's breadth.
 pub(in crate::control) const SAFE: Length = Length::from_mm(50.0);
@@ -69,19 +69,6 @@ const SLOWEST_JUDGED: Speed = Speed::from_mm_per_s(200.0);
 const USUAL_SPEED: Speed = Speed::from_mm_per_s(250.0);
 /// So many speeds beside the slowest.
 const SPEEDS_JUDGED: u8 = 4;
-
-/// Whom it follows, and how.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::control::drive) struct Following {
-    leader: TrainId,
-    gap: Gap,
-    /// It has been commanded to stop because it would come too near.
-    is_held: bool,
-    /// What it shall not pass, as of the last look, ...
-    rear: Option<WayPoint>,
-    /// ... and the fastest step from which it will still be able to stop before it.
-    fastest: Option<SpeedStep>,
-}
 
 impl Following {
     /// The fastest step that is safe, as of the last look.

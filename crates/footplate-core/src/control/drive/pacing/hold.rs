@@ -13,18 +13,9 @@ use crate::tracking::TrackContext;
 use crate::units::{Length, Speed};
 
 use super::ideal_line::IdealLine;
+use super::pace::{Holding, Pace, Pacing};
 use super::reference::Reference;
 use super::surveyed_way::SurveyedWay;
-use super::task::{Pace, Pacing};
-
-/// The speed to be held, and the line since there is one.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::control::drive) struct Holding {
-    speed: Speed,
-    /// From when on the train runs steadily at the step it was told first.
-    settled: Timestamp,
-    line: Option<IdealLine>,
-}
 
 impl Holding {
     /// Where it should be; `None` before there is a line, and when the way does not lead on from it any more.

@@ -12,6 +12,7 @@ mod hold;
 mod ideal_line;
 mod last_step;
 mod lead_line;
+mod pace;
 mod pacer;
 mod passages;
 mod reference;
@@ -21,5 +22,5 @@ mod task;
 mod zoned_transit;
 
 pub use arrival_plan::ArrivalProfile;
+pub(super) use pace::Pacing;
 pub(super) use passages::Passages;
-pub(super) use task::Pacing;

@@ -1,20 +1,16 @@
 //! What a train is paced for, and when it is looked at next.
 
-use alloc::boxed::Box;
-use alloc::vec::Vec;
-
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal};
-use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::ids::{NodeId, SensorId};
 use crate::link::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::TrackContext;
 
-use super::arrive::Arriving;
-use super::command_budget::{CommandBudget, SPACING, seconds};
-use super::follow::{Following, Others};
-use super::hold::Holding;
+use super::command_budget::{SPACING, seconds};
+use super::follow::Others;
+use super::pace::{Pace, Pacing};
 use super::reference::GRID;
 use super::step_search::StepSearch;
 use super::surveyed_way::SurveyedWay;
@@ -28,34 +24,6 @@ const WATCHED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 const FINE: f64 = 0.5 * GRID;
 /// A plan is looked at again after this time (s), whether or not anything was learnt.
 const AGAIN: f64 = 1.0;
-
-/// What a train is paced for.
-#[derive(Debug, Clone)]
-pub(in crate::control::drive) enum Pace {
-    /// To run at a speed.
-    Hold(Holding),
-    /// To come to rest in time.
-    Arrive(Box<Arriving>),
-    /// To keep a gap to another train.
-    Follow(Following),
-}
-
-/// A train that is paced.
-#[derive(Debug, Clone)]
-pub(in crate::control::drive) struct Pacing {
-    pub(super) pace: Pace,
-    /// The steps that may be commanded, slowest first.
-    pub(super) usable: Vec<SpeedStep>,
-    pub(super) budget: CommandBudget,
-    /// When it is looked at next.
-    pub(super) look: Option<Timestamp>,
-}
-
-impl Pacing {
-    pub(super) fn new(pace: Pace, usable: Vec<SpeedStep>, now: Timestamp) -> Self {
-        Self { pace, usable, budget: CommandBudget::UNUSED, look: Some(now) }
-    }
-}
 
 impl DrivenTrain {
     pub(super) fn paced(&self) -> Option<&Pacing> {

@@ -1,0 +1,24 @@
+//! How a turnout was commanded last, and how often.
+
+use crate::time::Timestamp;
+use crate::track::Leg;
+
+/// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
+/// hang together; those that do show when a train takes the other leg.
+pub(super) const SURE: u8 = 2;
+
+/// How a turnout was set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TurnoutCommand {
+    pub(super) leg: Leg,
+    /// How many times in a row.
+    pub(super) times: u8,
+    pub(super) last: Timestamp,
+}
+
+impl TurnoutCommand {
+    /// A turnout of which somebody knows how it lies.
+    pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: SURE, last: now }
+    }
+}

@@ -1,0 +1,79 @@
+//! Files of core that import each other in a circle: at most two, such as a machine and one family of its functions.
+#![expect(clippy::indexing_slicing, reason = "numbers of files, each of which is one of the list")]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::project::{Fault, assert_none, sources_below};
+use crate::source::Source;
+
+const CORE: &str = "crates/footplate-core/src/";
+/// More files than these cannot be read one after the other.
+const LARGEST: usize = 2;
+
+/// Which files of a list each file names something of.
+fn imports(sources: &[Source]) -> Vec<BTreeSet<usize>> {
+    let files = sources.iter().enumerate().filter(|(_, source)| !source.path.ends_with("/mod.rs"));
+    let at: BTreeMap<Vec<String>, usize> = files.map(|(at, source)| (source.module(), at)).collect();
+    let imported = |segments: &[String]| {
+        let inside = segments.strip_prefix(&["crate".to_owned()])?;
+        (1..=inside.len()).rev().find_map(|length| at.get(&inside[..length]).copied())
+    };
+    let of = |(own, source): (usize, &Source)| {
+        let all = source.named.iter().filter_map(|named| imported(&named.segments));
+        all.filter(|file| *file != own).collect()
+    };
+    sources.iter().enumerate().map(of).collect()
+}
+
+/// Everything that is reached from each file.
+fn reached(imports: &[BTreeSet<usize>]) -> Vec<BTreeSet<usize>> {
+    let from = |start: usize| {
+        let (mut seen, mut next) = (BTreeSet::new(), vec![start]);
+        while let Some(file) = next.pop() {
+            next.extend(imports[file].iter().filter(|file| seen.insert(**file)));
+        }
+        seen
+    };
+    (0..imports.len()).map(from).collect()
+}
+
+/// Groups of files each of which reaches all others of its group.
+fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
+    let reached = reached(&imports(sources));
+    let group = |file: usize| -> Vec<usize> {
+        (0..sources.len())
+            .filter(|other| reached[file].contains(other) && reached[*other].contains(&file))
+            .collect()
+    };
+    let groups: BTreeSet<Vec<usize>> =
+        (0..sources.len()).map(group).filter(|group| group.len() > 1).collect();
+    groups
+        .into_iter()
+        .map(|group| group.into_iter().map(|file| sources[file].path.as_str()).collect())
+        .collect()
+}
+
+#[test]
+fn no_more_than_two_files_import_each_other_in_a_circle() {
+    let sources = sources_below(CORE);
+    let circles = circles(&sources);
+    let large = circles.iter().filter(|circle| circle.len() > LARGEST).map(|circle| Fault {
+        path: circle[0].to_owned(),
+        line: 1,
+        what: format!("is in a circle of {} files: {}", circle.len(), circle.join(", ")),
+    });
+    assert_none(&large.collect::<Vec<_>>());
+}
+
+#[test]
+fn a_circle_is_found() {
+    let file = |name: &str, text: &str| Source::read(&format!("{CORE}track/{name}.rs"), text);
+    let sources = [
+        file("a", "use super::b::B;"),
+        file("b", "use crate::track::c::C;"),
+        file("c", "fn f() { super::a::g(); }"),
+        file("d", "use super::a::A;"),
+    ];
+    let [circle] = &circles(&sources)[..] else { panic!("one circle") };
+    assert_eq!(circle.len(), 3, "{circle:?}");
+}
