@@ -7,9 +7,14 @@
 extern crate alloc;
 
 pub mod dcc_ex;
+mod farewell;
+mod locomotives;
 pub mod marklin_serial;
 mod news;
+mod pacing;
 mod queue;
 mod session;
+mod silence;
+pub mod z21;
 
 pub use session::{Closing, CommandError, Confirmation, LinkNotice, Session, Transmit};

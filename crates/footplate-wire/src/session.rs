@@ -117,6 +117,13 @@ pub enum LinkNotice {
         /// The command.
         command: Command,
     },
+    /// The station is locked for driving over the network.
+    Locked,
+    /// The station does not tell this client everything that it was asked to.
+    BroadcastsRefused {
+        /// The flags that it left out.
+        missing: u32,
+    },
     /// The station has no such turnout.
     TurnoutRefused {
         /// The turnout.
@@ -290,6 +297,14 @@ impl Display for LinkNotice {
             Self::Unconfirmed { command } => {
                 write!(f, "the station did not confirm: {}; check that it has not stopped", Said(*command))
             }
+            Self::Locked => f.write_str(
+                "the station is locked: it ignores driving over the network until its unlock code is entered in its app",
+            ),
+            Self::BroadcastsRefused { missing } => write!(
+                f,
+                "the station does not report everything it was asked to (broadcast flags {missing:#010x}): check its firmware, \
+                 and what its sensors are connected to (feedback=r-bus, can or loconet)"
+            ),
             Self::TurnoutRefused { turnout } => write!(
                 f,
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \

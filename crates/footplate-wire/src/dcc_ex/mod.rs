@@ -7,16 +7,13 @@
 //! - [`Client`] is the session: it knows what is outstanding and what comes next.
 
 mod framing;
-mod locomotives;
 mod opening;
 mod outstanding;
-mod pacing;
 mod reply;
 mod request;
 mod sensors;
 mod session;
 mod settings;
-mod silence;
 mod time_model;
 
 pub use framing::{Framing, LONGEST_DIAGNOSTIC, LONGEST_MESSAGE};

@@ -1,7 +1,7 @@
 //! How long the link to each kind of station takes.
 
 use footplate_core::link::TimeModel;
-use footplate_wire::{dcc_ex, marklin_serial};
+use footplate_wire::{dcc_ex, marklin_serial, z21};
 
 use super::address::{Address, StationKind};
 
@@ -12,6 +12,7 @@ impl Address {
             Self::Simulated(simulated) => simulated.station.time_model(),
             Self::Serial(_) => StationKind::Marklin.time_model(),
             Self::Board(_) => StationKind::DccEx.time_model(),
+            Self::Z21(_) => StationKind::Z21.time_model(),
         }
     }
 }
@@ -21,6 +22,7 @@ impl StationKind {
         match self {
             Self::Marklin => marklin_serial::TIME_MODEL,
             Self::DccEx => dcc_ex::TIME_MODEL,
+            Self::Z21 => z21::TIME_MODEL,
         }
     }
 }

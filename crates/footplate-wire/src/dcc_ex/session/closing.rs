@@ -1,46 +1,10 @@
 //! The end of a session: every train is stopped, then the power goes off, and the board has to confirm both.
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, SpeedStep, Timestamp, TrainId};
 
 use super::Client;
+use crate::farewell::Farewell;
 use crate::session::{Closing, Confirmation, LinkNotice};
-
-/// How long the end waits for all stops to be confirmed before the power goes off all the same: five repeats.
-const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
-
-/// How far the end has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Farewell {
-    #[default]
-    NotBegun,
-    /// Trains are being stopped.
-    Stopping { until: Timestamp },
-    /// The power is being switched off.
-    SwitchingOff { is_confirmed: bool },
-    /// All is confirmed.
-    Over,
-}
-
-impl Farewell {
-    pub(super) fn begin(&mut self, now: Timestamp) {
-        *self = Self::Stopping { until: now + STOPS_WITHIN };
-    }
-
-    pub(super) fn has_begun(self) -> bool {
-        self != Self::NotBegun
-    }
-
-    pub(super) fn is_over(self) -> bool {
-        self == Self::Over
-    }
-
-    pub(super) const fn due(self) -> Option<Timestamp> {
-        match self {
-            Self::Stopping { until } => Some(until),
-            _ => None,
-        }
-    }
-}
 
 impl Client {
     /// Stops that wait are not dropped at the end. A train that was never driven here, as one that an earlier session left running,

@@ -1,4 +1,4 @@
-//! Whether the board answers at all, and since when it does not.
+//! Whether a station answers at all, and since when it does not.
 
 use footplate_core::{TimeSpan, Timestamp};
 
@@ -12,9 +12,21 @@ const SILENT_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 /// opened.
 const NOISE: usize = 64;
 
-/// The watch over what the board says.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Silence {
+/// What a person should check on a kind of link.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Checks {
+    /// When nothing at all was heard.
+    pub(crate) nothing_heard: &'static str,
+    /// When bytes came and none of them made a message.
+    pub(crate) nothing_whole: &'static str,
+    /// When much of what came could not be read.
+    pub(crate) noise: &'static str,
+}
+
+/// The watch over what the station says.
+#[derive(Debug, Clone)]
+pub(crate) struct Silence {
+    checks: Checks,
     /// The first request since the last message.
     since: Option<Timestamp>,
     /// Bytes that could not be read since then, and since the line was opened.
@@ -25,48 +37,46 @@ pub(super) struct Silence {
 }
 
 impl Silence {
+    pub(crate) const fn new(checks: Checks) -> Self {
+        let (since, unread, unread_in_all, is_silent, is_noise_known) = (None, 0, 0, false, false);
+        Self { checks, since, unread, unread_in_all, is_silent, is_noise_known }
+    }
+
     /// A request has gone that will be answered.
-    pub(super) fn asked(&mut self, at: Timestamp) {
+    pub(crate) fn asked(&mut self, at: Timestamp) {
         self.since.get_or_insert(at);
     }
 
-    /// A message has come; returns whether the board was called silent before.
-    pub(super) fn heard(&mut self) -> bool {
+    /// A message has come; returns whether the station was called silent before.
+    pub(crate) fn heard(&mut self) -> bool {
         (self.since, self.unread) = (None, 0);
         core::mem::take(&mut self.is_silent)
     }
 
     /// Bytes have come that are no message; says so once.
-    pub(super) fn heard_noise(&mut self, bytes: usize) -> Option<LinkNotice> {
+    pub(crate) fn heard_noise(&mut self, bytes: usize) -> Option<LinkNotice> {
         self.unread = self.unread.saturating_add(bytes);
         self.unread_in_all = self.unread_in_all.saturating_add(bytes);
         if self.unread_in_all < NOISE || self.is_noise_known {
             return None;
         }
         self.is_noise_known = true;
-        Some(LinkNotice::Unreadable {
-            bytes: self.unread_in_all,
-            check: "check the line's speed (115200 baud), the cable, and that no other program writes to the port",
-        })
+        Some(LinkNotice::Unreadable { bytes: self.unread_in_all, check: self.checks.noise })
     }
 
     /// Whether it is silent by now; says so once.
-    pub(super) fn watch(&mut self, now: Timestamp) -> Option<LinkNotice> {
+    pub(crate) fn watch(&mut self, now: Timestamp) -> Option<LinkNotice> {
         let since = now - self.since?;
         if since < SILENT_AFTER || self.is_silent {
             return None;
         }
         self.is_silent = true;
-        let check = if self.unread == 0 {
-            "check its power, the cable and the port"
-        } else {
-            "check the line's speed (115200 baud) and that the port belongs to a DCC-EX board"
-        };
+        let check = if self.unread == 0 { self.checks.nothing_heard } else { self.checks.nothing_whole };
         Some(LinkNotice::Silent { since, bytes: self.unread, check })
     }
 
     /// When to look again.
-    pub(super) fn due(&self) -> Option<Timestamp> {
+    pub(crate) fn due(&self) -> Option<Timestamp> {
         self.since.filter(|_| !self.is_silent).map(|since| since + SILENT_AFTER)
     }
 }

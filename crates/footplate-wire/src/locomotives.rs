@@ -1,4 +1,4 @@
-//! What was commanded to each locomotive, and what the board has confirmed of it.
+//! What was commanded to each locomotive, and what the station has confirmed of it.
 
 use alloc::vec::Vec;
 
@@ -6,33 +6,33 @@ use footplate_core::{SpeedStep, TrainId};
 
 /// One locomotive.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Locomotive {
-    pub(super) train: TrainId,
-    /// Which end leads, by the last command; `None` until the board has said how it is driven.
-    pub(super) forward: Option<bool>,
+pub(crate) struct Locomotive {
+    pub(crate) train: TrainId,
+    /// Which end leads, by the last command; `None` until the station has said how it is driven.
+    pub(crate) forward: Option<bool>,
     /// The step of the last command.
-    pub(super) step: SpeedStep,
+    pub(crate) step: SpeedStep,
     /// Whether a speed was ever written for it, so that it has to be stopped at the end.
-    pub(super) is_driven: bool,
-    /// Whether the board has confirmed step 0 since the last other step.
-    pub(super) is_stopped: bool,
+    pub(crate) is_driven: bool,
+    /// Whether the station has confirmed step 0 since the last other step.
+    pub(crate) is_stopped: bool,
 }
 
 /// All that were commanded or asked for.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Locomotives(Vec<Locomotive>);
+pub(crate) struct Locomotives(Vec<Locomotive>);
 
 impl Locomotives {
-    pub(super) fn get(&self, train: TrainId) -> Option<&Locomotive> {
+    pub(crate) fn get(&self, train: TrainId) -> Option<&Locomotive> {
         self.0.iter().find(|locomotive| locomotive.train == train)
     }
 
-    pub(super) fn get_mut(&mut self, train: TrainId) -> Option<&mut Locomotive> {
+    pub(crate) fn get_mut(&mut self, train: TrainId) -> Option<&mut Locomotive> {
         self.0.iter_mut().find(|locomotive| locomotive.train == train)
     }
 
     /// A locomotive is going to be commanded.
-    pub(super) fn know(&mut self, train: TrainId) {
+    pub(crate) fn know(&mut self, train: TrainId) {
         if self.get(train).is_none() {
             let step = SpeedStep::STAND;
             self.0.push(Locomotive { train, forward: None, step, is_driven: false, is_stopped: false });
@@ -40,20 +40,20 @@ impl Locomotives {
     }
 
     /// Whether it is known which end of a train leads.
-    pub(super) fn has_direction(&self, train: TrainId) -> bool {
+    pub(crate) fn has_direction(&self, train: TrainId) -> bool {
         self.get(train).is_some_and(|locomotive| locomotive.forward.is_some())
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Locomotive> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Locomotive> {
         self.0.iter()
     }
 
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Locomotive> {
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Locomotive> {
         self.0.iter_mut()
     }
 
     /// Those that ever had a speed and have stopped, or not.
-    pub(super) fn driven(&self, stopped: bool) -> Vec<TrainId> {
+    pub(crate) fn driven(&self, stopped: bool) -> Vec<TrainId> {
         let driven =
             self.0.iter().filter(|locomotive| locomotive.is_driven && locomotive.is_stopped == stopped);
         driven.map(|locomotive| locomotive.train).collect()

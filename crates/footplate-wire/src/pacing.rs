@@ -1,0 +1,61 @@
+//! How fast requests may follow one another: stations drop what they have no room for, without a word.
+
+use footplate_core::{TimeSpan, Timestamp};
+
+/// When the next request may go.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pacing {
+    /// From request to request on average.
+    every: TimeSpan,
+    /// Requests that may go at once after a pause.
+    at_once: i64,
+    /// What stops a train waits no longer than this for the request before.
+    urgent_after: TimeSpan,
+    /// The time up to which the average is used up.
+    used_until: Timestamp,
+    last: Option<Timestamp>,
+}
+
+impl Pacing {
+    /// A pace: the mean time between requests, how many may go at once, and how long what stops a train waits at most.
+    pub(crate) const fn new(every: TimeSpan, at_once: i64, urgent_after: TimeSpan) -> Self {
+        Self { every, at_once, urgent_after, used_until: Timestamp::ZERO, last: None }
+    }
+
+    /// When a request may go that can wait.
+    pub(crate) fn usual_at(&self) -> Timestamp {
+        self.used_until - TimeSpan::from_ns(self.every.as_ns() * (self.at_once - 1))
+    }
+
+    /// When a request may go that stops something.
+    pub(crate) fn urgent_at(&self) -> Timestamp {
+        let after_last = self.last.map_or(self.usual_at(), |last| last + self.urgent_after);
+        self.usual_at().min(after_last)
+    }
+
+    pub(crate) fn sent(&mut self, now: Timestamp) {
+        self.used_until = self.used_until.max(now) + self.every;
+        self.last = Some(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_go_at_once_then_twenty_a_second() {
+        let mut pacing = Pacing::new(TimeSpan::from_ms(50), 3, TimeSpan::from_ms(10));
+        let (mut now, mut sent) = (Timestamp::from_s(1.0), 0);
+        let end = Timestamp::from_s(3.0);
+        while now < end {
+            if now >= pacing.usual_at() {
+                pacing.sent(now);
+                sent += 1;
+            }
+            now += TimeSpan::from_ms(1);
+        }
+        assert_eq!(sent, 42, "three at once, then one each 50 ms");
+        assert!(pacing.urgent_at() <= pacing.last.unwrap() + TimeSpan::from_ms(10));
+    }
+}

@@ -1,0 +1,100 @@
+//! Which sensors are occupied, and what a message about one of them means when messages may be lost, come twice or too late.
+
+use alloc::vec::Vec;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+/// A sensor that is occupied again so soon after it was free is not a second train: it bounced, or an older datagram has
+/// overtaken a newer one. Longer than the interval at which states are asked for, which puts such an error right.
+const BOUNCES: TimeSpan = TimeSpan::from_ms(400);
+
+/// One sensor.
+#[derive(Debug, Clone, Copy)]
+struct Sensor {
+    number: u16,
+    is_occupied: bool,
+    /// When it was last said to have become free.
+    freed: Option<Timestamp>,
+    /// When it was last said to be free.
+    free_at: Option<Timestamp>,
+}
+
+/// The sensors that the station has spoken of, in the order of their numbers there.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sensors(Vec<Sensor>);
+
+/// What a message means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Change {
+    /// It has become occupied; when it was last said to be free.
+    Occupied { free_at: Option<Timestamp> },
+    /// It is occupied, and was before it was first asked for.
+    HeldFromStart,
+    /// Nothing new, or free.
+    None,
+}
+
+impl Sensors {
+    /// A sensor is occupied or free. `listing`: the states are being asked for, so that the first word about a sensor is no change.
+    pub(super) fn heard(&mut self, now: Timestamp, number: u16, is_occupied: bool, listing: bool) -> Change {
+        let sensor = match self.0.binary_search_by_key(&number, |sensor| sensor.number) {
+            Ok(at) => self.0.get_mut(at),
+            Err(at) => {
+                let free_at = (!is_occupied).then_some(now);
+                self.0.insert(at, Sensor { number, is_occupied, freed: None, free_at });
+                return match (is_occupied, listing) {
+                    (true, true) => Change::HeldFromStart,
+                    (true, false) => Change::Occupied { free_at: None },
+                    (false, _) => Change::None,
+                };
+            }
+        };
+        let Some(sensor) = sensor else { return Change::None };
+        let was_occupied = core::mem::replace(&mut sensor.is_occupied, is_occupied);
+        let bounces = sensor.freed.is_some_and(|freed| now - freed < BOUNCES);
+        let free_at = sensor.free_at;
+        if !is_occupied {
+            sensor.free_at = Some(now);
+            if was_occupied {
+                sensor.freed = Some(now);
+            }
+        }
+        if is_occupied && !was_occupied && !bounces { Change::Occupied { free_at } } else { Change::None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(ms: i64) -> Timestamp {
+        Timestamp::ZERO + TimeSpan::from_ms(ms)
+    }
+
+    #[test]
+    fn a_sensor_is_reported_once_each_time_it_becomes_occupied() {
+        let mut sensors = Sensors::default();
+        assert_eq!(sensors.heard(at(0), 5, false, true), Change::None);
+        assert_eq!(sensors.heard(at(0), 3, true, true), Change::HeldFromStart);
+        assert_eq!(sensors.heard(at(100), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(900), 5, true, false), Change::Occupied { free_at: Some(at(100)) });
+        assert_eq!(sensors.heard(at(910), 5, true, false), Change::None, "it came twice");
+        assert_eq!(sensors.heard(at(1_300), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(2_000), 5, true, false), Change::Occupied { free_at: Some(at(1_300)) });
+        assert_eq!(sensors.heard(at(2_000), 9, true, false), Change::Occupied { free_at: None });
+    }
+
+    #[test]
+    fn an_older_datagram_behind_a_newer_one_is_no_second_train() {
+        let mut sensors = Sensors::default();
+        sensors.heard(at(0), 5, false, true);
+        assert!(matches!(sensors.heard(at(1_000), 5, true, false), Change::Occupied { .. }));
+        // The answer from before it was occupied comes late, and the next puts it right.
+        assert_eq!(sensors.heard(at(1_004), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_200), 5, true, false), Change::None);
+        // It is free, and the message of before comes late.
+        assert_eq!(sensors.heard(at(1_500), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_520), 5, true, false), Change::None);
+        assert_eq!(sensors.heard(at(1_700), 5, false, false), Change::None);
+    }
+}

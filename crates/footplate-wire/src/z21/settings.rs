@@ -1,0 +1,72 @@
+//! What a station, its sensors and its turnouts are like.
+
+use core::ops::RangeInclusive;
+
+use footplate_core::{TimeSpan, TurnoutId};
+
+use super::broadcasts::Broadcasts;
+use super::detectors::{Feedback, GROUP_INPUTS, GROUPS};
+use super::request::TURNOUTS;
+use super::speed::Steps;
+use super::time_model::SENSOR_DELAY_LONGEST;
+
+/// What the station is like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// The steps of the decoders.
+    pub steps: Steps,
+    /// What sensors are connected to.
+    pub feedback: Feedback,
+    /// The station's number of the layout's sensor 0: 1 for input 1 of module 1.
+    pub first_sensor: u16,
+    /// The highest number of a sensor there, so that no group of modules is asked for that is not there.
+    pub last_sensor: u16,
+    /// The station's number of the layout's turnout 1, counted from 0: other programs and some stations are off by 4.
+    pub first_turnout: u16,
+    /// Which of a turnout's outputs lays it straight: the second (P = 1, RCN-213), or the first.
+    pub second_is_straight: bool,
+    /// The longest time from a sensor being occupied until the program hears of it.
+    pub sensor_delay: TimeSpan,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            steps: Steps::default(),
+            feedback: Feedback::default(),
+            first_sensor: 1,
+            last_sensor: GROUP_INPUTS,
+            first_turnout: 0,
+            second_is_straight: true,
+            sensor_delay: SENSOR_DELAY_LONGEST,
+        }
+    }
+}
+
+impl Settings {
+    /// What this client has to be told.
+    pub(super) fn broadcasts(&self) -> Broadcasts {
+        Broadcasts::STATES | Broadcasts::RAIL_COM | Broadcasts::SYSTEM_STATE | self.feedback.broadcasts()
+    }
+
+    /// The groups of the R-BUS that have to be asked for.
+    pub(super) fn groups(&self) -> RangeInclusive<u8> {
+        let last = self.last_sensor.saturating_sub(1) / GROUP_INPUTS;
+        0..=u8::try_from(last).unwrap_or(u8::MAX).min(GROUPS - 1)
+    }
+
+    /// The numbers that turnouts of the layout can have.
+    pub(super) fn turnouts(&self) -> RangeInclusive<u16> {
+        1..=(TURNOUTS.end() + 1).saturating_sub(self.first_turnout)
+    }
+
+    /// The station's number of a turnout.
+    pub(super) fn address_of(&self, turnout: TurnoutId) -> u16 {
+        turnout.0.saturating_sub(1).saturating_add(self.first_turnout)
+    }
+
+    /// The turnout of a station's number.
+    pub(super) fn turnout_at(&self, address: u16) -> Option<TurnoutId> {
+        Some(TurnoutId(address.checked_sub(self.first_turnout)?.checked_add(1)?))
+    }
+}

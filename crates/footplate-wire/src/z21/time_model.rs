@@ -1,0 +1,54 @@
+//! How long things take between the track, the station and this program.
+//!
+//! No source gives figures for a real Z21; these are reasoned, and wide on purpose. A feedback bus of this kind asks all its
+//! modules in a cycle of 33 ms (the RS-bus that the R-BUS resembles), so that a change waits for up to one cycle; then the station
+//! sends a datagram. Over a wired network that takes about a millisecond; 40 ms leave some for a busy station.
+
+use footplate_core::link::TimeModel;
+use footplate_core::{TimeSpan, Timestamp};
+
+/// The shortest time from a sensor being occupied until the host has the message: a datagram's way.
+pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ms(1);
+
+/// The longest, unless a person says another: one cycle of the feedback bus and what the station needs.
+pub const SENSOR_DELAY_LONGEST: TimeSpan = TimeSpan::from_ms(40);
+
+/// The times that planners need. A command counts as gone when its datagram is written. Datagrams go 20 ms apart at the most
+/// crowded, and a tenth more is allowed; a stop waits for 5 ms at most, behind the slowest report.
+pub const TIME_MODEL: TimeModel = TimeModel {
+    command: TimeSpan::ZERO,
+    usual_wait: TimeSpan::ZERO,
+    soonest: TimeSpan::from_ms(22),
+    reaction: TimeSpan::from_ms(50),
+    report_window: SENSOR_DELAY_LONGEST,
+};
+
+/// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
+///
+/// `not_before` is the time of the last entry of the recording, whose entries stay in order. `free_at`: when the station last said
+/// that the sensor is free, where that is known: for what was missed when it happened and is found when asked for.
+pub(super) fn occupied(
+    heard: Timestamp,
+    not_before: Timestamp,
+    longest: TimeSpan,
+    free_at: Option<Timestamp>,
+) -> (Timestamp, TimeSpan) {
+    let latest = (heard - SENSOR_DELAY_SHORTEST).max(not_before).min(heard);
+    let earliest = free_at.map_or(heard, |free| free.min(heard)) - longest;
+    (latest, latest - earliest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_reaches_back_over_the_delays_or_to_where_the_sensor_was_free() {
+        let heard = Timestamp::from_s(10.0);
+        let (latest, width) = occupied(heard, Timestamp::ZERO, SENSOR_DELAY_LONGEST, None);
+        assert_eq!((heard - latest, width), (TimeSpan::from_ms(1), TimeSpan::from_ms(39)));
+        let free = Some(heard - TimeSpan::from_ms(200));
+        let (latest, width) = occupied(heard, heard, SENSOR_DELAY_LONGEST, free);
+        assert_eq!((heard - latest, width), (TimeSpan::ZERO, TimeSpan::from_ms(240)));
+    }
+}

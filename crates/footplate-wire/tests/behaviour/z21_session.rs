@@ -1,0 +1,604 @@
+//! The session with a Z21: its order, its pace, and what it does when datagrams are lost, come twice or overtake one another.
+
+use std::collections::BTreeMap;
+
+use footplate_core::{
+    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
+use footplate_wire::z21::{
+    Broadcasts, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection, LocomotiveState,
+    Reply, Request, Settings, Steps, Throttle, TurnoutPosition,
+};
+use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+
+const T24: TrainId = TrainId(24);
+const T58: TrainId = TrainId(58);
+
+fn ms(ms: i64) -> Timestamp {
+    Timestamp::ZERO + TimeSpan::from_ms(ms)
+}
+
+fn speed(train: TrainId, step: u8) -> Command {
+    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
+}
+
+/// As the station says how a locomotive is driven.
+fn state(address: u16, throttle: Throttle, forward: bool) -> LocomotiveState {
+    LocomotiveState { address, busy: false, steps: Steps::All, throttle, forward, functions: 0 }
+}
+
+/// From a request to the answer.
+const ANSWER: TimeSpan = TimeSpan::from_ms(3);
+
+/// A station that answers what it is asked, and tells by itself only what a test makes it tell.
+struct Station {
+    locomotives: BTreeMap<u16, LocomotiveState>,
+    turnouts: BTreeMap<u16, bool>,
+    inputs: [u8; 10],
+    told: Broadcasts,
+    /// What it can tell.
+    tells: Broadcasts,
+    power: bool,
+    lock: Lock,
+    /// Whether it answers at all, and which datagrams, by their count, are lost on their way to it.
+    answers: bool,
+    loses: fn(usize) -> bool,
+    count: usize,
+}
+
+impl Station {
+    fn answer(&mut self, datagram: &[u8]) -> Vec<Vec<u8>> {
+        self.count += 1;
+        if !self.answers || (self.loses)(self.count) {
+            return Vec::new();
+        }
+        let replies = Datasets::of(datagram).filter_map(|dataset| self.obey(Request::read(&dataset)?));
+        replies.map(bytes).collect()
+    }
+
+    fn obey(&mut self, request: Request) -> Option<Reply> {
+        Some(match request {
+            Request::SerialNumber => Reply::SerialNumber(82_850),
+            Request::Hardware => {
+                Reply::Hardware { kind: 0x203, firmware: Firmware { major: 1, minor: 0x42 } }
+            }
+            Request::LockCode => Reply::LockCode(self.lock),
+            Request::SetBroadcasts(wanted) => {
+                self.told = Broadcasts(wanted.0 & self.tells.0);
+                return None;
+            }
+            Request::Broadcasts => Reply::Broadcasts(self.told),
+            Request::Status => Reply::Status(CentralState(if self.power { 0 } else { 2 })),
+            Request::Power { on } => {
+                self.power = on;
+                Reply::Power { on }
+            }
+            Request::StopAll => Reply::Stopped,
+            Request::Feedback { group } => Reply::Feedback { group, inputs: self.inputs },
+            Request::Locomotive { address } => Reply::Locomotive(self.locomotive(address)),
+            Request::Drive { address, throttle, forward, .. } => {
+                self.locomotives.insert(address, state(address, throttle, forward));
+                return None;
+            }
+            Request::SetTurnout { address, second, activate: true, .. } => {
+                self.turnouts.insert(address, second);
+                return None;
+            }
+            Request::Turnout { address } => {
+                let second = *self.turnouts.get(&address)?;
+                Reply::Turnout { address, position: TurnoutPosition::Output { second } }
+            }
+            _ => return None,
+        })
+    }
+
+    fn locomotive(&self, address: u16) -> LocomotiveState {
+        self.locomotives.get(&address).copied().unwrap_or_else(|| state(address, Throttle::Stop, true))
+    }
+}
+
+fn bytes(reply: Reply) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    reply.write(&mut bytes);
+    bytes
+}
+
+/// A session, the station, and the network between them.
+struct Desk {
+    client: Client,
+    now: Timestamp,
+    station: Station,
+    coming: Vec<(Timestamp, Vec<u8>)>,
+    /// What was written, and when (ms).
+    written: Vec<(i64, Request)>,
+    events: Vec<Event>,
+    notices: Vec<LinkNotice>,
+}
+
+impl Desk {
+    fn new(settings: Settings) -> Self {
+        let station = Station {
+            locomotives: BTreeMap::from([(24, state(24, Throttle::Stop, false))]),
+            turnouts: BTreeMap::new(),
+            inputs: [0; 10],
+            told: Broadcasts::NONE,
+            tells: Broadcasts(u32::MAX),
+            power: false,
+            lock: Lock::None,
+            answers: true,
+            loses: |_| false,
+            count: 0,
+        };
+        let client = Client::new(ms(0), settings);
+        let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { client, now: ms(0), station, coming, written, events, notices }
+    }
+
+    fn opened() -> Self {
+        let mut desk = Self::new(Settings::default());
+        desk.run_until(ms(1_000));
+        assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers), "{:?}", desk.written);
+        desk.written.clear();
+        desk.notices.clear();
+        desk
+    }
+
+    fn run_until(&mut self, end: Timestamp) {
+        loop {
+            while let Some(output) = self.client.poll_output() {
+                match output {
+                    Transmit::Message(datagram) => {
+                        let requests = Datasets::of(&datagram)
+                            .map(|dataset| Request::read(&dataset).expect("a request"));
+                        let at = (self.now - ms(0)).as_ns() / 1_000_000;
+                        self.written.extend(requests.map(|request| (at, request)));
+                        let due = self.now + ANSWER;
+                        self.coming
+                            .extend(self.station.answer(&datagram).into_iter().map(|bytes| (due, bytes)));
+                    }
+                    Transmit::Event(event) => self.events.push(event),
+                    Transmit::Notice(notice) => self.notices.push(notice),
+                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
+                }
+            }
+            self.coming.sort_by_key(|(at, _)| *at);
+            let next = [self.coming.first().map(|(at, _)| *at), self.client.next_timeout()];
+            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
+            self.now = self.now.max(at);
+            if self.coming.first().is_some_and(|(due, _)| *due <= at) {
+                let (_, datagram) = self.coming.remove(0);
+                self.client.handle_bytes(self.now, &datagram);
+            } else {
+                self.client.handle_timeout(at);
+                let next = self.client.next_timeout();
+                assert!(next.is_none_or(|next| next > at), "a session that is never done");
+            }
+        }
+        self.now = end;
+    }
+
+    fn run_for(&mut self, span_ms: i64) {
+        self.run_until(self.now + TimeSpan::from_ms(span_ms));
+    }
+
+    fn command(&mut self, command: Command) {
+        self.client.handle_command(self.now, command).unwrap();
+    }
+
+    fn hear(&mut self, reply: Reply) {
+        self.client.handle_bytes(self.now, &bytes(reply));
+    }
+
+    /// What was written but for the questions that are asked all the time.
+    fn commands(&self) -> Vec<Request> {
+        let is_command = |request: &Request| {
+            matches!(
+                request,
+                Request::Drive { .. } | Request::SetTurnout { .. } | Request::Power { .. } | Request::StopAll
+            )
+        };
+        self.written.iter().map(|(_, request)| *request).filter(is_command).collect()
+    }
+
+    fn reports(&self) -> Vec<(i64, u16, i64)> {
+        let report = |event: &Event| match event.kind {
+            EventKind::Sensor(Report { sensor, poll_interval }) => {
+                let at = (event.time - ms(0)).as_ns() / 1_000_000;
+                Some((at, sensor.0, poll_interval.unwrap().as_ns() / 1_000_000))
+            }
+            _ => None,
+        };
+        self.events.iter().filter_map(report).collect()
+    }
+}
+
+fn drive(address: u16, throttle: Throttle, forward: bool) -> Request {
+    Request::Drive { address, steps: Steps::All, throttle, forward }
+}
+
+#[test]
+fn the_station_is_asked_what_it_is_and_told_what_to_tell() {
+    let mut desk = Desk::new(Settings::default());
+    desk.station.inputs[0] = 0x08;
+    desk.run_until(ms(400));
+    let wanted = Broadcasts(0x0000_0107);
+    let requests: Vec<Request> = desk.written.iter().map(|(_, request)| *request).take(9).collect();
+    let expected = [
+        Request::SerialNumber,
+        Request::Hardware,
+        Request::LockCode,
+        Request::SetBroadcasts(wanted),
+        Request::Broadcasts,
+        Request::Feedback { group: 0 },
+        Request::Power { on: true },
+        Request::Status,
+        Request::Feedback { group: 0 },
+    ];
+    assert_eq!(requests, expected);
+    assert_eq!(desk.station.told, wanted);
+    let identity = "z21, firmware 1.42, serial number 82850".to_owned();
+    let held = LinkNotice::HeldClosed { sensor: SensorId(3) };
+    assert_eq!(desk.notices, [LinkNotice::Identified { identity }, held, LinkNotice::Answers]);
+    assert_eq!(desk.events, [], "states at the opening are no events");
+}
+
+#[test]
+fn the_opening_gets_through_whatever_is_lost() {
+    let mut desk = Desk::new(Settings::default());
+    // Two datagrams of three are lost.
+    desk.station.loses = |count| !count.is_multiple_of(3);
+    desk.run_until(ms(6_000));
+    assert!(desk.notices.contains(&LinkNotice::Answers), "{:?}", desk.written);
+    assert!(desk.station.told.has(Broadcasts::STATES) && desk.station.power);
+}
+
+#[test]
+fn a_station_that_is_locked_and_one_that_reports_less_are_named() {
+    let mut desk = Desk::new(Settings::default());
+    desk.station.lock = Lock::Locked;
+    desk.station.tells = Broadcasts(0x0000_0003);
+    desk.run_until(ms(3_000));
+    assert!(desk.notices.contains(&LinkNotice::Locked));
+    assert!(desk.notices.contains(&LinkNotice::BroadcastsRefused { missing: 0x104 }), "{:?}", desk.notices);
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers));
+    // It is not taken for one that was restarted.
+    desk.run_for(20_000);
+    assert!(!desk.notices.contains(&LinkNotice::Restarted));
+}
+
+#[test]
+fn the_direction_is_read_back_and_then_absolute() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(300);
+    // 24 was left running backwards by whoever drove it before.
+    let expected = [drive(24, Throttle::Step(72), false), drive(58, Throttle::Step(81), true)];
+    assert_eq!(desk.commands(), expected);
+    desk.written.clear();
+    for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
+        desk.command(command);
+        desk.run_for(100);
+    }
+    let expected = [
+        drive(24, Throttle::Stop, false),
+        drive(24, Throttle::Stop, true),
+        drive(24, Throttle::Step(72), true),
+    ];
+    assert_eq!(desk.commands(), expected);
+}
+
+#[test]
+fn each_number_of_steps_is_driven_in() {
+    for (steps, step) in [(Steps::Fourteen, 8), (Steps::TwentyEight, 16), (Steps::All, 72)] {
+        let mut desk = Desk::new(Settings { steps, ..Settings::default() });
+        desk.run_until(ms(1_000));
+        desk.command(speed(T58, 8));
+        desk.run_for(1_000);
+        let throttle = Throttle::Step(step);
+        assert_eq!(
+            desk.commands().last(),
+            Some(&Request::Drive { address: 58, steps, throttle, forward: true })
+        );
+    }
+}
+
+#[test]
+fn a_stop_goes_first_and_is_written_until_the_station_has_it() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.written.clear();
+    // Eleven of twelve datagrams are lost from here on.
+    desk.station.loses = |count| !count.is_multiple_of(12);
+    for number in 1..=10 {
+        desk.command(Command::Turnout { turnout: TurnoutId(number), curved: true });
+    }
+    desk.command(speed(T24, 0));
+    desk.run_for(20);
+    assert!(desk.commands().contains(&drive(24, Throttle::Stop, false)), "{:?}", desk.written);
+    desk.run_for(8_000);
+    assert_eq!(desk.station.locomotive(24).throttle, Throttle::Stop);
+}
+
+#[test]
+fn a_stop_that_is_lost_once_is_written_again_after_a_tenth_of_a_second() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.written.clear();
+    desk.station.count = 0;
+    desk.station.loses = |count| count == 1;
+    desk.command(speed(T24, 0));
+    desk.run_for(500);
+    let stops: Vec<i64> = desk
+        .written
+        .iter()
+        .filter(|(_, request)| *request == drive(24, Throttle::Stop, false))
+        .map(|(at, _)| *at)
+        .collect();
+    assert_eq!(stops.len(), 2, "{:?}", desk.written);
+    assert_eq!(stops[1] - stops[0], 100);
+    assert_eq!(desk.station.locomotive(24).throttle, Throttle::Stop);
+    assert!(desk.notices.is_empty(), "one lost datagram is no news: {:?}", desk.notices);
+}
+
+#[test]
+fn what_is_given_up_is_named() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.station.answers = false;
+    desk.command(speed(T24, 9));
+    desk.run_for(2_000);
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed { command: speed(T24, 9) }), "{:?}", desk.notices);
+    desk.written.clear();
+    desk.command(speed(T24, 0));
+    desk.run_for(3_000);
+    assert!(desk.commands().len() >= 25, "stops are never given up: {}", desk.commands().len());
+}
+
+#[test]
+fn an_old_datagram_is_no_other_throttle() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.command(speed(T24, 0));
+    desk.run_for(200);
+    // What was said while it ran comes again, late, and the answer to the question puts it right.
+    desk.hear(Reply::Locomotive(state(24, Throttle::Step(72), false)));
+    desk.hear(Reply::Power { on: false });
+    desk.run_for(500);
+    assert_eq!(desk.notices, []);
+    // But a throttle that goes on driving it is one.
+    desk.station.locomotives.insert(24, state(24, Throttle::Step(40), true));
+    desk.hear(Reply::Locomotive(state(24, Throttle::Step(40), true)));
+    desk.station.power = false;
+    desk.hear(Reply::Power { on: false });
+    desk.run_for(500);
+    assert!(
+        desk.notices.contains(&LinkNotice::OtherThrottle { train: T24, reversed: true }),
+        "{:?}",
+        desk.notices
+    );
+    assert!(desk.notices.contains(&LinkNotice::PowerLost));
+}
+
+#[test]
+fn a_sensor_is_an_event_with_the_span_of_its_delay() {
+    let mut desk = Desk::opened();
+    // Told by itself, between two questions.
+    desk.run_until(ms(1_350));
+    let inputs = |first: u8| Reply::Feedback { group: 0, inputs: [first, 0, 0, 0, 0, 0, 0, 0, 0, 0] };
+    desk.station.inputs[0] = 0x20;
+    let asked = desk.written.iter().map(|(at, _)| *at).max().unwrap();
+    assert!(1_350 - asked > 20, "{asked}");
+    desk.hear(inputs(0x20));
+    desk.hear(inputs(0x20));
+    desk.run_until(ms(2_000));
+    assert_eq!(desk.reports(), [(1_349, 5, 39)]);
+}
+
+#[test]
+fn a_sensor_whose_datagram_was_lost_is_found_by_asking() {
+    let mut desk = Desk::opened();
+    desk.run_until(ms(1_310));
+    desk.station.inputs[9] = 0x80;
+    desk.run_until(ms(2_000));
+    let reports = desk.reports();
+    let [(at, 79, width)] = reports[..] else { panic!("{reports:?}") };
+    // It became occupied between the question that found it free and the one that found it occupied.
+    assert!((1_310..=1_520).contains(&at) && (200..=260).contains(&width), "{reports:?}");
+}
+
+#[test]
+fn datagrams_that_come_twice_or_in_another_order_make_no_second_train() {
+    let mut desk = Desk::opened();
+    let inputs = |first: u8| Reply::Feedback { group: 0, inputs: [first, 0, 0, 0, 0, 0, 0, 0, 0, 0] };
+    desk.run_until(ms(1_310));
+    desk.station.inputs[0] = 0x01;
+    desk.hear(inputs(1));
+    desk.run_for(5);
+    desk.hear(inputs(0));
+    desk.run_for(5);
+    desk.hear(inputs(1));
+    desk.run_for(700);
+    desk.station.inputs[0] = 0;
+    desk.hear(inputs(0));
+    desk.run_for(20);
+    desk.hear(inputs(1));
+    desk.run_for(1_000);
+    assert_eq!(desk.reports().len(), 1, "{:?}", desk.reports());
+}
+
+#[test]
+fn detectors_on_loconet_are_heard_by_their_address() {
+    let settings = Settings { feedback: Feedback::LocoNet, first_sensor: 17, ..Settings::default() };
+    let mut desk = Desk::new(settings);
+    desk.run_until(ms(1_000));
+    assert!(desk.station.told.has(Broadcasts::LOCO_NET) && !desk.station.told.has(Broadcasts::R_BUS));
+    desk.hear(Reply::LocoNet(LocoNetDetection { kind: 1, address: 20, info: 1 }));
+    desk.hear(Reply::LocoNet(LocoNetDetection { kind: 1, address: 3, info: 1 }));
+    desk.run_for(10);
+    assert_eq!(desk.reports(), [(999, 3, 39)]);
+}
+
+#[test]
+fn turnouts_are_powered_one_after_the_other_and_let_go() {
+    let mut desk = Desk::opened();
+    for number in [5, 7] {
+        desk.command(Command::Turnout { turnout: TurnoutId(number), curved: number == 7 });
+    }
+    desk.run_for(1_000);
+    let set = |address, second, activate| Request::SetTurnout { address, second, activate, queue: false };
+    // Straight is the second output; a release is written twice, because nothing confirms it.
+    let expected = [
+        set(4, true, true),
+        set(4, true, false),
+        set(4, true, false),
+        set(6, false, true),
+        set(6, false, false),
+        set(6, false, false),
+    ];
+    assert_eq!(desk.commands(), expected);
+    let times: Vec<i64> = desk
+        .written
+        .iter()
+        .filter(|(_, request)| matches!(request, Request::SetTurnout { .. }))
+        .map(|(at, _)| *at)
+        .collect();
+    assert!((100..=250).contains(&(times[1] - times[0])), "{times:?}");
+    assert!(times[3] >= times[2], "{times:?}");
+    // Another hand-set throws one.
+    let position = TurnoutPosition::Output { second: false };
+    desk.hear(Reply::Turnout { address: 4, position });
+    desk.run_for(1);
+    let thrown = EventKind::Turnout { turnout: TurnoutId(5), curved: true };
+    assert_eq!(desk.events.last().map(|event| event.kind), Some(thrown));
+}
+
+#[test]
+fn silence_is_noticed_and_everything_asked_again_after_it() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.station.answers = false;
+    desk.run_for(2_500);
+    let silent = |notice: &&LinkNotice| matches!(notice, LinkNotice::Silent { .. });
+    assert_eq!(desk.notices.iter().filter(silent).count(), 1);
+    let text = desk.notices.iter().find(silent).unwrap().to_string();
+    assert!(text.contains("192.168.0.111"), "{text}");
+    (desk.station.answers, desk.station.inputs[0]) = (true, 1);
+    desk.written.clear();
+    desk.run_for(1_000);
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers));
+    assert!(desk.written.iter().any(|(_, request)| *request == Request::Locomotive { address: 24 }));
+    assert!(!desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
+    let [(_, 0, width)] = desk.reports()[..] else { panic!("{:?}", desk.reports()) };
+    assert!(width > 2_000, "it became occupied at some time of the silence: {width} ms");
+}
+
+#[test]
+fn a_station_that_was_restarted_is_recognised_by_what_it_forgot_and_trains_are_stopped() {
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(200);
+    desk.written.clear();
+    desk.station.told = Broadcasts::NONE;
+    desk.station.locomotives.clear();
+    desk.run_for(6_000);
+    assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers));
+    // The direction that it had is written again.
+    assert_eq!(desk.commands()[..2], [drive(24, Throttle::Stop, false), Request::Power { on: true }]);
+    assert!(desk.station.told.has(Broadcasts::R_BUS));
+}
+
+#[test]
+fn the_end_is_confirmed_by_the_station() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(500);
+    desk.written.clear();
+    desk.client.close(desk.now);
+    desk.run_for(500);
+    let expected =
+        [drive(24, Throttle::Stop, false), drive(58, Throttle::Stop, true), Request::Power { on: false }];
+    assert_eq!(desk.commands(), expected);
+    assert_eq!(desk.written.last().map(|(_, request)| *request), Some(Request::LogOff));
+    let closing = desk.client.closing();
+    assert!(closing.is_complete(), "{closing}");
+    let said = "commanded to stop: 24, 58; track power switched off; the station has confirmed it";
+    assert_eq!(closing.to_string(), said);
+    assert_eq!(desk.client.handle_command(desk.now, speed(T24, 3)), Err(CommandError::Closed));
+}
+
+#[test]
+fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commanded() {
+    let mut desk = Desk::new(Settings::default());
+    desk.station.locomotives.insert(24, state(24, Throttle::Step(72), false));
+    desk.command(speed(T24, 0));
+    desk.client.close(desk.now);
+    desk.run_for(500);
+    let expected = [Request::StopAll, drive(24, Throttle::Stop, false), Request::Power { on: false }];
+    assert_eq!(desk.commands(), expected);
+    let closing = desk.client.closing();
+    assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
+}
+
+#[test]
+fn the_end_gets_through_when_datagrams_are_lost_and_names_what_did_not() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(500);
+    desk.station.loses = |count| !count.is_multiple_of(3);
+    desk.client.close(desk.now);
+    desk.run_for(3_000);
+    assert!(desk.client.closing().is_complete(), "{}", desk.client.closing());
+    let mut desk = Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(500);
+    desk.station.answers = false;
+    desk.client.close(desk.now);
+    desk.run_for(5_000);
+    let closing = desk.client.closing();
+    assert_eq!((closing.power_off, closing.not_commanded), (false, vec![T24]));
+}
+
+#[test]
+fn noise_is_called_noise_once() {
+    let mut desk = Desk::opened();
+    for _ in 0..20 {
+        desk.client.handle_bytes(desk.now, b"GET / HTTP/1.1");
+        desk.run_for(20);
+    }
+    let noise: Vec<String> = desk
+        .notices
+        .iter()
+        .filter(|notice| matches!(notice, LinkNotice::Unreadable { .. }))
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(noise.len(), 1);
+    assert!(noise[0].contains("UDP port 21105"), "{}", noise[0]);
+}
+
+#[test]
+fn what_the_station_does_not_know_is_refused() {
+    let mut desk = Desk::opened();
+    let refusals = [
+        (speed(TrainId(0), 3), "train 0 has no address here; addresses are 1 to 9999"),
+        (speed(T24, 15), "step 15 is beyond the decoder; steps are 0 to 14"),
+        (
+            Command::Turnout { turnout: TurnoutId(2_049), curved: true },
+            "turnout 2049 has no address here; addresses are 1 to 2048",
+        ),
+    ];
+    for (command, reason) in refusals {
+        assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
+    }
+}
