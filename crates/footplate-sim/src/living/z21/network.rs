@@ -28,64 +28,82 @@ pub(super) struct Network {
     duplicated: Ratio,
     overtaken: Ratio,
     count: u64,
-    to_station: Vec<OnItsWay>,
-    to_client: Vec<OnItsWay>,
+    to_station: Way,
+    to_client: Way,
+}
+
+/// One direction.
+#[derive(Debug, Clone)]
+struct Way {
+    datagrams: Vec<OnItsWay>,
+    /// When the last one arrives that is not overtaken: the others stay in order.
+    last_due: Timestamp,
 }
 
 impl Network {
-    pub(super) const fn new(draws: Draws, switches: Z21Switches) -> Self {
+    pub(super) fn new(draws: Draws, switches: Z21Switches) -> Self {
         let Z21Switches { lost, duplicated, overtaken, .. } = switches;
-        Self { draws, lost, duplicated, overtaken, count: 0, to_station: Vec::new(), to_client: Vec::new() }
+        let way = || Way { datagrams: Vec::new(), last_due: Timestamp::ZERO };
+        Self { draws, lost, duplicated, overtaken, count: 0, to_station: way(), to_client: way() }
     }
 
     pub(super) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
-        let sent = self.sent(now, client, datagram);
-        self.to_station.extend(sent);
+        let last = self.to_station.last_due;
+        let (sent, last) = self.sent(now, last, client, datagram);
+        self.to_station.take(sent, last);
     }
 
     pub(super) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
-        let sent = self.sent(leaves, client, datagram);
-        self.to_client.extend(sent);
+        let last = self.to_client.last_due;
+        let (sent, last) = self.sent(leaves, last, client, datagram);
+        self.to_client.take(sent, last);
     }
 
     pub(super) fn next_to_station(&self) -> Option<Timestamp> {
-        self.to_station.iter().map(|datagram| datagram.due).min()
+        self.to_station.next()
     }
 
     pub(super) fn next_to_client(&self) -> Option<Timestamp> {
-        self.to_client.iter().map(|datagram| datagram.due).min()
+        self.to_client.next()
     }
 
     pub(super) fn take_to_station(&mut self) -> Option<(usize, Vec<u8>)> {
-        take_first(&mut self.to_station)
+        self.to_station.take_first()
     }
 
     pub(super) fn take_to_client(&mut self) -> Option<(usize, Vec<u8>)> {
-        take_first(&mut self.to_client)
+        self.to_client.take_first()
     }
 
     pub(super) fn clear(&mut self) {
-        self.to_station.clear();
-        self.to_client.clear();
+        self.to_station.datagrams.clear();
+        self.to_client.datagrams.clear();
     }
 
-    /// A datagram leaves: nothing of it arrives, or once or twice.
-    fn sent(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) -> Vec<OnItsWay> {
+    /// A datagram leaves: nothing of it arrives, or once or twice, none before `last`; returns the new last.
+    fn sent(
+        &mut self,
+        leaves: Timestamp,
+        mut last: Timestamp,
+        client: usize,
+        datagram: &[u8],
+    ) -> (Vec<OnItsWay>, Timestamp) {
         let copies = 1 + usize::from(self.happens(self.duplicated));
         let mut sent = Vec::with_capacity(copies);
         for _ in 0..copies {
-            let mut takes_s = self.draws.uniform(TAKES_S);
+            let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(TAKES_S))).max(last);
             if self.happens(self.overtaken) {
-                takes_s += self.draws.uniform(OVERTAKEN_S);
+                due += TimeSpan::from_s(self.draws.uniform(OVERTAKEN_S));
+            } else {
+                last = due;
             }
             if self.happens(self.lost) {
                 continue;
             }
             self.count += 1;
-            let due = leaves + TimeSpan::from_s(takes_s);
             sent.push(OnItsWay { due, nth: self.count, client, datagram: datagram.to_vec() });
         }
-        sent
+        (sent, last)
     }
 
     fn happens(&mut self, share: Ratio) -> bool {
@@ -93,9 +111,20 @@ impl Network {
     }
 }
 
-fn take_first(datagrams: &mut Vec<OnItsWay>) -> Option<(usize, Vec<u8>)> {
-    let first = datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
-    let at = first.map(|(at, _)| at)?;
-    let OnItsWay { client, datagram, .. } = datagrams.swap_remove(at);
-    Some((client, datagram))
+impl Way {
+    fn take(&mut self, sent: Vec<OnItsWay>, last_due: Timestamp) {
+        self.datagrams.extend(sent);
+        self.last_due = last_due;
+    }
+
+    fn next(&self) -> Option<Timestamp> {
+        self.datagrams.iter().map(|datagram| datagram.due).min()
+    }
+
+    fn take_first(&mut self) -> Option<(usize, Vec<u8>)> {
+        let first = self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
+        let at = first.map(|(at, _)| at)?;
+        let OnItsWay { client, datagram, .. } = self.datagrams.swap_remove(at);
+        Some((client, datagram))
+    }
 }
