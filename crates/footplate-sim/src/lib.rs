@@ -56,7 +56,7 @@ pub use law::{Law, LawFamily};
 pub use living::{
     BoardSwitches, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError, LivingLayout, LivingSwitches,
     Mishap, MishapKind, PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualBoard,
-    VirtualStation,
+    VirtualStation, VirtualZ21, Z21Switches,
 };
 pub use other_law::OtherLaw;
 pub use physics_range::PhysicsRange;

@@ -3,6 +3,7 @@
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
+//! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, with what a network does to them
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
 //! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
@@ -25,6 +26,8 @@ mod station;
 mod switches;
 mod truth;
 mod world;
+mod z21;
+mod z21_switches;
 
 pub use board::VirtualBoard;
 pub use board_switches::{BoardSwitches, Delivery};
@@ -36,3 +39,5 @@ pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;
 pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};
 pub use world::LivingLayout;
+pub use z21::VirtualZ21;
+pub use z21_switches::Z21Switches;

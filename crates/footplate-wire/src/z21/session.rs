@@ -65,6 +65,8 @@ pub struct Client {
     /// It was said once to have lost its power, which an old datagram may say, too.
     power_is_suspect: bool,
     asks_status: bool,
+    /// Something does not fit what was commanded: perhaps the station was restarted, and has forgotten this client, too.
+    asks_broadcasts: bool,
     /// Locomotives whose state has to be asked for again.
     unverified: Vec<TrainId>,
     /// What was said once of a locomotive and is not what was commanded: an old datagram, or another throttle.
@@ -121,6 +123,7 @@ impl Client {
             is_powered: false,
             power_is_suspect: false,
             asks_status: false,
+            asks_broadcasts: false,
             unverified: Vec::new(),
             suspected: Vec::new(),
             identity: None,
@@ -202,6 +205,9 @@ impl Client {
         }
         if core::mem::take(&mut self.asks_status) {
             return Some(Outgoing::of(Request::Status, Some(Awaited::Status)));
+        }
+        if core::mem::take(&mut self.asks_broadcasts) {
+            return Some(Outgoing::of(Request::Broadcasts, self.awaited_of(Request::Broadcasts)));
         }
         if let Some(train) = self.unverified.pop() {
             return Some(query(train));
@@ -389,7 +395,7 @@ impl Client {
             free.map_or(paced, |free| free.max(paced))
         };
         let waits = self.waiting.iter().map(of_command).min();
-        let asks = !self.unverified.is_empty() || self.asks_status;
+        let asks = !self.unverified.is_empty() || self.asks_status || self.asks_broadcasts;
         [waits, asks.then(|| self.pacing.usual_at())].into_iter().flatten().min()
     }
 }
@@ -473,7 +479,7 @@ impl Session for Client {
             return None;
         }
         let usual = match &self.opening {
-            _ if self.farewell.has_begun() => None,
+            _ if self.farewell.has_begun() => Some(self.pacing.urgent_at()),
             Opening::Asking(_) if self.outstanding.has_question() => None,
             Opening::Asking(_) => Some(self.pacing.usual_at()),
             Opening::Open => Some(self.poll_due().max(self.pacing.usual_at())),

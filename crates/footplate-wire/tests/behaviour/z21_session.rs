@@ -378,15 +378,15 @@ fn an_old_datagram_is_no_other_throttle() {
 fn a_sensor_is_an_event_with_the_span_of_its_delay() {
     let mut desk = Desk::opened();
     // Told by itself, between two questions.
-    desk.run_until(ms(1_310));
+    desk.run_until(ms(1_350));
     let inputs = |first: u8| Reply::Feedback { group: 0, inputs: [first, 0, 0, 0, 0, 0, 0, 0, 0, 0] };
     desk.station.inputs[0] = 0x20;
     let asked = desk.written.iter().map(|(at, _)| *at).max().unwrap();
-    assert!(1_310 - asked > 20, "{asked}");
+    assert!(1_350 - asked > 20, "{asked}");
     desk.hear(inputs(0x20));
     desk.hear(inputs(0x20));
     desk.run_until(ms(2_000));
-    assert_eq!(desk.reports(), [(1_309, 5, 39)]);
+    assert_eq!(desk.reports(), [(1_349, 5, 39)]);
 }
 
 #[test]
@@ -457,7 +457,8 @@ fn turnouts_are_powered_one_after_the_other_and_let_go() {
         .filter(|(_, request)| matches!(request, Request::SetTurnout { .. }))
         .map(|(at, _)| *at)
         .collect();
-    assert!((100..=250).contains(&(times[1] - times[0])) && times[3] > times[2], "{times:?}");
+    assert!((100..=250).contains(&(times[1] - times[0])), "{times:?}");
+    assert!(times[3] >= times[2], "{times:?}");
     // Another hand-set throws one.
     let position = TurnoutPosition::Output { second: false };
     desk.hear(Reply::Turnout { address: 4, position });

@@ -36,8 +36,7 @@ fn replies_mean_what_is_written_beside_them() {
         let reply = Reply::read(&dataset).expect(&meaning).expect(&meaning);
         assert_eq!((format!("{reply:?}"), datasets.unread()), (meaning, 0));
         let mut written = Vec::new();
-        // The locomotive's message that was seen is of firmware before 1.42.
-        reply.write_as(false, &mut written);
+        reply.write(&mut written);
         assert_eq!(written, bytes, "{reply:?}");
         assert!(dataset.is_sound());
     }
@@ -59,9 +58,14 @@ fn a_locomotive_is_read_as_far_as_its_message_is_known() {
         Ok(Some(Reply::Locomotive(state))) => state,
         other => panic!("{other:?}"),
     };
-    let newer = state("10 00 40 00 ef 00 18 04 bf 10 00 00 00 00 01 5d");
+    let newer = state("0f 00 40 00 ef 00 18 04 bf 10 00 00 00 01 5d");
     assert_eq!(newer.functions, 1 << 29 | 1);
-    assert_eq!(state("11 00 40 00 ef 00 18 04 bf 10 00 00 00 00 01 ff a2"), newer);
+    assert_eq!(state("10 00 40 00 ef 00 18 04 bf 10 00 00 00 01 ff a2"), newer);
+    let older = "0e 00 40 00 ef 00 18 04 bf 10 00 00 00 5c";
+    assert_eq!(state(older).functions, 1);
+    let mut written = Vec::new();
+    Reply::Locomotive(state(older)).write_as(false, &mut written);
+    assert_eq!(written, bytes(older));
     // Without functions at all, as a small clone says it.
     assert_eq!(state("0a 00 40 00 ef 00 18 04 bf 4c").functions, 0);
 }

@@ -199,6 +199,7 @@ impl Client {
         if !self.suspected.contains(&said) {
             self.suspected.retain(|(other, ..)| *other != train);
             self.suspected.push(said);
+            self.asks_broadcasts = true;
             if !self.unverified.contains(&train) {
                 self.unverified.push(train);
             }

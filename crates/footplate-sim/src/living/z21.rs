@@ -1,0 +1,350 @@
+//! The virtual Z21: a living layout behind the datagrams that such a station exchanges with up to twenty clients.
+//!
+//! What comes in is read with the codec that the program writes with; when things come and go is decided here. Nothing is known of a
+//! real station's times but that its bus of feedback modules is asked in a cycle: that cycle is simulated. Whoever spoke to it
+//! is forgotten after a minute and otherwise not watched: trains run on when they are gone.
+
+mod network;
+mod obeying;
+
+use std::collections::VecDeque;
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_wire::z21::{
+    Broadcasts, CanDetection, CentralState, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom,
+    Reply, Steps, Throttle, TurnoutPosition,
+};
+
+use self::network::Network;
+use crate::circuit::CircuitError;
+use crate::draws::{Draws, Purpose};
+use crate::living::s88::Edge;
+use crate::living::switches::LivingSwitches;
+use crate::living::world::LivingLayout;
+use crate::living::z21_switches::Z21Switches;
+
+/// All modules of the feedback bus are asked once in this time (the RS-bus: 130 pulses of 0.2 ms and a pause of 7 ms).
+const BUS_CYCLE: TimeSpan = TimeSpan::from_ms(33);
+/// What the station needs from there until its datagram leaves (s; chosen).
+const HANDS_ON_S: std::ops::Range<f64> = 0.000_5..0.003;
+/// Detectors that report by themselves filter what they see for so long (s; chosen).
+const DETECTOR_S: std::ops::Range<f64> = 0.003..0.025;
+/// What the station needs for an answer (s; chosen).
+const ANSWER_S: std::ops::Range<f64> = 0.000_5..0.004;
+/// The world goes on in such steps, so that no sensor is seen later than its message is due.
+const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(2);
+/// Inputs of a feedback module.
+const MODULE_INPUTS: u16 = 8;
+/// Clients that it knows at a time.
+const MOST_CLIENTS: usize = 20;
+/// A client that says nothing for so long is forgotten.
+const FORGOTTEN_AFTER: TimeSpan = TimeSpan::from_ms(60_000);
+/// Locomotives of which a client is told.
+const MOST_SUBSCRIBED: usize = 16;
+/// From power on until it answers.
+const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
+/// How often a decoder's RailCom data are passed on.
+const RAIL_COM_EVERY: TimeSpan = TimeSpan::from_ms(500);
+/// From mm/s of a model in 1:87 to km/h.
+const SCALE_KM_H: f64 = 87.0 * 3.6e-3;
+
+/// A client, by the number that the network knows it by.
+#[derive(Debug, Clone)]
+struct Connected {
+    id: usize,
+    told: Broadcasts,
+    subscribed: VecDeque<u16>,
+    heard: Timestamp,
+}
+
+/// A locomotive that the station drives.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    address: u16,
+    steps: Steps,
+    throttle: Throttle,
+    forward: bool,
+    functions: u32,
+    received: u32,
+}
+
+/// A living layout behind a Z21, on a clock of its own.
+#[derive(Debug, Clone)]
+pub struct VirtualZ21<'l> {
+    world: LivingLayout<'l>,
+    switches: Z21Switches,
+    draws: Draws,
+    network: Network,
+    now: Timestamp,
+    clients: Vec<Connected>,
+    slots: Vec<Slot>,
+    turnouts: Vec<(u16, TurnoutPosition)>,
+    /// What the station knows of its sensors, and what it will know when.
+    occupied: Vec<SensorId>,
+    changes: Vec<(Timestamp, SensorId, bool)>,
+    /// When each module is asked within the cycle of the bus.
+    phases: Vec<TimeSpan>,
+    central: CentralState,
+    rail_com_due: Timestamp,
+    loses_next_subscription: bool,
+    /// Until when it is starting.
+    dark_until: Option<Timestamp>,
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Incoming,
+    Change,
+    Outgoing,
+    RailCom,
+    Light,
+}
+
+impl<'l> VirtualZ21<'l> {
+    /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
+    /// power yet. The layout's sensor 0 is input 1 of module 1, its turnout 1 is the first.
+    #[must_use]
+    pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: Z21Switches) -> Self {
+        let now = world.now();
+        let known = |train: TrainId| {
+            let forward = world.runs_forward(train).unwrap_or(true);
+            let (steps, throttle) = (Steps::All, Throttle::Stop);
+            Slot { address: train.0, steps, throttle, forward, functions: 0, received: 0 }
+        };
+        let slots = world.train_ids().map(known).collect();
+        world.power(false, now);
+        world.s88.take_edges(now);
+        let mut draws = Draws::new(seed, Purpose::Line);
+        let network = Network::new(draws.split(), switches);
+        let sensors = world.s88.sensors();
+        let occupied = sensors.iter().copied().filter(|sensor| world.s88.is_occupied(*sensor) == Some(true));
+        let modules = sensors.iter().map(|sensor| sensor.0 / MODULE_INPUTS + 1).max().unwrap_or_default();
+        let phase = |_| TimeSpan::from_s(draws.uniform(0.0..BUS_CYCLE.as_s()));
+        let phases = (0..modules).map(phase).collect();
+        Self {
+            occupied: occupied.collect(),
+            world,
+            switches,
+            draws,
+            network,
+            now,
+            clients: Vec::new(),
+            slots,
+            turnouts: Vec::new(),
+            changes: Vec::new(),
+            phases,
+            central: CentralState(CentralState::POWER_OFF),
+            rail_com_due: now + RAIL_COM_EVERY,
+            loses_next_subscription: switches.loses_first_subscription,
+            dark_until: None,
+        }
+    }
+
+    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
+    ///
+    /// # Errors
+    /// [`CircuitError`] when no train can run round on the layout.
+    pub fn draw(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        z21: Z21Switches,
+    ) -> Result<Self, CircuitError> {
+        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, z21))
+    }
+
+    /// The time.
+    #[must_use]
+    pub const fn now(&self) -> Timestamp {
+        self.now
+    }
+
+    /// The layout.
+    #[must_use]
+    pub const fn world(&self) -> &LivingLayout<'l> {
+        &self.world
+    }
+
+    /// The layout, for a person's hands.
+    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
+        &mut self.world
+    }
+
+    /// It is switched off and on: it forgets its clients and its locomotives, and after some seconds gives power to the track.
+    pub fn restart(&mut self) {
+        let now = self.now;
+        self.world.power(false, now);
+        self.world.forget_all_told();
+        self.clients.clear();
+        self.slots.clear();
+        self.turnouts.clear();
+        self.network.clear();
+        self.central = CentralState(CentralState::POWER_OFF);
+        self.dark_until = Some(now + BOOT);
+    }
+
+    /// A client puts a datagram on the network.
+    pub fn write(&mut self, client: usize, datagram: &[u8]) {
+        self.network.send_to_station(self.now, client, datagram);
+    }
+
+    /// Goes on until a time, or until a datagram reaches a client before it.
+    pub fn advance(&mut self, until: Timestamp) -> Option<(usize, Vec<u8>)> {
+        loop {
+            let next = self.next().filter(|(at, _)| *at <= until);
+            let at = next.map_or(until, |(at, _)| at).max(self.now);
+            let looks = at.min(self.now + LOOK_EVERY);
+            self.world.advance(looks);
+            self.now = looks;
+            self.look(looks);
+            match next {
+                _ if looks < at => {}
+                Some((_, Next::Outgoing)) => return self.network.take_to_client(),
+                Some((_, next)) => self.happen(next),
+                // A change may have become due while the world went on.
+                None if self.next().is_none_or(|(at, _)| at > until) => return None,
+                None => {}
+            }
+        }
+    }
+
+    /// What happens next, and when; of things at one time the first in the order of this list.
+    fn next(&self) -> Option<(Timestamp, Next)> {
+        let rail_com = self.switches.rail_com.then_some(self.rail_com_due);
+        let coming = [
+            (self.network.next_to_station(), Next::Incoming),
+            (self.changes.iter().map(|(at, ..)| *at).min(), Next::Change),
+            (self.network.next_to_client(), Next::Outgoing),
+            (rail_com, Next::RailCom),
+            (self.dark_until, Next::Light),
+        ];
+        coming.into_iter().filter_map(|(at, next)| Some((at?, next))).min_by_key(|(at, _)| *at)
+    }
+
+    fn happen(&mut self, next: Next) {
+        match next {
+            Next::Incoming => {
+                if let Some((client, datagram)) = self.network.take_to_station()
+                    && self.dark_until.is_none()
+                {
+                    self.read(client, &datagram);
+                }
+            }
+            Next::Change => {
+                let first = self.changes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
+                if let Some(at) = first.map(|(at, _)| at) {
+                    let (_, sensor, is_occupied) = self.changes.remove(at);
+                    self.change(sensor, is_occupied);
+                }
+            }
+            Next::RailCom => {
+                self.rail_com_due += RAIL_COM_EVERY;
+                self.pass_on_rail_com();
+            }
+            Next::Light => {
+                self.dark_until = None;
+                self.power(true, self.now);
+            }
+            Next::Outgoing => {}
+        }
+    }
+
+    /// Sees which sensors have changed, and when the station will know.
+    fn look(&mut self, by: Timestamp) {
+        for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
+            let due = match self.switches.feedback {
+                Feedback::RBus => {
+                    let phase = self.phases.get(usize::from(sensor.0 / MODULE_INPUTS));
+                    let since = (at - Timestamp::ZERO).as_ns() - phase.copied().unwrap_or_default().as_ns();
+                    let waits = BUS_CYCLE.as_ns() - since.rem_euclid(BUS_CYCLE.as_ns());
+                    at + TimeSpan::from_ns(waits) + TimeSpan::from_s(self.draws.uniform(HANDS_ON_S))
+                }
+                Feedback::Can | Feedback::LocoNet => at + TimeSpan::from_s(self.draws.uniform(DETECTOR_S)),
+            };
+            // What is known of one sensor stays in order.
+            let last = self.changes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
+            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
+            self.changes.push((due, sensor, is_occupied));
+        }
+    }
+
+    fn change(&mut self, sensor: SensorId, is_occupied: bool) {
+        self.occupied.retain(|other| *other != sensor);
+        if is_occupied {
+            self.occupied.push(sensor);
+        }
+        let reply = match self.switches.feedback {
+            Feedback::RBus => self.group(sensor.0 / GROUP_INPUTS),
+            Feedback::Can => Reply::Can(self.can_detection(sensor)),
+            Feedback::LocoNet => {
+                Reply::LocoNet(LocoNetDetection { kind: 1, address: sensor.0 + 1, info: is_occupied.into() })
+            }
+        };
+        self.broadcast(self.switches.feedback.broadcasts(), &reply);
+    }
+
+    /// The inputs of ten feedback modules.
+    fn group(&self, group: u16) -> Reply {
+        let mut inputs = [0; GROUP_MODULES];
+        for sensor in self.occupied.iter().filter(|sensor| sensor.0 / GROUP_INPUTS == group) {
+            let input = sensor.0 % GROUP_INPUTS;
+            inputs[usize::from(input / MODULE_INPUTS)] |= 1 << (input % MODULE_INPUTS);
+        }
+        Reply::Feedback { group: group as u8, inputs }
+    }
+
+    fn can_detection(&self, sensor: SensorId) -> CanDetection {
+        let address = sensor.0 / MODULE_INPUTS + 1;
+        let value = if self.occupied.contains(&sensor) { 0x1100 } else { 0x0100 };
+        let port = (sensor.0 % MODULE_INPUTS) as u8;
+        CanDetection { network: 0xd000 | address, address, port, kind: 1, value, more: 0 }
+    }
+
+    /// Decoders report how fast they run.
+    fn pass_on_rail_com(&mut self) {
+        if !self.central.is_powered() {
+            return;
+        }
+        for at in 0..self.slots.len() {
+            self.slots[at].received += 1;
+            let slot = self.slots[at];
+            let rail_com = Reply::RailCom(self.rail_com(&slot));
+            let wants = |client: &Connected| {
+                client.told.has(Broadcasts::ALL_RAIL_COM)
+                    || client.told.has(Broadcasts::RAIL_COM) && client.subscribed.contains(&slot.address)
+            };
+            let ids: Vec<usize> = self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();
+            ids.into_iter().for_each(|id| self.say(id, &rail_com));
+        }
+    }
+
+    fn rail_com(&self, slot: &Slot) -> RailCom {
+        let train = self.world.trains.iter().find(|train| train.id.0 == slot.address);
+        let km_h = train.map_or(0.0, |train| (train.speed.abs() * SCALE_KM_H).round());
+        RailCom {
+            address: slot.address,
+            received: slot.received,
+            errors: 0,
+            options: 0x01,
+            speed: km_h.min(255.0) as u8,
+            quality: 0,
+        }
+    }
+
+    /// How a turnout was commanded last.
+    fn position(&self, address: u16) -> TurnoutPosition {
+        let known = self.turnouts.iter().find(|(known, _)| *known == address);
+        known.map_or(TurnoutPosition::Unknown, |(_, position)| *position)
+    }
+
+    /// The second output lays a turnout straight.
+    fn lay(&mut self, at: Timestamp, address: u16, second: bool) {
+        if self.central.0 & CentralState::POWER_OFF == 0 {
+            let turnout = footplate_core::TurnoutId(address.saturating_add(1));
+            self.world.points.power(turnout, Leg::from_curved(!second), at);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! How a virtual Z21 and the network before it behave, each as it was reported of real ones.
+
+use footplate_core::Ratio;
+use footplate_wire::z21::Feedback;
+
+/// How the station and the network behave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Z21Switches {
+    /// How often a datagram is lost, either way.
+    pub lost: Ratio,
+    /// How often one comes twice.
+    pub duplicated: Ratio,
+    /// How often one is overtaken by those that follow it.
+    pub overtaken: Ratio,
+    /// Whether the first request for broadcasts is lost, which left programs without any feedback.
+    pub loses_first_subscription: bool,
+    /// Whether it refuses what has a wrong XOR byte; most do not look at it.
+    pub strict_xor: bool,
+    /// Whether its own XOR bytes are wrong, as those of one program that serves are.
+    pub wrong_xor: bool,
+    /// Whether what it says of a locomotive ends with F28, as firmware before 1.42 says it.
+    pub short_states: bool,
+    /// Whether it reads only the first dataset of a datagram, as small clones do.
+    pub first_only: bool,
+    /// Whether it is a z21start without its unlock code: driving and turnouts are ignored without a word.
+    pub is_locked: bool,
+    /// What its sensors are connected to.
+    pub feedback: Feedback,
+    /// Whether its decoders report their speed by RailCom.
+    pub rail_com: bool,
+}
+
+impl Default for Z21Switches {
+    fn default() -> Self {
+        Self {
+            lost: Ratio::ZERO,
+            duplicated: Ratio::ZERO,
+            overtaken: Ratio::ZERO,
+            loses_first_subscription: false,
+            strict_xor: false,
+            wrong_xor: false,
+            short_states: false,
+            first_only: false,
+            is_locked: false,
+            feedback: Feedback::RBus,
+            rail_com: true,
+        }
+    }
+}
