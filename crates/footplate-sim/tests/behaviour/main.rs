@@ -16,4 +16,5 @@ mod scenarios;
 mod speeds;
 mod stops;
 mod virtual_board;
+mod virtual_central_station;
 mod yard;

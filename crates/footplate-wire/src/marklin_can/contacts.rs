@@ -45,7 +45,10 @@ impl Contacts {
     pub(super) fn changed(&mut self, now: Timestamp, number: u16, change: ContactChange) -> News {
         let place = self.contact(now, number, change.was_occupied);
         let Some(contact) = self.0.get_mut(place) else { return News::None };
-        let is_repeated = contact.report.is_some_and(|(last, at)| last == change && now - at <= REORDERED_WITHIN);
+        let is_repeated = contact.report.is_some_and(|(last, at)| {
+            let is_same = last == change || last == ContactChange { lasted: None, ..change };
+            is_same && now - at <= REORDERED_WITHIN
+        });
         let is_late = change.is_occupied && contact.is_inferred && now - contact.known <= REORDERED_WITHIN;
         if is_repeated || is_late || change.was_occupied == change.is_occupied {
             contact.is_inferred = false;
@@ -158,7 +161,9 @@ mod tests {
         assert_eq!(contacts.asked(ms(3_000), 5, false, false), News::None);
         let News::Occupied(span) = contacts.asked(ms(4_000), 5, true, false) else { panic!() };
         assert_eq!((span.earliest, span.latest), (ms(3_000) - NETWORK_LONGEST, ms(4_000)));
-        assert_eq!(contacts.changed(ms(4_500), 5, change(true, false, 90)), News::None);
+        // The report that was overtaken by the answer is no second one.
+        assert_eq!(contacts.changed(ms(4_010), 5, change(false, true, 170)), News::None);
+        assert_eq!(contacts.changed(ms(4_500), 5, change(true, false, 50)), News::None);
     }
 
     #[test]

@@ -27,5 +27,5 @@ pub use roster::{LOCOMOTIVES_FILE, ListedLocomotive, check_sum, read_list};
 pub use session::Client;
 pub use settings::{Settings, Transport};
 pub use speed::{HIGHEST_SPEED, speed_of, step_of};
-pub use time_model::{CONTACTS_PER_MODULE, NETWORK_LONGEST, NETWORK_SHORTEST, SCAN_PER_MODULE, TICK};
+pub use time_model::{BIT_TIME, CONTACTS_PER_MODULE, NETWORK_LONGEST, NETWORK_SHORTEST, SCAN_EVERY, TICK};
 pub use uid::{AccessoryProtocol, LocomotiveProtocol, Uid};

@@ -20,6 +20,9 @@ const STOP_WAITS: TimeSpan = TimeSpan::from_ms(20);
 /// How often a request is written in all before it is given up: three repetitions. What stops something is never given up.
 pub(super) const MOST_TRIES: u8 = 4;
 
+/// The same for the list of locomotives once the station has begun to send it: one frame in fifty lost still leaves it whole soon.
+pub(super) const LIST_TRIES: u8 = 16;
+
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Awaited {

@@ -41,13 +41,20 @@ pub(super) struct Roster {
     stream: Vec<u8>,
     /// Bytes of the stream; `None`: none is coming.
     length: Option<usize>,
+    has_begun: bool,
     list: Vec<ListedLocomotive>,
 }
 
 impl Roster {
+    /// Whether the station has ever begun to send it.
+    pub(super) const fn has_begun(&self) -> bool {
+        self.has_begun
+    }
+
     /// A stream of a length begins.
     pub(super) fn begins(&mut self, length: u32) {
         self.stream.clear();
+        self.has_begun = true;
         self.length = usize::try_from(length).ok().filter(|length| (1..=LONGEST_STREAM).contains(length));
     }
 

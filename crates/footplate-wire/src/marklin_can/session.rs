@@ -13,7 +13,7 @@ use super::frame::{Frame, hash_of};
 use super::framing::Framing;
 use super::message::{Direction, Message};
 use super::opening::{Opening, Question};
-use super::outstanding::{AllOutstanding, Awaited, MOST_TRIES, Outstanding};
+use super::outstanding::{AllOutstanding, Awaited, LIST_TRIES, MOST_TRIES, Outstanding};
 use super::roster::{LOCOMOTIVES_FILE, ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
@@ -298,7 +298,9 @@ impl Client {
             if command.is_some_and(|command| self.waiting.outdates(command)) {
                 continue;
             }
-            if tries >= MOST_TRIES && due.may_be_given_up() {
+            // A list that was damaged on its way comes whole another time.
+            let most = if awaited == Awaited::Roster && self.roster.has_begun() { LIST_TRIES } else { MOST_TRIES };
+            if tries >= most && due.may_be_given_up() {
                 if let Some(given_up) = self.given_up(awaited, command) {
                     return Some(given_up);
                 }

@@ -2,7 +2,7 @@
 
 use footplate_core::{TimeSpan, TurnoutId};
 
-use super::time_model::SCAN_PER_MODULE;
+use super::time_model::SCAN_EVERY;
 use super::uid::{AccessoryProtocol, LocomotiveProtocol, Uid};
 
 /// How frames travel.
@@ -32,8 +32,8 @@ pub struct Settings {
     pub device: Option<u16>,
     /// S88 modules behind it.
     pub modules: u8,
-    /// How often the station reads its modules; `None`: as long as that many modules take at most.
-    pub scan: Option<TimeSpan>,
+    /// How often the station reads its contacts.
+    pub scan: TimeSpan,
 }
 
 impl Default for Settings {
@@ -47,17 +47,12 @@ impl Default for Settings {
             first_contact: 1,
             device: None,
             modules: 1,
-            scan: None,
+            scan: SCAN_EVERY,
         }
     }
 }
 
 impl Settings {
-    /// How long the station may need to see a change.
-    pub(super) fn scan(&self) -> TimeSpan {
-        self.scan.unwrap_or(TimeSpan::from_ns(SCAN_PER_MODULE.as_ns() * i64::from(self.modules.max(1))))
-    }
-
     /// The number of a turnout on the bus.
     pub(super) const fn turnout(&self, turnout: TurnoutId) -> Uid {
         self.turnouts.uid(turnout.0)

@@ -1,6 +1,7 @@
 //! How long things take between the track, the station and this program.
 //!
-//! A station reads its S88 modules one behind the other and reports what has changed since the time before. A report says for how
+//! A station loads all contacts into the S88 bus at once, a cycle apart, shifts out one after the other and reports what has changed
+//! since the cycle before. A report says for how
 //! long the contact was in the state before, in units of 10 ms by the station's clock. So the times at which the station saw two
 //! changes of one contact are known to lie so far apart, whatever the network did to the reports: where the delay of one is uncertain,
 //! the other one narrows it.
@@ -10,8 +11,11 @@ use footplate_core::{TimeSpan, Timestamp};
 /// Contacts of an S88 module.
 pub const CONTACTS_PER_MODULE: u16 = 16;
 
-/// The longest that a station takes to read one module: 512 contacts are read within about half a second at most.
-pub const SCAN_PER_MODULE: TimeSpan = TimeSpan::from_ms(16);
+/// How often a station loads its contacts, unless its owner has set another cycle (10 to 1000 ms on a Link S88).
+pub const SCAN_EVERY: TimeSpan = TimeSpan::from_ms(100);
+
+/// What shifting out one contact takes (Link S88, unless its owner has set another).
+pub const BIT_TIME: TimeSpan = TimeSpan::from_us(167);
 
 /// The shortest time from the station seeing a change until the host has the report: a frame with eight bytes has about 130 bits,
 /// at 250 kbit/s.
@@ -28,6 +32,13 @@ const SATURATED: u16 = u16::MAX;
 
 /// By how much two clocks may drift apart: crystals are good for 50 parts in a million each.
 const DRIFT_PPM: i64 = 100;
+
+/// What an entry may not come before, and what it may not come after.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Order {
+    pub(super) not_before: Timestamp,
+    pub(super) now: Timestamp,
+}
 
 /// A time that lies between two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,10 +80,11 @@ impl Span {
     }
 
     /// The end of an entry in the recording and the width of the span before it: entries stay in order, and a contact became
-    /// occupied up to one scan before the station saw it.
-    pub(super) fn entry(self, scan: TimeSpan, not_before: Timestamp, now: Timestamp) -> (Timestamp, TimeSpan) {
-        let latest = self.latest.max(not_before).min(now);
-        (latest, (latest - (self.earliest - scan)).max(TimeSpan::ZERO))
+    /// occupied up to one cycle before it was loaded, which was before it was shifted out.
+    pub(super) fn entry(self, contact: u16, scan: TimeSpan, order: Order) -> (Timestamp, TimeSpan) {
+        let shifted = TimeSpan::from_ns(BIT_TIME.as_ns() * i64::from(contact));
+        let latest = (self.latest - shifted).max(order.not_before).min(order.now);
+        (latest, (latest - (self.earliest - shifted - scan)).max(TimeSpan::ZERO))
     }
 }
 
@@ -97,11 +109,13 @@ mod tests {
 
     #[test]
     fn an_entry_reaches_back_over_the_scan_and_stays_in_order() {
-        let now = Timestamp::from_s(10.0);
+        let (now, scan) = (Timestamp::from_s(10.0), TimeSpan::from_ms(100));
         let span = Span::of_report(now);
-        let (latest, width) = span.entry(TimeSpan::from_ms(80), Timestamp::ZERO, now);
-        assert_eq!((now - latest, width), (NETWORK_SHORTEST, TimeSpan::from_us(99_480)));
-        let (latest, width) = span.entry(TimeSpan::from_ms(80), now, now);
-        assert_eq!((now - latest, width), (TimeSpan::ZERO, TimeSpan::from_ms(100)));
+        let (latest, width) = span.entry(12, scan, Order { not_before: Timestamp::ZERO, now });
+        // The twelfth contact is shifted out 12 × 0.167 = 2.004 ms after it was loaded.
+        assert_eq!(now - latest, TimeSpan::from_us(2_524));
+        assert_eq!(width, TimeSpan::from_us(119_480));
+        let (latest, width) = span.entry(12, scan, Order { not_before: now, now });
+        assert_eq!((now - latest, width), (TimeSpan::ZERO, TimeSpan::from_us(122_004)));
     }
 }

@@ -10,7 +10,7 @@ use super::super::message::{ContactChange, Direction, Message, kind_in_words};
 use super::super::opening::Opening;
 use super::super::outstanding::Awaited;
 use super::super::speed::step_of;
-use super::super::time_model::{CONTACTS_PER_MODULE, Span};
+use super::super::time_model::{CONTACTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::session::LinkNotice;
@@ -245,20 +245,21 @@ impl Client {
             let contact = u16::from(before) * CONTACTS_PER_MODULE + bit + 1;
             let Some(number) = contact.checked_sub(self.settings.first_contact) else { continue };
             let news = self.contacts.asked(now, contact, contacts & 1 << bit != 0, listing);
-            self.report(now, SensorId(number), news);
+            self.report(now, contact, SensorId(number), news);
         }
     }
 
     fn hear_of_contact(&mut self, now: Timestamp, contact: u16, change: ContactChange) {
         let Some(number) = contact.checked_sub(self.settings.first_contact) else { return };
         let news = self.contacts.changed(now, contact, change);
-        self.report(now, SensorId(number), news);
+        self.report(now, contact, SensorId(number), news);
     }
 
-    fn report(&mut self, now: Timestamp, sensor: SensorId, news: News) {
+    fn report(&mut self, now: Timestamp, contact: u16, sensor: SensorId, news: News) {
         match news {
             News::Occupied(span) => {
-                let (latest, width) = Span::entry(span, self.settings.scan(), self.last_entry, now);
+                let order = Order { not_before: self.last_entry, now };
+                let (latest, width) = span.entry(contact, self.settings.scan, order);
                 self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
             }
             News::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
