@@ -141,6 +141,12 @@ impl Client {
         client
     }
 
+    /// What the station, its sensors and its turnouts are taken to be like.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// Goes on as far as the clock allows.
     fn go_on(&mut self, now: Timestamp) {
         self.now = now;

@@ -2,6 +2,7 @@
 
 mod board_figures;
 mod figures;
+mod z21_figures;
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -12,10 +13,11 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{CommandError, LinkNotice, z21};
 
 use self::board_figures::BoardFigures;
 use self::figures::Figures;
+use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
 use crate::link::{Address, Link, Passed, Speed, StationSession, TappedLink, open, open_session};
@@ -34,10 +36,11 @@ const LOST_SHARE: f64 = 0.01;
 #[command(after_help = "\
 Examples:
   footplate doctor --link marklin-serial:/dev/ttyUSB0
-  footplate doctor --link dcc-ex:tcp://192.168.4.1:2560")]
+  footplate doctor --link dcc-ex:tcp://192.168.4.1:2560
+  footplate doctor --link z21:192.168.0.111")]
 pub(crate) struct Arguments {
-    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, or tcp://host:port in place of a
-    /// device.
+    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, or tcp://host:port
+    /// in place of a device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -78,6 +81,7 @@ impl Arguments {
         let lost_share = match runtime.session() {
             StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
             StationSession::DccEx(_) => self.report_board(&heard, output)?,
+            StationSession::Z21(session) => self.report_z21(session.settings(), &heard, output)?,
         };
         Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
     }
@@ -138,6 +142,29 @@ impl Arguments {
             writeln!(output, "{}", figures.json())?;
         } else {
             figures.write(output)?;
+            heard.ear.write(output)?;
+        }
+        Ok(figures.lost_share())
+    }
+
+    /// Reports on a Z21; returns the share of requests that were not answered.
+    fn report_z21(
+        &self,
+        settings: &z21::Settings,
+        heard: &Heard<'_>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<f64> {
+        let figures = Z21Figures::of(heard.passed, settings.feedback);
+        if !figures.is_known() {
+            bail!("no Z21 has said its serial number; check its address and the network");
+        }
+        if let Some(plot) = &self.plot {
+            plot.write(&figures.picture())?;
+        }
+        if self.json {
+            writeln!(output, "{}", figures.json())?;
+        } else {
+            figures.write(settings.sensor_delay, output)?;
             heard.ear.write(output)?;
         }
         Ok(figures.lost_share())

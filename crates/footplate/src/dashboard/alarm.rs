@@ -112,7 +112,10 @@ impl Alarm {
             LinkNotice::OtherThrottle { train, .. } => {
                 (Grade::Danger, "line-says", Some(*train), vec![notice.to_string()])
             }
-            LinkNotice::Restarted | LinkNotice::PowerLost | LinkNotice::Unconfirmed { .. } => {
+            LinkNotice::Restarted
+            | LinkNotice::PowerLost
+            | LinkNotice::Unconfirmed { .. }
+            | LinkNotice::Locked => {
                 (Grade::Danger, "line-says", None, vec![notice.to_string()])
             }
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),

@@ -2,19 +2,21 @@
 //!
 //! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
-//! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board.
+//! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board, `z21:HOST` a Z21.
 
 use std::str::FromStr;
 
 use footplate_core::{Ratio, TrainId};
-use footplate_sim::{BoardSwitches, Delivery, LawFamily, PhysicsRange};
+use footplate_sim::{BoardSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
 
 use super::board_address::BoardAddress;
 use super::port::Port;
+use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
 const SERIAL: &str = "marklin-serial:";
 const BOARD: &str = "dcc-ex:";
+const Z21: &str = "z21:";
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
 
@@ -31,6 +33,8 @@ pub(crate) enum Address {
     Serial(SerialAddress),
     /// A DCC-EX board behind a serial port or a network.
     Board(BoardAddress),
+    /// A Z21 in a network.
+    Z21(Z21Address),
 }
 
 impl Address {
@@ -38,7 +42,7 @@ impl Address {
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            Self::Serial(_) | Self::Board(_) => None,
+            Self::Serial(_) | Self::Board(_) | Self::Z21(_) => None,
         }
     }
 }
@@ -51,6 +55,8 @@ pub(crate) enum StationKind {
     Marklin,
     /// A DCC-EX board.
     DccEx,
+    /// A Z21.
+    Z21,
 }
 
 impl StationKind {
@@ -62,7 +68,8 @@ impl StationKind {
         match value {
             "marklin" => Ok(Self::Marklin),
             "dcc-ex" => Ok(Self::DccEx),
-            _ => Err(format!("there is no simulated station `{value}`; there are marklin and dcc-ex")),
+            "z21" => Ok(Self::Z21),
+            _ => Err(format!("there is no simulated station `{value}`; there are marklin, dcc-ex and z21")),
         }
     }
 }
@@ -86,8 +93,17 @@ pub(crate) struct SimulatedAddress {
     pub(crate) speed: Option<Speed>,
     /// The station that it is behind.
     pub(crate) station: StationKind,
-    /// How a DCC-EX board behaves, if it is one.
+    /// How it behaves.
+    pub(crate) quirks: Quirks,
+}
+
+/// How a simulated station behaves, by its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Quirks {
+    /// If it is a DCC-EX board.
     pub(crate) board: BoardSwitches,
+    /// If it is a Z21.
+    pub(crate) z21: Z21Switches,
 }
 
 /// How fast a simulated clock runs.
@@ -141,10 +157,14 @@ impl FromStr for Address {
             let mut address = BoardAddress::of(port)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::Board(address))
+        } else if let Some(place) = place.strip_prefix(Z21) {
+            let mut address = Z21Address::of(place)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Z21(address))
         } else {
             Err(format!(
                 "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, or tcp://host:port in place of a port"
+                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -185,7 +205,7 @@ impl SimulatedAddress {
             physics: PhysicsRange::Usual,
             speed: None,
             station: StationKind::default(),
-            board: BoardSwitches::default(),
+            quirks: Quirks::default(),
         })
     }
 
@@ -198,7 +218,7 @@ impl SimulatedAddress {
             "law" => self.law = Some(law_named(value)?),
             "world" => self.physics = physics_named(value)?,
             "station" => self.station = StationKind::named(value)?,
-            "quirks" => self.board = quirks(value)?,
+            "quirks" => self.quirks = quirks(value)?,
             "faults" => {
                 self.faults = match value {
                     "some" => true,
@@ -243,25 +263,28 @@ const CHATTER: Ratio = Ratio::from_percent(50.0);
 /// How often a lossy line drops a byte: one message in fifty is hit.
 const LOSSY: Ratio = Ratio::from_percent(0.2);
 
-/// Reads quirks of a DCC-EX board as `chatter,split`.
-pub(crate) fn quirks(value: &str) -> Result<BoardSwitches, String> {
-    let mut board = BoardSwitches::default();
+/// Reads quirks of a DCC-EX board or a Z21 as `chatter,split`.
+pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
+    let Quirks { mut board, mut z21 } = Quirks::default();
     for one in value.split(',') {
+        let is_of_z21 = set_quirk(&mut z21, one);
         match one {
             "chatter" => board.chatter = CHATTER,
             "merged" => board.delivery = Delivery::Merged,
             "split" => board.delivery = Delivery::Split,
             "lossy" => board.lost = LOSSY,
             "silent" => board.has_banner = false,
+            _ if is_of_z21 => {}
             _ => {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
-                     (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset)"
+                     (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
+                     DCC-EX board, and of a Z21 {QUIRKS}"
                 ));
             }
         }
     }
-    Ok(board)
+    Ok(Quirks { board, z21 })
 }
 
 /// The law of a name.
@@ -333,7 +356,7 @@ mod tests {
             physics: PhysicsRange::Usual,
             speed: Some(Speed::Times(20.0)),
             station: StationKind::Marklin,
-            board: BoardSwitches::default(),
+            quirks: Quirks::default(),
         };
         assert_eq!(written.parse(), Ok(Address::Simulated(expected)));
         let Ok(Address::Simulated(plain)) = "sim:loop.toml".parse() else { panic!("a plain one") };
@@ -376,7 +399,8 @@ mod tests {
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
-            ("sim:track-a?station=z21", "marklin and dcc-ex"),
+            ("sim:track-a?station=intellibox", "marklin, dcc-ex and z21"),
+            ("sim:track-a?quirks=none", "wrong-xor"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),
             ("marklin-serial:tcp://host:99999", "tcp://host:port"),

@@ -32,6 +32,8 @@ pub(crate) trait Link {
 pub(crate) enum Heard {
     /// A byte from the station.
     Byte(u8),
+    /// A whole datagram from the station.
+    Datagram(Vec<u8>),
     /// The hand-shake line is up or down now.
     Cts(bool),
     /// Nothing, and the time has come.

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
+//! z21_address  datagrams  a Z21: its address, and the line to it over UDP
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
@@ -17,6 +18,7 @@
 
 mod address;
 mod board_address;
+mod datagrams;
 mod line;
 mod news;
 mod observed;
@@ -29,14 +31,16 @@ mod simulated_station;
 mod station_session;
 mod stream;
 mod tapped;
+mod z21_address;
 
-pub(crate) use address::{Address, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
+pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
+pub(crate) use datagrams::DatagramLink;
 pub(crate) use line::{Heard, Link, Lost};
 pub(crate) use news::news_of;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;
-pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
+pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::SimulatedStation;
 pub(crate) use station_session::StationSession;

@@ -88,7 +88,11 @@ impl<L: Link> Link for ObservedLink<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         // What is written byte by byte is a 6051's; a DCC-EX board is written messages, and is not polled.
         if let (Some(observed), [_, _, ..]) = (&mut self.observed, bytes) {
-            observed.rhythm.wrote_message(bytes);
+            // A DCC-EX board's begin with a bracket; a Z21's with their length, which is never 60.
+            match bytes {
+                [b'<', ..] => observed.rhythm.wrote_message(bytes),
+                _ => observed.rhythm.wrote_datagram(bytes),
+            }
         }
         if let (Some(observed), [byte]) = (&mut self.observed, bytes) {
             let request = observed.rhythm.written(self.link.now(), *byte);
@@ -105,6 +109,9 @@ impl<L: Link> Link for ObservedLink<L> {
         observed.turn_ends();
         let heard = self.link.wait(until);
         observed.turn = Some(Stopwatch::start());
+        if let Heard::Datagram(datagram) = &heard {
+            observed.rhythm.heard_datagram(datagram);
+        }
         if let Heard::Byte(byte) = heard {
             observed.rhythm.heard_of_board(byte);
             if let Some(span) = observed.rhythm.heard(self.link.now()) {

@@ -2,12 +2,12 @@
 
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
-use footplate_sim::living::{LivingSwitches, VirtualBoard, VirtualStation};
-use footplate_wire::dcc_ex;
+use footplate_sim::living::{LivingSwitches, VirtualBoard, VirtualStation, VirtualZ21};
+use footplate_wire::{dcc_ex, z21};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
-use super::{Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+use super::{DatagramLink, Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
 /// 16 ms unless told otherwise.
@@ -26,6 +26,7 @@ pub(crate) fn open<'l>(
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
         Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
         Address::Board(board) => Box::new(StreamLink::open(board)?),
+        Address::Z21(z21) => Box::new(DatagramLink::open(z21)?),
     })
 }
 
@@ -59,7 +60,8 @@ pub(crate) fn station<'l>(
     let SimulatedAddress { seed, trains, .. } = address;
     Ok(match address.station {
         StationKind::Marklin => VirtualStation::draw(layout, *seed, trains, &switches)?.into(),
-        StationKind::DccEx => VirtualBoard::draw(layout, *seed, trains, &switches, address.board)?.into(),
+        StationKind::DccEx => VirtualBoard::draw(layout, *seed, trains, &switches, address.quirks.board)?.into(),
+        StationKind::Z21 => VirtualZ21::draw(layout, *seed, trains, &switches, address.quirks.z21)?.into(),
     })
 }
 
@@ -83,12 +85,24 @@ pub(crate) fn open_session(
         Address::Simulated(simulated) => match simulated.station {
             StationKind::Marklin => Interface::new(now, Settings::with_cts(modules))?.into(),
             StationKind::DccEx => dcc_ex::Client::new(now, dcc_ex::Settings::default()).into(),
+            StationKind::Z21 => {
+                let feedback = simulated.quirks.z21.feedback;
+                let settings = z21::Settings { feedback, ..z21::Settings::default() };
+                z21::Client::new(now, z21_settings(settings, layout)).into()
+            }
         },
         Address::Serial(serial) => {
             Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
         }
         Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
+        Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
     })
+}
+
+/// Settings that know how many sensors the layout has.
+fn z21_settings(settings: z21::Settings, layout: &Layout) -> z21::Settings {
+    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    z21::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
 }
 
 fn serial_settings(address: &SerialAddress, has_cts: bool, modules: u8) -> Settings {

@@ -3,6 +3,7 @@
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
+use footplate_wire::z21;
 use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
@@ -66,6 +67,25 @@ impl Rhythm {
         }
     }
 
+    /// A datagram to a Z21 was written.
+    pub(crate) fn wrote_datagram(&mut self, datagram: &[u8]) {
+        for dataset in z21::Datasets::of(datagram) {
+            if let Some(z21::Request::Power { on }) = z21::Request::read(&dataset) {
+                self.power = Some(PowerCommand { is_on: on, has_answered: false });
+            }
+        }
+    }
+
+    /// A datagram was heard; if a Z21 confirms the power with it, that counts.
+    pub(crate) fn heard_datagram(&mut self, datagram: &[u8]) {
+        for dataset in z21::Datasets::of(datagram) {
+            let confirmed = z21::Reply::read(&dataset).ok().flatten().and_then(|reply| reply.power());
+            if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
+                power.has_answered = true;
+            }
+        }
+    }
+
     /// A byte was heard; if a DCC-EX board confirms the power with it, that counts.
     pub(crate) fn heard_of_board(&mut self, byte: u8) {
         let Some(text) = self.replies.as_mut().and_then(|framing| framing.push(byte)) else { return };
@@ -104,6 +124,17 @@ mod tests {
         b"<# 50><p0 B>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
         b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
+    }
+
+    #[test]
+    fn a_z21_confirms_the_power_itself() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_datagram(&[0x07, 0x00, 0x40, 0x00, 0x21, 0x81, 0xa0]);
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        rhythm.heard_datagram(&[0x07, 0x00, 0x40, 0x00, 0x61, 0x00, 0x61]);
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        rhythm.heard_datagram(&[0x07, 0x00, 0x40, 0x00, 0x61, 0x01, 0x60]);
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
     }
 

@@ -1,17 +1,18 @@
-//! A simulated station behind a network port or a pseudo-terminal, for any program that speaks to one.
+//! A simulated station behind a network port or a pseudo-terminal, for any program that speaks to one; behind UDP for several at once.
 //!
 //! Between the other program and a 6051 stands what an adapter with a hand-shake would be: it keeps bytes until the
 //! station's CTS has gone down and up again. The station runs at a multiple of real time, whether anybody listens or
 //! not, as trains do.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::marklin_serial::BYTE_TIME;
+use footplate_wire::z21::LONGEST_DATAGRAM;
 
 use super::simulated_station::{FromSimulated, SimulatedStation};
 use crate::clock::Stopwatch;
@@ -31,6 +32,10 @@ pub(crate) enum Incoming {
     Byte(usize, u8),
     /// They are gone.
     Gone(usize),
+    /// Somebody sends datagrams, beside others; what is to be said to them goes there.
+    Peer(usize, Box<dyn Write + Send>),
+    /// They send one.
+    Datagram(usize, Vec<u8>),
 }
 
 /// A station and who is connected to it.
@@ -41,6 +46,7 @@ pub(crate) struct Server<'l> {
     stopwatch: Stopwatch,
     incoming: Receiver<Incoming>,
     client: Option<(usize, Box<dyn Write + Send>)>,
+    peers: BTreeMap<usize, Box<dyn Write + Send>>,
     /// Bytes that wait for the station to be ready.
     waiting: VecDeque<u8>,
     /// When the last byte was passed on, and whether CTS has gone down since.
@@ -63,6 +69,7 @@ impl<'l> Server<'l> {
             stopwatch: Stopwatch::start(),
             incoming,
             client: None,
+            peers: BTreeMap::new(),
             waiting: VecDeque::new(),
             passed: None,
         }
@@ -105,6 +112,8 @@ impl<'l> Server<'l> {
             }
             Incoming::Byte(id, byte) if self.is_client(id) => self.waiting.push_back(byte),
             Incoming::Gone(id) if self.is_client(id) => self.client = None,
+            Incoming::Peer(id, peer) => drop(self.peers.insert(id, peer)),
+            Incoming::Datagram(id, datagram) => self.station.write_of(id, &datagram),
             Incoming::Byte(..) | Incoming::Gone(_) => {}
         }
     }
@@ -124,6 +133,10 @@ impl<'l> Server<'l> {
             };
             match self.station.advance(until) {
                 Some(FromSimulated::Bytes(bytes)) => said.push(bytes.into()),
+                // A datagram that cannot be sent is lost, as others are.
+                Some(FromSimulated::Datagram(id, datagram)) => {
+                    let _ = self.peers.get_mut(&id).map(|peer| peer.write_all(&datagram));
+                }
                 Some(FromSimulated::Cts(up)) => {
                     if let Some((_, lowered)) = &mut self.passed {
                         *lowered |= !up;
@@ -192,6 +205,66 @@ pub(crate) fn listen_to(id: usize, mut client: impl Read + Send + 'static, sende
         }
         let _ = sender.send(Incoming::Gone(id));
     });
+}
+
+/// Clients that are told apart by where their datagrams come from: more than a station knows. One more takes the place of the first.
+const MOST_PEERS: usize = 64;
+
+/// Lets clients send datagrams to a port, on a thread of its own; returns the port, which the system chooses if none was asked for,
+/// and what comes from them.
+///
+/// # Errors
+/// When the port cannot be had.
+pub(crate) fn listen_for_datagrams(address: &str) -> std::io::Result<(u16, Receiver<Incoming>)> {
+    let socket = UdpSocket::bind(address)?;
+    let port = socket.local_addr()?.port();
+    let (sender, incoming) = channel();
+    std::thread::spawn(move || {
+        let mut bytes = [0; LONGEST_DATAGRAM];
+        let mut known: VecDeque<(usize, SocketAddr)> = VecDeque::new();
+        let mut count = 0;
+        loop {
+            // The answer to a client that is gone comes back as an error.
+            let Ok((length, from)) = socket.recv_from(&mut bytes) else { continue };
+            let id = match known.iter().find(|(_, address)| *address == from) {
+                Some((id, _)) => *id,
+                None => {
+                    let Ok(socket) = socket.try_clone() else { continue };
+                    if known.len() >= MOST_PEERS {
+                        known.pop_front();
+                    }
+                    let id = count % MOST_PEERS;
+                    count += 1;
+                    known.push_back((id, from));
+                    if sender.send(Incoming::Peer(id, Box::new(Peer { socket, address: from }))).is_err() {
+                        return;
+                    }
+                    id
+                }
+            };
+            let datagram = bytes.iter().take(length).copied().collect();
+            if sender.send(Incoming::Datagram(id, datagram)).is_err() {
+                return;
+            }
+        }
+    });
+    Ok((port, incoming))
+}
+
+/// Where datagrams to a client go.
+struct Peer {
+    socket: UdpSocket,
+    address: SocketAddr,
+}
+
+impl Write for Peer {
+    fn write(&mut self, datagram: &[u8]) -> std::io::Result<usize> {
+        self.socket.send_to(datagram, self.address)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Opens a pseudo-terminal for a client; returns its path and what comes from there.

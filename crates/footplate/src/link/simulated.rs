@@ -73,6 +73,7 @@ impl Link for SimulatedLink<'_> {
                 self.heard = bytes;
                 self.heard.pop_front().map_or(Heard::Nothing, Heard::Byte)
             }
+            Some(FromSimulated::Datagram(_, datagram)) => Heard::Datagram(datagram),
             Some(FromSimulated::Cts(up)) => Heard::Cts(up),
             None => Heard::Nothing,
         }

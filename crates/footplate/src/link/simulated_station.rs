@@ -1,9 +1,9 @@
-//! A simulated layout behind either kind of station.
+//! A simulated layout behind any kind of station.
 
 use std::collections::VecDeque;
 
 use footplate_core::Timestamp;
-use footplate_sim::living::{CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualStation};
+use footplate_sim::living::{CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualStation, VirtualZ21};
 
 /// A simulated station and the world behind it.
 #[derive(Debug, Clone)]
@@ -12,6 +12,8 @@ pub(crate) enum SimulatedStation<'l> {
     Marklin(Box<VirtualStation<'l>>),
     /// A DCC-EX board.
     DccEx(Box<VirtualBoard<'l>>),
+    /// A Z21.
+    Z21(Box<VirtualZ21<'l>>),
 }
 
 impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
@@ -26,11 +28,19 @@ impl<'l> From<VirtualBoard<'l>> for SimulatedStation<'l> {
     }
 }
 
-/// What reaches the host from either.
+impl<'l> From<VirtualZ21<'l>> for SimulatedStation<'l> {
+    fn from(station: VirtualZ21<'l>) -> Self {
+        Self::Z21(Box::new(station))
+    }
+}
+
+/// What reaches the host from any.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FromSimulated {
     /// Bytes in one portion.
     Bytes(VecDeque<u8>),
+    /// A datagram to one of several clients.
+    Datagram(usize, Vec<u8>),
     /// The hand-shake line is up or down.
     Cts(bool),
 }
@@ -41,6 +51,7 @@ impl<'l> SimulatedStation<'l> {
         match self {
             Self::Marklin(station) => station.now(),
             Self::DccEx(board) => board.now(),
+            Self::Z21(station) => station.now(),
         }
     }
 
@@ -52,14 +63,23 @@ impl<'l> SimulatedStation<'l> {
                 FromStation::Cts(up) => FromSimulated::Cts(up),
             }),
             Self::DccEx(board) => board.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
+            Self::Z21(station) => {
+                station.advance(until).map(|(client, datagram)| FromSimulated::Datagram(client, datagram))
+            }
         }
     }
 
     /// The host puts bytes on the line.
     pub(crate) fn write(&mut self, bytes: &[u8]) {
+        self.write_of(0, bytes);
+    }
+
+    /// One of several clients puts bytes on the line, of which each has its own where the station knows more than one.
+    pub(crate) fn write_of(&mut self, client: usize, bytes: &[u8]) {
         match self {
             Self::Marklin(station) => bytes.iter().for_each(|byte| station.write(*byte)),
             Self::DccEx(board) => board.write(bytes),
+            Self::Z21(station) => station.write(client, bytes),
         }
     }
 
@@ -67,7 +87,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
-            Self::DccEx(_) => None,
+            Self::DccEx(_) | Self::Z21(_) => None,
         }
     }
 
@@ -76,6 +96,7 @@ impl<'l> SimulatedStation<'l> {
         match self {
             Self::Marklin(station) => station.world(),
             Self::DccEx(board) => board.world(),
+            Self::Z21(station) => station.world(),
         }
     }
 
@@ -84,14 +105,15 @@ impl<'l> SimulatedStation<'l> {
         match self {
             Self::Marklin(station) => station.world_mut(),
             Self::DccEx(board) => board.world_mut(),
+            Self::Z21(station) => station.world_mut(),
         }
     }
 
-    /// Solenoids that were left powered for too long; a DCC-EX board leaves that to the decoders of turnouts.
+    /// Solenoids that were left powered for too long; others leave that to the decoders of turnouts.
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),
-            Self::DccEx(_) => &[],
+            Self::DccEx(_) | Self::Z21(_) => &[],
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use footplate_core::{Command, SensorId, Timestamp};
 use footplate_wire::marklin_serial::Interface;
-use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex};
+use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, z21};
 
 /// A session with any station that there is.
 #[derive(Debug, Clone)]
@@ -11,6 +11,8 @@ pub(crate) enum StationSession {
     Marklin(Interface),
     /// A DCC-EX board.
     DccEx(dcc_ex::Client),
+    /// A Z21.
+    Z21(z21::Client),
 }
 
 impl From<Interface> for StationSession {
@@ -25,11 +27,18 @@ impl From<dcc_ex::Client> for StationSession {
     }
 }
 
+impl From<z21::Client> for StationSession {
+    fn from(session: z21::Client) -> Self {
+        Self::Z21(session)
+    }
+}
+
 impl StationSession {
     fn any(&self) -> &dyn Session {
         match self {
             Self::Marklin(session) => session,
             Self::DccEx(session) => session,
+            Self::Z21(session) => session,
         }
     }
 
@@ -37,6 +46,7 @@ impl StationSession {
         match self {
             Self::Marklin(session) => session,
             Self::DccEx(session) => session,
+            Self::Z21(session) => session,
         }
     }
 }

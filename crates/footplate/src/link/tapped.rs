@@ -43,8 +43,13 @@ impl<L: Link> Link for TappedLink<L> {
 
     fn wait(&mut self, until: Timestamp) -> Heard {
         let heard = self.link.wait(until);
-        if let Heard::Byte(byte) = heard {
-            self.passed.push(Passed::Heard(self.link.now(), byte));
+        match &heard {
+            Heard::Byte(byte) => self.passed.push(Passed::Heard(self.link.now(), *byte)),
+            Heard::Datagram(datagram) => {
+                let now = self.link.now();
+                self.passed.extend(datagram.iter().map(|byte| Passed::Heard(now, *byte)));
+            }
+            Heard::Cts(_) | Heard::Nothing | Heard::Lost(_) => {}
         }
         heard
     }

@@ -148,6 +148,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                     }
                     match heard {
                         Heard::Byte(byte) => self.session.handle_bytes(now, &[byte]),
+                        Heard::Datagram(datagram) => self.session.handle_bytes(now, &datagram),
                         Heard::Cts(up) => self.session.handle_cts(now, up),
                         Heard::Lost(lost) => {
                             if let Err(lost) = self.open_again(lost) {
@@ -265,6 +266,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             let end = began + WITHIN;
             match self.link.wait(self.session.next_timeout().unwrap_or(end).min(end)) {
                 Heard::Byte(byte) => self.session.handle_bytes(self.link.now(), &[byte]),
+                Heard::Datagram(datagram) => self.session.handle_bytes(self.link.now(), &datagram),
                 Heard::Cts(up) => self.session.handle_cts(self.link.now(), up),
                 Heard::Nothing => self.session.handle_timeout(self.link.now()),
                 Heard::Lost(_) => return,

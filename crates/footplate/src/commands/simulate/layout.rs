@@ -7,13 +7,13 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_sim::{BoardSwitches, LawFamily, Railway, Scenario, SimulatedRecording};
+use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
 use footplate_store::{layout_named, write_sensor_log, write_whole};
 
 use super::super::Outcome;
 use super::station::{Place, Wanted, place_named, serve};
 use super::{recording, truth};
-use crate::link::{StationKind, quirks};
+use crate::link::{Quirks, StationKind, quirks};
 
 /// Let model trains run through a scenario, each on its own.
 ///
@@ -50,15 +50,17 @@ pub(super) struct Arguments {
     /// Report on the files as JSON, a line for each train.
     #[arg(long)]
     json: bool,
-    /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `pty` for a pseudo-terminal.
+    /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `udp:127.0.0.1:0` for a Z21's, `pty` for a
+    /// pseudo-terminal.
     #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
     station: Option<Place>,
-    /// What the station is: `marklin`, a 6051, or `dcc-ex`, a DCC-EX board.
+    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, or `z21`, a Z21.
     #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
     protocol: StationKind,
-    /// How a DCC-EX board behaves, with commas between: chatter, merged, split, lossy, silent.
+    /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,
+    /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21).
     #[arg(long, value_parser = quirks, requires = "station")]
-    quirks: Option<BoardSwitches>,
+    quirks: Option<Quirks>,
     /// How many times faster than real time the station runs.
     #[arg(long, default_value_t = 1.0, requires = "station")]
     speed: f64,
@@ -115,7 +117,7 @@ impl Arguments {
             law: self.law,
             speed: self.speed,
             protocol: self.protocol,
-            board: self.quirks.unwrap_or_default(),
+            quirks: self.quirks.unwrap_or_default(),
         };
         serve(place, &wanted, layout, output)
     }

@@ -5,10 +5,12 @@ use std::sync::mpsc::Receiver;
 
 use anyhow::{Context, anyhow, bail};
 use footplate_core::track::Layout;
-use footplate_sim::{BoardSwitches, LawFamily};
+use footplate_wire::z21::Feedback;
+use footplate_sim::LawFamily;
 
 use crate::link::{
-    Incoming, Server, SimulatedAddress, StationKind, listen_on, open_pseudo_terminal, station, trains,
+    Incoming, Quirks, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_on,
+    open_pseudo_terminal, station, trains,
 };
 use crate::runtime::StopFlag;
 
@@ -17,15 +19,22 @@ use crate::runtime::StopFlag;
 pub(super) enum Place {
     /// At an address of this computer, such as `127.0.0.1:0`; port 0 is any that is free.
     Tcp(String),
+    /// At an address of this computer, for datagrams.
+    Udp(String),
     /// At a pseudo-terminal.
     PseudoTerminal,
 }
 
 pub(super) fn place_named(text: &str) -> anyhow::Result<Place> {
-    match text.strip_prefix("tcp:") {
-        Some(address) if address.contains(':') => Ok(Place::Tcp(address.trim_start_matches('/').to_owned())),
-        None if text == "pty" => Ok(Place::PseudoTerminal),
-        _ => Err(anyhow!("write tcp:127.0.0.1:0 for a network port or pty for a pseudo-terminal")),
+    let address = |scheme| text.strip_prefix(scheme).filter(|address| address.contains(':'));
+    let plain = |address: &str| address.trim_start_matches('/').to_owned();
+    match (address("tcp:"), address("udp:")) {
+        (Some(address), _) => Ok(Place::Tcp(plain(address))),
+        (_, Some(address)) => Ok(Place::Udp(plain(address))),
+        _ if text == "pty" => Ok(Place::PseudoTerminal),
+        _ => Err(anyhow!(
+            "write tcp:127.0.0.1:0 for a network port, udp:127.0.0.1:0 for a Z21's, or pty for a pseudo-terminal"
+        )),
     }
 }
 
@@ -37,7 +46,7 @@ pub(super) struct Wanted<'a> {
     pub(super) law: Option<LawFamily>,
     pub(super) speed: f64,
     pub(super) protocol: StationKind,
-    pub(super) board: BoardSwitches,
+    pub(super) quirks: Quirks,
 }
 
 /// Serves until somebody stops the program.
@@ -49,12 +58,18 @@ pub(super) fn serve(
 ) -> anyhow::Result<()> {
     let mut address = SimulatedAddress::of(wanted.layout).map_err(|error| anyhow!(error))?;
     (address.seed, address.law) = (wanted.seed, wanted.law);
-    (address.station, address.board) = (wanted.protocol, wanted.board);
+    (address.station, address.quirks) = (wanted.protocol, wanted.quirks);
     if let Some(named) = wanted.trains {
         address.trains = trains(named).map_err(|error| anyhow!(error))?;
     }
     if !(wanted.speed > 0.0 && wanted.speed.is_finite()) {
         bail!("speed {} is no multiple of real time; write --speed 20", wanted.speed);
+    }
+    match (wanted.protocol, place) {
+        (StationKind::Z21, Place::Udp(_)) => {}
+        (StationKind::Z21, _) => bail!("a Z21 is spoken to over UDP: write --station udp:127.0.0.1:0"),
+        (_, Place::Udp(_)) => bail!("only a Z21 is spoken to over UDP: write --protocol z21, or --station tcp:127.0.0.1:0"),
+        _ => {}
     }
     let station = station(&address, layout)?;
     let (port, incoming) = open(place)?;
@@ -69,6 +84,16 @@ pub(super) fn serve(
         StationKind::DccEx => {
             writeln!(output, "dcc-ex:{port}?reset=no&speed={speed}")?;
             "DCC-EX board"
+        }
+        StationKind::Z21 => {
+            // What its sensors are connected to has to be said with the link, as of a real one.
+            let feedback = match wanted.quirks.z21.feedback {
+                Feedback::RBus => "",
+                Feedback::Can => "feedback=can&",
+                Feedback::LocoNet => "feedback=loconet&",
+            };
+            writeln!(output, "z21:{port}?{feedback}speed={speed}")?;
+            "Z21"
         }
     };
     output.flush()?;
@@ -92,6 +117,12 @@ fn open(place: &Place) -> anyhow::Result<(String, Receiver<Incoming>)> {
                 listen_on(address).with_context(|| format!("cannot listen on {address}"))?;
             let host = address.rsplit_once(':').map_or(address.as_str(), |(host, _)| host);
             Ok((format!("tcp://{host}:{port}"), incoming))
+        }
+        Place::Udp(address) => {
+            let (port, incoming) =
+                listen_for_datagrams(address).with_context(|| format!("cannot listen on {address}"))?;
+            let host = address.rsplit_once(':').map_or(address.as_str(), |(host, _)| host);
+            Ok((format!("{host}:{port}"), incoming))
         }
         Place::PseudoTerminal => open_pseudo_terminal().context("cannot open a pseudo-terminal"),
     }
