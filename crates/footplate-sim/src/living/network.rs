@@ -43,21 +43,21 @@ pub(crate) struct Network {
 }
 
 impl Network {
-    pub(crate) const fn new(draws: Draws, disturbances: Disturbances) -> Self {
+    pub(crate) fn new(draws: Draws, disturbances: Disturbances) -> Self {
         let (last_to_station, last_to_client) = (Timestamp::ZERO, Timestamp::ZERO);
         let (to_station, to_client) = (Vec::new(), Vec::new());
         Self { draws, disturbances, count: 0, last_to_station, last_to_client, to_station, to_client }
     }
 
     pub(crate) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
-        let sent = self.sent(now, self.last_to_station, client, datagram);
-        self.last_to_station = sent.iter().map(|sent| sent.due).fold(self.last_to_station, Ord::max);
+        let (sent, last) = self.sent(now, self.last_to_station, client, datagram);
+        self.last_to_station = last;
         self.to_station.extend(sent);
     }
 
     pub(crate) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
-        let sent = self.sent(leaves, self.last_to_client, client, datagram);
-        self.last_to_client = sent.iter().map(|sent| sent.due).fold(self.last_to_client, Ord::max);
+        let (sent, last) = self.sent(leaves, self.last_to_client, client, datagram);
+        self.last_to_client = last;
         self.to_client.extend(sent);
     }
 
@@ -82,8 +82,15 @@ impl Network {
         self.to_client.clear();
     }
 
-    /// A datagram leaves: nothing of it arrives, or once or twice.
-    fn sent(&mut self, leaves: Timestamp, last: Timestamp, client: usize, datagram: &[u8]) -> Vec<OnItsWay> {
+    /// A datagram leaves: nothing of it arrives, or once or twice. Returns also when the last of those that keep their order
+    /// arrives, which was `last` before.
+    fn sent(
+        &mut self,
+        leaves: Timestamp,
+        mut last: Timestamp,
+        client: usize,
+        datagram: &[u8],
+    ) -> (Vec<OnItsWay>, Timestamp) {
         let copies = 1 + usize::from(self.happens(self.disturbances.duplicated));
         let mut sent = Vec::with_capacity(copies);
         for _ in 0..copies {
@@ -99,10 +106,11 @@ impl Network {
             let mut due = leaves + TimeSpan::from_s(takes_s);
             if self.disturbances.keeps_order && !is_overtaken {
                 due = due.max(last);
+                last = due;
             }
             sent.push(OnItsWay { due, nth: self.count, client, datagram: datagram.to_vec() });
         }
-        sent
+        (sent, last)
     }
 
     fn happens(&mut self, share: Ratio) -> bool {

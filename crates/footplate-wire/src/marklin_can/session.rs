@@ -153,6 +153,12 @@ impl Client {
         client
     }
 
+    /// What it was opened with.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// The locomotives that the station has listed.
     #[must_use]
     pub fn listed_locomotives(&self) -> &[ListedLocomotive] {
