@@ -198,6 +198,7 @@ step_browser() {
 # The exact versions, as above.
 readonly DCC_EX_PY=DCC-EX-py==1.0.0
 readonly DCC_EX_COMMANDS=@cloudthrottle/dcc-ex--commands@0.12.0
+readonly Z21AIO=z21aio==1.0.7
 
 # Two ends of our own that agree prove nothing.
 step_stations() {
@@ -209,10 +210,12 @@ step_stations() {
   python3 -c "import ensurepip, venv" 2>/dev/null || need pip3-venv python3-venv
   [[ -x $at/venv/bin/python ]] || python3 -m venv "$at/venv"
   "$at/venv/bin/python" -c "import dcc_ex_py" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$DCC_EX_PY"
+  "$at/venv/bin/python" -c "import z21aio" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$Z21AIO"
   [[ -d $at/node_modules/@cloudthrottle ]] || npm install --silent --no-save --prefix "$at" "$DCC_EX_COMMANDS"
   cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/dcc_ex_client.py
   FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/dcc_ex_commands.mjs
+  FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/z21_client.py
 }
 
 refresh_table() {

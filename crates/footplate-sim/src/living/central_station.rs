@@ -100,7 +100,7 @@ impl<'l> VirtualCentralStation<'l> {
         world.power(false, now);
         let mut draws = Draws::new(seed, Purpose::Line);
         let CanSwitches { lost, duplicated, overtaken, .. } = switches;
-        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken, keeps_order: true });
+        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
         let scanning = Scanning::begin(&world, now, switches.scan, &mut draws);
         Self {
             world,

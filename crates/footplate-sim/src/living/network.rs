@@ -15,8 +15,6 @@ pub(crate) struct Disturbances {
     pub(crate) lost: Ratio,
     pub(crate) duplicated: Ratio,
     pub(crate) overtaken: Ratio,
-    /// Whether all others arrive in the order in which they left, however close they follow one another.
-    pub(crate) keeps_order: bool,
 }
 
 /// A datagram on its way.
@@ -35,55 +33,58 @@ pub(crate) struct Network {
     draws: Draws,
     disturbances: Disturbances,
     count: u64,
-    /// When the last of those that keep their order arrives.
-    last_to_station: Timestamp,
-    last_to_client: Timestamp,
-    to_station: Vec<OnItsWay>,
-    to_client: Vec<OnItsWay>,
+    to_station: Way,
+    to_client: Way,
+}
+
+/// One direction.
+#[derive(Debug, Clone)]
+struct Way {
+    datagrams: Vec<OnItsWay>,
+    /// When the last one arrives that is not overtaken: the others stay in order.
+    last_due: Timestamp,
 }
 
 impl Network {
     pub(crate) fn new(draws: Draws, disturbances: Disturbances) -> Self {
-        let (last_to_station, last_to_client) = (Timestamp::ZERO, Timestamp::ZERO);
-        let (to_station, to_client) = (Vec::new(), Vec::new());
-        Self { draws, disturbances, count: 0, last_to_station, last_to_client, to_station, to_client }
+        let way = || Way { datagrams: Vec::new(), last_due: Timestamp::ZERO };
+        Self { draws, disturbances, count: 0, to_station: way(), to_client: way() }
     }
 
     pub(crate) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
-        let (sent, last) = self.sent(now, self.last_to_station, client, datagram);
-        self.last_to_station = last;
-        self.to_station.extend(sent);
+        let last = self.to_station.last_due;
+        let (sent, last) = self.sent(now, last, client, datagram);
+        self.to_station.take(sent, last);
     }
 
     pub(crate) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
-        let (sent, last) = self.sent(leaves, self.last_to_client, client, datagram);
-        self.last_to_client = last;
-        self.to_client.extend(sent);
+        let last = self.to_client.last_due;
+        let (sent, last) = self.sent(leaves, last, client, datagram);
+        self.to_client.take(sent, last);
     }
 
     pub(crate) fn next_to_station(&self) -> Option<Timestamp> {
-        self.to_station.iter().map(|datagram| datagram.due).min()
+        self.to_station.next()
     }
 
     pub(crate) fn next_to_client(&self) -> Option<Timestamp> {
-        self.to_client.iter().map(|datagram| datagram.due).min()
+        self.to_client.next()
     }
 
     pub(crate) fn take_to_station(&mut self) -> Option<(usize, Vec<u8>)> {
-        take_first(&mut self.to_station)
+        self.to_station.take_first()
     }
 
     pub(crate) fn take_to_client(&mut self) -> Option<(usize, Vec<u8>)> {
-        take_first(&mut self.to_client)
+        self.to_client.take_first()
     }
 
     pub(crate) fn clear(&mut self) {
-        self.to_station.clear();
-        self.to_client.clear();
+        self.to_station.datagrams.clear();
+        self.to_client.datagrams.clear();
     }
 
-    /// A datagram leaves: nothing of it arrives, or once or twice. Returns also when the last of those that keep their order
-    /// arrives, which was `last` before.
+    /// A datagram leaves: nothing of it arrives, or once or twice, none before `last`; returns the new last.
     fn sent(
         &mut self,
         leaves: Timestamp,
@@ -94,20 +95,16 @@ impl Network {
         let copies = 1 + usize::from(self.happens(self.disturbances.duplicated));
         let mut sent = Vec::with_capacity(copies);
         for _ in 0..copies {
-            let mut takes_s = self.draws.uniform(TAKES_S);
-            let is_overtaken = self.happens(self.disturbances.overtaken);
-            if is_overtaken {
-                takes_s += self.draws.uniform(OVERTAKEN_S);
+            let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(TAKES_S))).max(last);
+            if self.happens(self.disturbances.overtaken) {
+                due += TimeSpan::from_s(self.draws.uniform(OVERTAKEN_S));
+            } else {
+                last = due;
             }
             if self.happens(self.disturbances.lost) {
                 continue;
             }
             self.count += 1;
-            let mut due = leaves + TimeSpan::from_s(takes_s);
-            if self.disturbances.keeps_order && !is_overtaken {
-                due = due.max(last);
-                last = due;
-            }
             sent.push(OnItsWay { due, nth: self.count, client, datagram: datagram.to_vec() });
         }
         (sent, last)
@@ -118,9 +115,20 @@ impl Network {
     }
 }
 
-fn take_first(datagrams: &mut Vec<OnItsWay>) -> Option<(usize, Vec<u8>)> {
-    let first = datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
-    let at = first.map(|(at, _)| at)?;
-    let OnItsWay { client, datagram, .. } = datagrams.swap_remove(at);
-    Some((client, datagram))
+impl Way {
+    fn take(&mut self, sent: Vec<OnItsWay>, last_due: Timestamp) {
+        self.datagrams.extend(sent);
+        self.last_due = last_due;
+    }
+
+    fn next(&self) -> Option<Timestamp> {
+        self.datagrams.iter().map(|datagram| datagram.due).min()
+    }
+
+    fn take_first(&mut self) -> Option<(usize, Vec<u8>)> {
+        let first = self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
+        let at = first.map(|(at, _)| at)?;
+        let OnItsWay { client, datagram, .. } = self.datagrams.swap_remove(at);
+        Some((client, datagram))
+    }
 }

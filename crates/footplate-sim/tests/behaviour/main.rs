@@ -17,4 +17,5 @@ mod speeds;
 mod stops;
 mod virtual_board;
 mod virtual_central_station;
+mod virtual_z21;
 mod yard;

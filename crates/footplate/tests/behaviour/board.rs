@@ -10,7 +10,7 @@ use crate::station::Standing;
 const LINK: &str = "sim:track-a?faults=none&trains=24&station=dcc-ex&seed=";
 
 /// Stops at two places of one circuit.
-const SCRIPT: &str = "\
+pub(crate) const SCRIPT: &str = "\
 turnout all straight
 speed 24 9
 wait 24 located
@@ -33,8 +33,13 @@ fn folder(name: &str) -> PathBuf {
 
 /// A folder with the store of a train that was calibrated for five minutes behind the simulated board of a seed.
 pub(crate) fn calibrated(name: &str, seed: u64) -> PathBuf {
+    calibrated_over(LINK, name, seed)
+}
+
+/// The same behind any simulated station; the link ends where the seed is written.
+pub(crate) fn calibrated_over(link: &str, name: &str, seed: u64) -> PathBuf {
     let folder = folder(name);
-    let (link, store) = (format!("{LINK}{seed}"), folder.join("railway.db").display().to_string());
+    let (link, store) = (format!("{link}{seed}"), folder.join("railway.db").display().to_string());
     let over = ["--link", &link, "--layout", "track-a", "--store", &store];
     let calibrated = footplate(&[&["calibrate", "--train", "24", "--budget", "5m"], &over[..]].concat());
     assert_eq!(calibrated.status, 0, "{}{}", calibrated.output, calibrated.errors);
@@ -42,7 +47,7 @@ pub(crate) fn calibrated(name: &str, seed: u64) -> PathBuf {
 }
 
 /// Has a script carried out over a link, and returns what came of its stops.
-fn driven(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
+pub(crate) fn driven(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
     let [store, file] = ["railway.db", "script.txt"].map(|file| folder.join(file).display().to_string());
     std::fs::write(&file, script).expect("a test file");
     let over = ["--link", link, "--layout", "track-a", "--store", &store];

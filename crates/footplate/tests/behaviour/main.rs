@@ -40,3 +40,4 @@ mod store;
 mod two_sensor;
 mod usage;
 mod wheel_scales;
+mod z21;

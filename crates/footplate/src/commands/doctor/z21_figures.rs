@@ -95,7 +95,10 @@ impl Z21Figures {
             Reply::SerialNumber(number) => self.serial_number = Some(number),
             Reply::Hardware { kind, firmware } => self.hardware = Some((kind, firmware)),
             Reply::LockCode(lock) => self.lock = Some(lock),
-            Reply::SystemState(state) => self.system = Some(state),
+            // What it says when the power goes off at the end is no news.
+            Reply::SystemState(state) if state.central.is_powered() || self.system.is_none() => {
+                self.system = Some(state);
+            }
             Reply::RailCom(rail_com) => drop(self.rail_com.insert(rail_com.address, rail_com)),
             _ => {}
         }

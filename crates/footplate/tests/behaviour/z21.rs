@@ -1,0 +1,109 @@
+//! A train behind a Z21 is calibrated and stopped where it should; the truth is the simulated world's.
+
+use std::net::UdpSocket;
+use std::time::Duration;
+
+use footplate_wire::z21::{Datasets, Request};
+use serde_json::Value;
+
+use crate::board::{SCRIPT, calibrated_over, driven};
+use crate::program::footplate;
+use crate::station::Standing;
+
+const LINK: &str = "sim:track-a?faults=none&trains=24&station=z21&seed=";
+const OTHER_LINK: &str = "sim:track-a?faults=none&trains=24&station=marklin&seed=";
+
+/// The true errors of stops in mm, without their signs, and how many of them were outside of what was promised.
+fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
+    let number = |stop: &Value, field: &str| stop[field].as_f64().unwrap_or_else(|| panic!("{field}: {stop}"));
+    // A stop whose train was lost on its way has no error.
+    let scored: Vec<&Value> = stops.iter().filter(|stop| stop["true_error_mm"].is_f64()).collect();
+    let is_broken = |stop: &&&Value| {
+        let promised = number(stop, "promised_low_mm")..=number(stop, "promised_high_mm");
+        !promised.contains(&number(stop, "true_error_mm"))
+    };
+    let broken = scored.iter().filter(is_broken).count();
+    (scored.iter().map(|stop| number(stop, "true_error_mm").abs()).collect(), broken)
+}
+
+fn median(mut errors: Vec<f64>) -> f64 {
+    errors.sort_by(f64::total_cmp);
+    errors[errors.len() / 2]
+}
+
+#[test]
+fn a_train_is_calibrated_behind_a_z21_and_stops_where_it_should() {
+    let (mut all, mut broken) = (Vec::new(), 0);
+    // Worlds whose train faces the way of the script's places.
+    for seed in [7, 10, 11] {
+        let folder = calibrated_over(LINK, &format!("z21-{seed}"), seed);
+        let (stops, outside) = errors(&driven(&folder, &format!("{LINK}{seed}"), SCRIPT).1);
+        all.extend(stops);
+        broken += outside;
+    }
+    all.sort_by(f64::total_cmp);
+    println!("{} stops, errors in mm: {all:.1?}, {broken} promises of 95 % broken", all.len());
+    assert!(all.len() >= 15, "{all:?}");
+    assert!(all[all.len() / 2] < 12.0 && all[all.len() - 1] < 60.0, "{all:?}");
+    assert!(broken <= 3, "{broken} of {} promises of 95 % broken", all.len());
+}
+
+#[test]
+fn a_calibration_made_over_a_6051_is_valid_over_a_z21() {
+    let (mut same, mut other) = (Vec::new(), Vec::new());
+    for seed in [7, 10, 11] {
+        // One calibration; stops over the other link, and over the one that it was made over.
+        let stays = calibrated_over(OTHER_LINK, &format!("z21-transfer-{seed}"), seed);
+        let moves = stays.join("moves");
+        std::fs::create_dir_all(&moves).expect("a folder");
+        std::fs::copy(stays.join("railway.db"), moves.join("railway.db")).expect("a copy of the store");
+        other.extend(errors(&driven(&moves, &format!("{LINK}{seed}"), SCRIPT).1).0);
+        same.extend(errors(&driven(&stays, &format!("{OTHER_LINK}{seed}"), SCRIPT).1).0);
+    }
+    println!("over the 6051: {same:.1?}\nover the Z21: {other:.1?}");
+    assert!(same.len() >= 15 && other.len() >= 15, "{same:?} {other:?}");
+    let (same, other) = (median(same), median(other));
+    println!("median {same:.1} mm over the 6051, {other:.1} mm over the Z21");
+    assert!(other <= 1.2 * same, "{other:.1} mm over the Z21, {same:.1} mm over the 6051");
+}
+
+#[test]
+fn it_stops_there_over_a_network_that_loses_doubles_and_reorders_datagrams() {
+    let folder = calibrated_over(LINK, "z21-network", 7);
+    let quirks = ["--protocol", "z21", "--quirks", "lossy,twice,overtaken,unsubscribed,short", "--seed", "7"];
+    let station = Standing::with("udp:127.0.0.1:0", "5", &quirks);
+    assert!(station.address.starts_with("z21:127.0.0.1:"), "{}", station.address);
+    let doctor = footplate(&["doctor", "--link", &station.address, "--seconds", "20", "--json"]);
+    let figures: Value = serde_json::from_str(&doctor.output).expect("JSON");
+    assert_eq!((figures["sensors"].as_u64(), &figures["firmware"]), (Some(80), &"1.42".into()), "{}", doctor.errors);
+    assert!(figures["lost_answers"].as_u64().is_some_and(|lost| lost > 0), "{figures}");
+    let script: String = SCRIPT.lines().take(7).map(|line| format!("{line}\n")).collect();
+    let (run, stops) = driven(&folder, &station.address, &script);
+    assert_eq!(stops.len(), 2, "{}", run.output);
+    assert!(stops.iter().all(|stop| stop["achieved"].is_string()), "{}{}", run.output, run.errors);
+    assert!(!run.errors.contains("another throttle") && !run.errors.contains("lost its power"), "{}", run.errors);
+    assert!(!run.errors.contains("NOT commanded"), "{}", run.errors);
+}
+
+#[test]
+fn a_locked_station_is_said_to_be_locked() {
+    let doctor = footplate(&["doctor", "--link", "sim:track-a?station=z21&quirks=locked", "--seconds", "5"]);
+    assert!(doctor.output.contains("until its unlock code is entered"), "{}{}", doctor.output, doctor.errors);
+}
+
+#[test]
+fn an_address_where_no_station_answers_is_said_so_with_status_2() {
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    socket.set_read_timeout(Some(Duration::from_secs(20))).expect("an option of sockets");
+    let link = format!("z21:{}", socket.local_addr().expect("an address"));
+    let doctor = footplate(&["doctor", "--link", &link, "--seconds", "60"]);
+    assert_eq!(doctor.status, 2, "{}", doctor.errors);
+    assert!(doctor.errors.contains("192.168.0.111"), "{}", doctor.errors);
+    // It was asked all the same, and asked again.
+    let mut bytes = [0; 100];
+    for _ in 0..2 {
+        let length = socket.recv(&mut bytes).expect("a datagram");
+        let request = Datasets::of(&bytes[..length]).next().and_then(|dataset| Request::read(&dataset));
+        assert_eq!(request, Some(Request::SerialNumber));
+    }
+}
