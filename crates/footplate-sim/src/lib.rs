@@ -54,9 +54,9 @@ pub use electric::ElectricEngine;
 pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use living::{
-    BoardSwitches, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError, LivingLayout, LivingSwitches,
-    Mishap, MishapKind, PassTruth, RestTruth, StationSwitches, TrainTruth, Truth, VirtualBoard,
-    VirtualStation, VirtualZ21, Z21Switches,
+    BoardSwitches, CanSwitches, CanTransport, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError,
+    LivingLayout, LivingSwitches, Mishap, MishapKind, PassTruth, RestTruth, StationSwitches, TrainTruth,
+    Truth, VirtualBoard, VirtualCentralStation, VirtualStation, VirtualZ21, Z21Switches,
 };
 pub use other_law::OtherLaw;
 pub use physics_range::PhysicsRange;

@@ -9,6 +9,7 @@ extern crate alloc;
 pub mod dcc_ex;
 mod farewell;
 mod locomotives;
+pub mod marklin_can;
 pub mod marklin_serial;
 mod news;
 mod pacing;

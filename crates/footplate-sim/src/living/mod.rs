@@ -4,6 +4,8 @@
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
 //! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, with what a network does to them
+//! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
+//! network                  what a network does to datagrams
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
 //! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
@@ -13,11 +15,14 @@
 mod board;
 mod board_switches;
 mod body;
+mod can_switches;
+mod central_station;
 mod cts;
 mod drive;
 mod hands;
 mod live_train;
 mod mishap;
+mod network;
 mod points;
 mod rails;
 mod s88;
@@ -31,6 +36,8 @@ mod z21_switches;
 
 pub use board::VirtualBoard;
 pub use board_switches::{BoardSwitches, Delivery};
+pub use can_switches::{CanSwitches, CanTransport};
+pub use central_station::VirtualCentralStation;
 pub use cts::CtsSwitch;
 pub use hands::HandError;
 pub use live_train::End;

@@ -4,7 +4,6 @@
 //! real station's times but that its bus of feedback modules is asked in a cycle: that cycle is simulated. Whoever spoke to it
 //! is forgotten after a minute and otherwise not watched: trains run on when they are gone.
 
-mod network;
 mod obeying;
 
 use std::collections::VecDeque;
@@ -16,9 +15,9 @@ use footplate_wire::z21::{
     Reply, Steps, Throttle, TurnoutPosition,
 };
 
-use self::network::Network;
 use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
+use crate::living::network::{Disturbances, Network};
 use crate::living::s88::Edge;
 use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
@@ -117,7 +116,8 @@ impl<'l> VirtualZ21<'l> {
         world.power(false, now);
         world.s88.take_edges(now);
         let mut draws = Draws::new(seed, Purpose::Line);
-        let network = Network::new(draws.split(), switches);
+        let Z21Switches { lost, duplicated, overtaken, .. } = switches;
+        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
         let sensors = world.s88.sensors();
         let occupied = sensors.iter().copied().filter(|sensor| world.s88.is_occupied(*sensor) == Some(true));
         let modules = sensors.iter().map(|sensor| sensor.0 / MODULE_INPUTS + 1).max().unwrap_or_default();

@@ -16,5 +16,6 @@ mod scenarios;
 mod speeds;
 mod stops;
 mod virtual_board;
+mod virtual_central_station;
 mod virtual_z21;
 mod yard;

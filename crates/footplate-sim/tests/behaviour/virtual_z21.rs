@@ -199,7 +199,8 @@ fn a_train_with_a_long_address_is_driven() {
     let world = station.world_mut();
     world.lift(TRAIN);
     world.add(long, Train::draw(24, LawFamily::Constant), 1.0);
-    let edge = layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
+    let edge =
+        layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
     world.place(long, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
     let throttle = Throttle::Step(72);
     let request = Request::Drive { address: 3_078, steps: Steps::All, throttle, forward: true };

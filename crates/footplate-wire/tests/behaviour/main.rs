@@ -9,6 +9,9 @@
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
 mod dcc_ex_vectors;
+mod marklin_can_round_trip;
+mod marklin_can_session;
+mod marklin_can_vectors;
 mod marklin_serial_bench;
 mod marklin_serial_line;
 mod marklin_serial_mishaps;

@@ -6,8 +6,8 @@ use footplate_core::{
     Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 use footplate_wire::z21::{
-    Broadcasts, CanDetection, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection, LocomotiveState,
-    Reply, Request, Settings, Steps, Throttle, TurnoutPosition,
+    Broadcasts, CanDetection, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection,
+    LocomotiveState, Reply, Request, Settings, Steps, Throttle, TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
 
@@ -448,11 +448,13 @@ fn detectors_on_loconet_are_heard_by_their_address() {
 fn a_detector_on_the_can_bus_that_reports_by_itself_has_the_span_of_its_delay() {
     let mut desk = Desk::new(Settings { feedback: Feedback::Can, ..Settings::default() });
     desk.run_until(ms(1_000));
-    let occupied = |value| Reply::Can(CanDetection { network: 0xd001, address: 1, port: 3, kind: 1, value, more: 0 });
+    let occupied =
+        |value| Reply::Can(CanDetection { network: 0xd001, address: 1, port: 3, kind: 1, value, more: 0 });
     desk.hear(occupied(0x0100));
     desk.run_for(300);
     // The detectors are asked every 400 ms; this is far from both times.
-    let asked = desk.written.iter().filter(|(_, request)| *request == Request::ALL_CAN).map(|(at, _)| *at).max();
+    let asked =
+        desk.written.iter().filter(|(_, request)| *request == Request::ALL_CAN).map(|(at, _)| *at).max();
     desk.run_until(ms(asked.unwrap() + 250));
     desk.hear(occupied(0x1100));
     desk.run_for(10);

@@ -1,6 +1,7 @@
 //! `footplate doctor`: whether the line to a station is in order, and how fast it is.
 
 mod board_figures;
+mod can_figures;
 mod figures;
 mod z21_figures;
 
@@ -13,9 +14,10 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
-use footplate_wire::{CommandError, LinkNotice, z21};
+use footplate_wire::{CommandError, LinkNotice, marklin_can, z21};
 
 use self::board_figures::BoardFigures;
+use self::can_figures::CanFigures;
 use self::figures::Figures;
 use self::z21_figures::Z21Figures;
 use super::Outcome;
@@ -37,10 +39,11 @@ const LOST_SHARE: f64 = 0.01;
 Examples:
   footplate doctor --link marklin-serial:/dev/ttyUSB0
   footplate doctor --link dcc-ex:tcp://192.168.4.1:2560
-  footplate doctor --link z21:192.168.0.111")]
+  footplate doctor --link z21:192.168.0.111
+  footplate doctor --link marklin-can:192.168.0.5")]
 pub(crate) struct Arguments {
-    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, or tcp://host:port
-    /// in place of a device.
+    /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111,
+    /// marklin-can:192.168.0.5, or tcp://host:port in place of a device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -82,6 +85,7 @@ impl Arguments {
             StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
             StationSession::DccEx(_) => self.report_board(&heard, output)?,
             StationSession::Z21(session) => self.report_z21(session.settings(), &heard, output)?,
+            StationSession::Can(session) => self.report_bus(session, &heard, output)?,
         };
         Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
     }
@@ -165,6 +169,31 @@ impl Arguments {
             writeln!(output, "{}", figures.json())?;
         } else {
             figures.write(settings.sensor_delay, output)?;
+            heard.ear.write(output)?;
+        }
+        Ok(figures.lost_share())
+    }
+
+    /// Reports on a Märklin CAN bus; returns the share of requests that were not answered.
+    fn report_bus(
+        &self,
+        session: &marklin_can::Client,
+        heard: &Heard<'_>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<f64> {
+        let figures = CanFigures::of(heard.passed, session.settings());
+        if !figures.is_known() {
+            bail!(
+                "nobody on the CAN bus has named themselves; check the station's address, or the adapter and its cable"
+            );
+        }
+        if let Some(plot) = &self.plot {
+            plot.write(&figures.picture())?;
+        }
+        if self.json {
+            writeln!(output, "{}", figures.json(session.listed_locomotives()))?;
+        } else {
+            figures.write(session.listed_locomotives(), session.settings().scan, output)?;
             heard.ear.write(output)?;
         }
         Ok(figures.lost_share())

@@ -93,7 +93,7 @@ pub(crate) struct Arguments {
 /// What is driven: a station, a layout, and what is known of trains.
 #[derive(Args)]
 pub(crate) struct Railway {
-    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, or
+    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, or
     /// tcp://host:port in place of a device.
     #[arg(long, value_name = "URL")]
     link: Address,
@@ -155,7 +155,7 @@ impl Arguments {
                 let link = open_simulated(simulated, &real, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) => {
+            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
                 let link = opened.map_or_else(|| open(&self.railway.link, layout, pace), Ok)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }

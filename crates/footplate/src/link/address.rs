@@ -2,14 +2,16 @@
 //!
 //! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
-//! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board, `z21:HOST` a Z21.
+//! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board, `z21:HOST` a Z21, `marklin-can:HOST` a
+//! Central Station.
 
 use std::str::FromStr;
 
 use footplate_core::{Ratio, TrainId};
-use footplate_sim::{BoardSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
+use footplate_sim::{BoardSwitches, CanSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
 
 use super::board_address::BoardAddress;
+use super::can_address::{self, CanAddress};
 use super::port::Port;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
@@ -17,6 +19,7 @@ const SIMULATED: &str = "sim:";
 const SERIAL: &str = "marklin-serial:";
 const BOARD: &str = "dcc-ex:";
 const Z21: &str = "z21:";
+const CAN: &str = "marklin-can:";
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
 
@@ -35,6 +38,8 @@ pub(crate) enum Address {
     Board(BoardAddress),
     /// A Z21 in a network.
     Z21(Z21Address),
+    /// A station on Märklin's CAN bus.
+    Can(CanAddress),
 }
 
 impl Address {
@@ -42,7 +47,7 @@ impl Address {
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            Self::Serial(_) | Self::Board(_) | Self::Z21(_) => None,
+            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) => None,
         }
     }
 }
@@ -57,6 +62,8 @@ pub(crate) enum StationKind {
     DccEx,
     /// A Z21.
     Z21,
+    /// A Central Station on Märklin's CAN bus.
+    MarklinCan,
 }
 
 impl StationKind {
@@ -69,7 +76,10 @@ impl StationKind {
             "marklin" => Ok(Self::Marklin),
             "dcc-ex" => Ok(Self::DccEx),
             "z21" => Ok(Self::Z21),
-            _ => Err(format!("there is no simulated station `{value}`; there are marklin, dcc-ex and z21")),
+            "marklin-can" => Ok(Self::MarklinCan),
+            _ => Err(format!(
+                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21 and marklin-can"
+            )),
         }
     }
 }
@@ -104,6 +114,8 @@ pub(crate) struct Quirks {
     pub(crate) board: BoardSwitches,
     /// If it is a Z21.
     pub(crate) z21: Z21Switches,
+    /// If it is a Central Station.
+    pub(crate) can: CanSwitches,
 }
 
 /// How fast a simulated clock runs.
@@ -161,10 +173,14 @@ impl FromStr for Address {
             let mut address = Z21Address::of(place)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::Z21(address))
+        } else if let Some(place) = place.strip_prefix(CAN) {
+            let mut address = CanAddress::of(place)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Can(address))
         } else {
             Err(format!(
                 "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, or tcp://host:port in place of a port"
+                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -263,28 +279,29 @@ const CHATTER: Ratio = Ratio::from_percent(50.0);
 /// How often a lossy line drops a byte: one message in fifty is hit.
 const LOSSY: Ratio = Ratio::from_percent(0.2);
 
-/// Reads quirks of a DCC-EX board or a Z21 as `chatter,split`.
+/// Reads quirks of a DCC-EX board, a Z21 or a Central Station as `chatter,split`.
 pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
-    let Quirks { mut board, mut z21 } = Quirks::default();
+    let Quirks { mut board, mut z21, mut can } = Quirks::default();
     for one in value.split(',') {
-        let is_of_z21 = set_quirk(&mut z21, one);
+        let is_of_another = set_quirk(&mut z21, one) | can_address::set_quirk(&mut can, one);
         match one {
             "chatter" => board.chatter = CHATTER,
             "merged" => board.delivery = Delivery::Merged,
             "split" => board.delivery = Delivery::Split,
             "lossy" => board.lost = LOSSY,
             "silent" => board.has_banner = false,
-            _ if is_of_z21 => {}
+            _ if is_of_another => {}
             _ => {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
                      (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
-                     DCC-EX board, and of a Z21 {QUIRKS}"
+                     DCC-EX board, of a Z21 {QUIRKS}, and of a Central Station {}",
+                    can_address::QUIRKS
                 ));
             }
         }
     }
-    Ok(Quirks { board, z21 })
+    Ok(Quirks { board, z21, can })
 }
 
 /// The law of a name.
@@ -399,7 +416,7 @@ mod tests {
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
-            ("sim:track-a?station=intellibox", "marklin, dcc-ex and z21"),
+            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21 and marklin-can"),
             ("sim:track-a?quirks=none", "wrong-xor"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
+//! can_address  a station on Märklin's CAN bus
 //! z21_address  datagrams  a Z21: its address, and the line to it over UDP
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
@@ -18,6 +19,7 @@
 
 mod address;
 mod board_address;
+mod can_address;
 mod datagrams;
 mod line;
 mod observed;

@@ -91,6 +91,8 @@ impl<L: Link> Link for ObservedLink<L> {
             // A DCC-EX board's begin with a bracket; a Z21's with their length, which is never 60.
             match bytes {
                 [b'<', ..] => observed.rhythm.wrote_message(bytes),
+                // A frame of Märklin's CAN bus with 0, or as a line of an adapter; no length of a Z21's is one of these.
+                [0 | b'T' | b'\r', ..] => observed.rhythm.wrote_frame(bytes),
                 _ => observed.rhythm.wrote_datagram(bytes),
             }
         }
@@ -111,9 +113,11 @@ impl<L: Link> Link for ObservedLink<L> {
         observed.turn = Some(Stopwatch::start());
         if let Heard::Datagram(datagram) = &heard {
             observed.rhythm.heard_datagram(datagram);
+            datagram.iter().for_each(|byte| observed.rhythm.heard_of_bus(*byte));
         }
         if let Heard::Byte(byte) = heard {
             observed.rhythm.heard_of_board(byte);
+            observed.rhythm.heard_of_bus(byte);
             if let Some(span) = observed.rhythm.heard(self.link.now()) {
                 observed.own.first_bytes.add(span.as_ms());
             }

@@ -2,11 +2,14 @@
 
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
-use footplate_sim::living::{LivingSwitches, VirtualBoard, VirtualStation, VirtualZ21};
+use footplate_sim::living::{
+    LivingSwitches, VirtualBoard, VirtualCentralStation, VirtualStation, VirtualZ21,
+};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
-use footplate_wire::{dcc_ex, z21};
+use footplate_wire::{dcc_ex, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
+use super::can_address::{CanAddress, CanPlace};
 use super::{DatagramLink, Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
@@ -27,6 +30,10 @@ pub(crate) fn open<'l>(
         Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
         Address::Board(board) => Box::new(StreamLink::open(board)?),
         Address::Z21(z21) => Box::new(DatagramLink::open(z21)?),
+        Address::Can(can) => match &can.place {
+            CanPlace::Line(port) => Box::new(StreamLink::open((port, can.speed))?),
+            CanPlace::Datagrams { .. } => Box::new(DatagramLink::open(can)?),
+        },
     })
 }
 
@@ -64,6 +71,9 @@ pub(crate) fn station<'l>(
             VirtualBoard::draw(layout, *seed, trains, &switches, address.quirks.board)?.into()
         }
         StationKind::Z21 => VirtualZ21::draw(layout, *seed, trains, &switches, address.quirks.z21)?.into(),
+        StationKind::MarklinCan => {
+            VirtualCentralStation::draw(layout, *seed, trains, &switches, address.quirks.can)?.into()
+        }
     })
 }
 
@@ -92,12 +102,18 @@ pub(crate) fn open_session(
                 let settings = z21::Settings { feedback, ..z21::Settings::default() };
                 z21::Client::new(now, z21_settings(settings, layout)).into()
             }
+            StationKind::MarklinCan => {
+                let scan = simulated.quirks.can.scan;
+                let settings = marklin_can::Settings { modules, scan, ..marklin_can::Settings::default() };
+                marklin_can::Client::new(now, settings).into()
+            }
         },
         Address::Serial(serial) => {
             Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
         }
         Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
         Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
+        Address::Can(can) => marklin_can::Client::new(now, can_settings(can, layout)).into(),
     })
 }
 
@@ -105,6 +121,15 @@ pub(crate) fn open_session(
 fn z21_settings(settings: z21::Settings, layout: &Layout) -> z21::Settings {
     let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
     z21::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
+}
+
+/// Settings that know which modules the layout's contacts are on.
+fn can_settings(address: &CanAddress, layout: &Layout) -> marklin_can::Settings {
+    let CanAddress { settings, modules, .. } = address;
+    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    let last = highest.saturating_add(settings.first_contact.max(1));
+    let needed = u8::try_from(last.div_ceil(CONTACTS_PER_MODULE)).unwrap_or(u8::MAX);
+    marklin_can::Settings { modules: modules.unwrap_or(needed), ..*settings }
 }
 
 fn serial_settings(address: &SerialAddress, has_cts: bool, modules: u8) -> Settings {

@@ -48,6 +48,20 @@ impl Port {
     }
 }
 
+/// Reads a place in the network, `HOST` or `HOST:PORT`, with the port that is usual where none is written.
+pub(super) fn host_and_port(place: &str, usual: u16) -> Option<(String, u16)> {
+    let (host, port) = match place.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        Some((host, "")) => (host, usual),
+        Some((host, rest)) => (host, rest.strip_prefix(':')?.parse().ok()?),
+        None => match place.rsplit_once(':') {
+            Some((host, port)) => (host, port.parse().ok()?),
+            None => (place, usual),
+        },
+    };
+    let is_name = !host.is_empty() && (!host.contains(['/', ':']) || host.contains("::"));
+    is_name.then(|| (host.to_owned(), port))
+}
+
 impl Display for Port {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         match self {

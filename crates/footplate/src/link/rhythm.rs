@@ -3,7 +3,7 @@
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
-use footplate_wire::z21;
+use footplate_wire::{marklin_can, z21};
 use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
@@ -18,6 +18,8 @@ pub(crate) struct Rhythm {
     asked_since: bool,
     /// What a DCC-EX board says, once something was written to one.
     replies: Option<Framing>,
+    /// What a station on Märklin's CAN bus says, once something was written to one.
+    frames: Option<marklin_can::Framing>,
 }
 
 /// What the station was commanded last of the power, and whether anything was heard of it since.
@@ -67,6 +69,29 @@ impl Rhythm {
         }
     }
 
+    /// A frame for Märklin's CAN bus was written.
+    pub(crate) fn wrote_frame(&mut self, bytes: &[u8]) {
+        let is_text = bytes.first().is_some_and(|first| *first != 0);
+        let transport =
+            if is_text { marklin_can::Transport::Adapter } else { marklin_can::Transport::Network };
+        self.frames.get_or_insert_with(|| marklin_can::Framing::new(transport));
+        let mut framing = marklin_can::Framing::new(transport);
+        let frame = bytes.iter().find_map(|byte| framing.push(*byte)).filter(|frame| !frame.is_response);
+        if let Some(is_on) = frame.and_then(|frame| power_of(&frame)) {
+            self.power = Some(PowerCommand { is_on, has_answered: false });
+        }
+    }
+
+    /// A byte was heard; if a station on Märklin's CAN bus confirms the power with it, that counts.
+    pub(crate) fn heard_of_bus(&mut self, byte: u8) {
+        let frame =
+            self.frames.as_mut().and_then(|framing| framing.push(byte)).filter(|frame| frame.is_response);
+        let confirmed = frame.and_then(|frame| power_of(&frame));
+        if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
+            power.has_answered = true;
+        }
+    }
+
     /// A datagram to a Z21 was written.
     pub(crate) fn wrote_datagram(&mut self, datagram: &[u8]) {
         for dataset in z21::Datasets::of(datagram) {
@@ -112,6 +137,15 @@ impl Rhythm {
     }
 }
 
+/// What a frame says of the power.
+fn power_of(frame: &marklin_can::Frame) -> Option<bool> {
+    match marklin_can::Message::of(frame) {
+        marklin_can::Message::Go(_) => Some(true),
+        marklin_can::Message::Stop(_) => Some(false),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,6 +159,20 @@ mod tests {
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
         b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
+    }
+
+    #[test]
+    fn a_central_station_confirms_the_power_itself() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_frame(&[0, 0, 3, 0, 5, 0, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        // Its own echo says nothing; the response bit does.
+        for (response, has_answered) in [(0, false), (1, true)] {
+            [0, response, 3, 0, 5, 0, 0, 0, 0, 1, 0, 0, 0]
+                .into_iter()
+                .for_each(|byte| rhythm.heard_of_bus(byte));
+            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+        }
     }
 
     #[test]

@@ -3,7 +3,10 @@
 use std::collections::VecDeque;
 
 use footplate_core::Timestamp;
-use footplate_sim::living::{CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualStation, VirtualZ21};
+use footplate_sim::living::{
+    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualStation,
+    VirtualZ21,
+};
 
 /// A simulated station and the world behind it.
 #[derive(Debug, Clone)]
@@ -14,6 +17,8 @@ pub(crate) enum SimulatedStation<'l> {
     DccEx(Box<VirtualBoard<'l>>),
     /// A Z21.
     Z21(Box<VirtualZ21<'l>>),
+    /// A Central Station.
+    Can(Box<VirtualCentralStation<'l>>),
 }
 
 impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
@@ -31,6 +36,12 @@ impl<'l> From<VirtualBoard<'l>> for SimulatedStation<'l> {
 impl<'l> From<VirtualZ21<'l>> for SimulatedStation<'l> {
     fn from(station: VirtualZ21<'l>) -> Self {
         Self::Z21(Box::new(station))
+    }
+}
+
+impl<'l> From<VirtualCentralStation<'l>> for SimulatedStation<'l> {
+    fn from(station: VirtualCentralStation<'l>) -> Self {
+        Self::Can(Box::new(station))
     }
 }
 
@@ -52,6 +63,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Marklin(station) => station.now(),
             Self::DccEx(board) => board.now(),
             Self::Z21(station) => station.now(),
+            Self::Can(station) => station.now(),
         }
     }
 
@@ -66,6 +78,10 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => {
                 station.advance(until).map(|(client, datagram)| FromSimulated::Datagram(client, datagram))
             }
+            Self::Can(station) => station.advance(until).map(|(client, bytes)| match station.transport() {
+                CanTransport::Datagrams => FromSimulated::Datagram(client, bytes),
+                CanTransport::Stream | CanTransport::Adapter => FromSimulated::Bytes(bytes.into()),
+            }),
         }
     }
 
@@ -80,6 +96,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Marklin(station) => bytes.iter().for_each(|byte| station.write(*byte)),
             Self::DccEx(board) => board.write(bytes),
             Self::Z21(station) => station.write(client, bytes),
+            Self::Can(station) => station.write(client, bytes),
         }
     }
 
@@ -87,7 +104,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
-            Self::DccEx(_) | Self::Z21(_) => None,
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => None,
         }
     }
 
@@ -97,6 +114,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Marklin(station) => station.world(),
             Self::DccEx(board) => board.world(),
             Self::Z21(station) => station.world(),
+            Self::Can(station) => station.world(),
         }
     }
 
@@ -106,6 +124,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Marklin(station) => station.world_mut(),
             Self::DccEx(board) => board.world_mut(),
             Self::Z21(station) => station.world_mut(),
+            Self::Can(station) => station.world_mut(),
         }
     }
 
@@ -113,7 +132,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),
-            Self::DccEx(_) | Self::Z21(_) => &[],
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => &[],
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use footplate_core::{Command, SensorId, Timestamp};
 use footplate_wire::marklin_serial::Interface;
-use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, z21};
+use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, marklin_can, z21};
 
 /// A session with any station that there is.
 #[derive(Debug, Clone)]
@@ -13,6 +13,8 @@ pub(crate) enum StationSession {
     DccEx(dcc_ex::Client),
     /// A Z21.
     Z21(z21::Client),
+    /// A station on Märklin's CAN bus.
+    Can(Box<marklin_can::Client>),
 }
 
 impl From<Interface> for StationSession {
@@ -33,12 +35,19 @@ impl From<z21::Client> for StationSession {
     }
 }
 
+impl From<marklin_can::Client> for StationSession {
+    fn from(session: marklin_can::Client) -> Self {
+        Self::Can(Box::new(session))
+    }
+}
+
 impl StationSession {
     fn any(&self) -> &dyn Session {
         match self {
             Self::Marklin(session) => session,
             Self::DccEx(session) => session,
             Self::Z21(session) => session,
+            Self::Can(session) => session.as_ref(),
         }
     }
 
@@ -47,6 +56,7 @@ impl StationSession {
             Self::Marklin(session) => session,
             Self::DccEx(session) => session,
             Self::Z21(session) => session,
+            Self::Can(session) => session.as_mut(),
         }
     }
 }

@@ -22,6 +22,8 @@ use crate::clock::Stopwatch;
 const MARKLIN_BAUD: u32 = 2400;
 /// The speed of a DCC-EX board's serial port.
 const DCC_EX_BAUD: u32 = 115_200;
+/// The speed of a serial CAN adapter.
+const ADAPTER_BAUD: u32 = 115_200;
 /// How often the hand-shake line is looked at: it is down for a millisecond or so after each byte.
 const CTS_EVERY: Duration = Duration::from_micros(500);
 /// How long a connection over a network may take to be made.
@@ -52,6 +54,13 @@ impl From<&BoardAddress> for Cable {
     fn from(address: &BoardAddress) -> Self {
         let BoardAddress { port, speed, .. } = address.clone();
         Self { port, baud: DCC_EX_BAUD, stop_bits: StopBits::One, cts: Some(false), speed }
+    }
+}
+
+impl From<(&Port, f64)> for Cable {
+    /// A connection, or an adapter on USB, whose port runs as fast as it can whatever is set.
+    fn from((port, speed): (&Port, f64)) -> Self {
+        Self { port: port.clone(), baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false), speed }
     }
 }
 

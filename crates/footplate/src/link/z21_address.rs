@@ -6,6 +6,7 @@ use footplate_sim::Z21Switches;
 use footplate_wire::z21::{Feedback, Settings, Steps};
 
 use super::address::{number, times};
+use super::port::host_and_port;
 
 /// The port at which stations listen.
 const PORT: u16 = 21_105;
@@ -33,20 +34,8 @@ impl Z21Address {
     pub(super) fn of(place: &str) -> Result<Self, String> {
         let wanted = || format!("`z21:{place}` names no station: write z21:192.168.0.111 or z21:HOST:{PORT}");
         let place = place.strip_prefix("//").unwrap_or(place);
-        let (host, port) = match place.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
-            Some((host, "")) => (host, PORT),
-            Some((host, rest)) => {
-                (host, rest.strip_prefix(':').and_then(|port| port.parse().ok()).ok_or_else(wanted)?)
-            }
-            None => match place.rsplit_once(':') {
-                Some((host, port)) => (host, port.parse().map_err(|_| wanted())?),
-                None => (place, PORT),
-            },
-        };
-        if host.is_empty() || host.contains(['/', ':']) && !host.contains("::") {
-            return Err(wanted());
-        }
-        Ok(Self { host: host.to_owned(), port, settings: Settings::default(), speed: 1.0 })
+        let (host, port) = host_and_port(place, PORT).ok_or_else(wanted)?;
+        Ok(Self { host, port, settings: Settings::default(), speed: 1.0 })
     }
 
     pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {

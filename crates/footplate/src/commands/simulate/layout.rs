@@ -50,11 +50,12 @@ pub(super) struct Arguments {
     /// Report on the files as JSON, a line for each train.
     #[arg(long)]
     json: bool,
-    /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `udp:127.0.0.1:0` for a Z21's, `pty` for a
+    /// Serve other programs instead: `tcp:127.0.0.1:0` for any free network port, `udp:127.0.0.1:0` for datagrams, `pty` for a
     /// pseudo-terminal.
     #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
     station: Option<Place>,
-    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, or `z21`, a Z21.
+    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, `z21`, a Z21, or `marklin-can`, a
+    /// Central Station.
     #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
     protocol: StationKind,
     /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,

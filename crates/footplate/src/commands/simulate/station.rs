@@ -5,7 +5,7 @@ use std::sync::mpsc::Receiver;
 
 use anyhow::{Context, anyhow, bail};
 use footplate_core::track::Layout;
-use footplate_sim::LawFamily;
+use footplate_sim::{CanTransport, LawFamily};
 use footplate_wire::z21::Feedback;
 
 use crate::link::{
@@ -33,7 +33,7 @@ pub(super) fn place_named(text: &str) -> anyhow::Result<Place> {
         (_, Some(address)) => Ok(Place::Udp(plain(address))),
         _ if text == "pty" => Ok(Place::PseudoTerminal),
         _ => Err(anyhow!(
-            "write tcp:127.0.0.1:0 for a network port, udp:127.0.0.1:0 for a Z21's, or pty for a pseudo-terminal"
+            "write tcp:127.0.0.1:0 for a network port, udp:127.0.0.1:0 for datagrams, or pty for a pseudo-terminal"
         )),
     }
 }
@@ -67,9 +67,18 @@ pub(super) fn serve(
     }
     match (wanted.protocol, place) {
         (StationKind::Z21, Place::Udp(_)) => {}
+        (StationKind::MarklinCan, place) => {
+            address.quirks.can.transport = match place {
+                Place::Tcp(_) => CanTransport::Stream,
+                Place::Udp(_) => CanTransport::Datagrams,
+                Place::PseudoTerminal => CanTransport::Adapter,
+            };
+        }
         (StationKind::Z21, _) => bail!("a Z21 is spoken to over UDP: write --station udp:127.0.0.1:0"),
         (_, Place::Udp(_)) => {
-            bail!("only a Z21 is spoken to over UDP: write --protocol z21, or --station tcp:127.0.0.1:0")
+            bail!(
+                "only a Z21 and a Central Station are spoken to over UDP: write --protocol z21 or marklin-can, or --station tcp:127.0.0.1:0"
+            )
         }
         _ => {}
     }
@@ -96,6 +105,13 @@ pub(super) fn serve(
             };
             writeln!(output, "z21:{port}?{feedback}speed={speed}")?;
             "Z21"
+        }
+        StationKind::MarklinCan => {
+            // It answers to where it was written from, so that several programs can be tried on one computer.
+            let receive = if matches!(place, Place::Udp(_)) { "receive=0&" } else { "" };
+            let scan = wanted.quirks.can.scan.as_ms();
+            writeln!(output, "marklin-can:{port}?{receive}scan={scan}&speed={speed}")?;
+            "Central Station"
         }
     };
     output.flush()?;

@@ -1,14 +1,21 @@
-//! The network between the clients and the station: datagrams take their time, and may be lost, come twice or be overtaken.
+//! The network between clients and a station: datagrams take their time, and may be lost, come twice or be overtaken.
 
 use footplate_core::{Ratio, TimeSpan, Timestamp};
 
 use crate::draws::Draws;
-use crate::living::z21_switches::Z21Switches;
 
 /// What a datagram takes (s; a wired network and a wireless one that is not busy).
 const TAKES_S: std::ops::Range<f64> = 0.000_2..0.002;
 /// What one takes more that is overtaken (s; chosen).
 const OVERTAKEN_S: std::ops::Range<f64> = 0.005..0.04;
+
+/// What happens to datagrams, and how often.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Disturbances {
+    pub(crate) lost: Ratio,
+    pub(crate) duplicated: Ratio,
+    pub(crate) overtaken: Ratio,
+}
 
 /// A datagram on its way.
 #[derive(Debug, Clone)]
@@ -22,11 +29,9 @@ struct OnItsWay {
 
 /// All datagrams on their way.
 #[derive(Debug, Clone)]
-pub(super) struct Network {
+pub(crate) struct Network {
     draws: Draws,
-    lost: Ratio,
-    duplicated: Ratio,
-    overtaken: Ratio,
+    disturbances: Disturbances,
     count: u64,
     to_station: Way,
     to_client: Way,
@@ -41,41 +46,40 @@ struct Way {
 }
 
 impl Network {
-    pub(super) fn new(draws: Draws, switches: Z21Switches) -> Self {
-        let Z21Switches { lost, duplicated, overtaken, .. } = switches;
+    pub(crate) fn new(draws: Draws, disturbances: Disturbances) -> Self {
         let way = || Way { datagrams: Vec::new(), last_due: Timestamp::ZERO };
-        Self { draws, lost, duplicated, overtaken, count: 0, to_station: way(), to_client: way() }
+        Self { draws, disturbances, count: 0, to_station: way(), to_client: way() }
     }
 
-    pub(super) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
+    pub(crate) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
         let last = self.to_station.last_due;
         let (sent, last) = self.sent(now, last, client, datagram);
         self.to_station.take(sent, last);
     }
 
-    pub(super) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
+    pub(crate) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
         let last = self.to_client.last_due;
         let (sent, last) = self.sent(leaves, last, client, datagram);
         self.to_client.take(sent, last);
     }
 
-    pub(super) fn next_to_station(&self) -> Option<Timestamp> {
+    pub(crate) fn next_to_station(&self) -> Option<Timestamp> {
         self.to_station.next()
     }
 
-    pub(super) fn next_to_client(&self) -> Option<Timestamp> {
+    pub(crate) fn next_to_client(&self) -> Option<Timestamp> {
         self.to_client.next()
     }
 
-    pub(super) fn take_to_station(&mut self) -> Option<(usize, Vec<u8>)> {
+    pub(crate) fn take_to_station(&mut self) -> Option<(usize, Vec<u8>)> {
         self.to_station.take_first()
     }
 
-    pub(super) fn take_to_client(&mut self) -> Option<(usize, Vec<u8>)> {
+    pub(crate) fn take_to_client(&mut self) -> Option<(usize, Vec<u8>)> {
         self.to_client.take_first()
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.to_station.datagrams.clear();
         self.to_client.datagrams.clear();
     }
@@ -88,16 +92,16 @@ impl Network {
         client: usize,
         datagram: &[u8],
     ) -> (Vec<OnItsWay>, Timestamp) {
-        let copies = 1 + usize::from(self.happens(self.duplicated));
+        let copies = 1 + usize::from(self.happens(self.disturbances.duplicated));
         let mut sent = Vec::with_capacity(copies);
         for _ in 0..copies {
             let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(TAKES_S))).max(last);
-            if self.happens(self.overtaken) {
+            if self.happens(self.disturbances.overtaken) {
                 due += TimeSpan::from_s(self.draws.uniform(OVERTAKEN_S));
             } else {
                 last = due;
             }
-            if self.happens(self.lost) {
+            if self.happens(self.disturbances.lost) {
                 continue;
             }
             self.count += 1;
@@ -122,7 +126,8 @@ impl Way {
     }
 
     fn take_first(&mut self) -> Option<(usize, Vec<u8>)> {
-        let first = self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
+        let first =
+            self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
         let at = first.map(|(at, _)| at)?;
         let OnItsWay { client, datagram, .. } = self.datagrams.swap_remove(at);
         Some((client, datagram))

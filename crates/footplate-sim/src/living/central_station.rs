@@ -1,0 +1,324 @@
+//! The virtual Central Station: a living layout behind the frames of Märklin's CAN bus, over datagrams, a stream or a serial adapter.
+//!
+//! What comes in is read with the codec that the program writes with; when things come and go is decided here. All contacts are
+//! loaded into the S88 bus at once, a cycle apart, and remembered until then; one after the other is shifted out and reported.
+//! Directions are absolute, the decoders know 14 speed steps. Whoever spoke to it is not watched: trains run on when they are
+//! gone.
+
+mod adapter;
+mod obeying;
+mod scanning;
+
+use std::collections::VecDeque;
+
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_wire::marklin_can::{AccessoryProtocol, Frame, Framing, Message, Transport, Uid};
+
+use self::adapter::Adapter;
+use self::scanning::Scanning;
+use crate::circuit::CircuitError;
+use crate::draws::{Draws, Purpose};
+use crate::living::can_switches::{CanSwitches, CanTransport};
+use crate::living::network::{Disturbances, Network};
+use crate::living::switches::LivingSwitches;
+use crate::living::world::LivingLayout;
+
+/// A frame with eight bytes on the bus: about 130 bits at 250 kbit/s.
+const FRAME_TIME: TimeSpan = TimeSpan::from_us(520);
+/// What the station needs for an answer (s; chosen: stations answer within some milliseconds).
+const ANSWER_S: std::ops::Range<f64> = 0.001..0.006;
+/// What bytes of a stream or of an adapter take (s; chosen).
+const LINE_S: std::ops::Range<f64> = 0.000_2..0.001_5;
+/// The second part of a frame that is cut comes so much later (s; chosen).
+const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
+/// How often the station asks who is there.
+const PING_EVERY: TimeSpan = TimeSpan::from_ms(10_000);
+/// From power on until it answers (chosen: a box, not the half minute of a screen).
+const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
+/// The hash of its frames, seen on a real track box; the published formula does not yield it.
+const HASH: u16 = 0x9346;
+/// Clients that datagrams are sent to at most; more than any layout has.
+const MOST_CLIENTS: usize = 64;
+
+/// A locomotive that was ever spoken of.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    uid: Uid,
+    speed: u16,
+    forward: bool,
+    functions: u32,
+}
+
+/// A living layout behind a Central Station, on a clock of its own.
+#[derive(Debug, Clone)]
+pub struct VirtualCentralStation<'l> {
+    world: LivingLayout<'l>,
+    switches: CanSwitches,
+    draws: Draws,
+    now: Timestamp,
+    network: Network,
+    clients: Vec<usize>,
+    adapter: Adapter,
+    framing: Framing,
+    /// Frames that the bytes of a stream or an adapter made, and when the station reads each.
+    incoming: VecDeque<(Timestamp, Frame)>,
+    /// Bytes on their way to the host of a stream or an adapter.
+    outgoing: VecDeque<(Timestamp, Vec<u8>)>,
+    bus_is_free: Timestamp,
+    slots: Vec<Slot>,
+    scanning: Scanning,
+    ping_due: Timestamp,
+    /// Until when it is starting.
+    dark_until: Option<Timestamp>,
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Datagram,
+    Frame,
+    Scan,
+    Report,
+    ToClient,
+    ToHost,
+    Ping,
+    Light,
+}
+
+impl<'l> VirtualCentralStation<'l> {
+    /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
+    /// power yet. The layout's sensor 0 is contact 1, its turnout 1 is the first.
+    #[must_use]
+    pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: CanSwitches) -> Self {
+        let now = world.now();
+        let slot = |train: TrainId| {
+            let forward = world.runs_forward(train).unwrap_or(true);
+            Slot { uid: switches.locomotives.uid(train.0), speed: 0, forward, functions: 0 }
+        };
+        let slots = world.train_ids().map(slot).collect();
+        world.power(false, now);
+        let mut draws = Draws::new(seed, Purpose::Line);
+        let CanSwitches { lost, duplicated, overtaken, .. } = switches;
+        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
+        let scanning = Scanning::begin(&world, now, switches.scan, &mut draws);
+        Self {
+            world,
+            switches,
+            draws,
+            now,
+            network,
+            clients: Vec::new(),
+            adapter: Adapter::default(),
+            framing: Framing::new(Transport::Network),
+            incoming: VecDeque::new(),
+            outgoing: VecDeque::new(),
+            bus_is_free: now,
+            slots,
+            scanning,
+            ping_due: now + PING_EVERY,
+            dark_until: None,
+        }
+    }
+
+    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
+    ///
+    /// # Errors
+    /// [`CircuitError`] when no train can run round on the layout.
+    pub fn draw(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        can: CanSwitches,
+    ) -> Result<Self, CircuitError> {
+        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, can))
+    }
+
+    /// The time.
+    #[must_use]
+    pub const fn now(&self) -> Timestamp {
+        self.now
+    }
+
+    /// The layout.
+    #[must_use]
+    pub const fn world(&self) -> &LivingLayout<'l> {
+        &self.world
+    }
+
+    /// The layout, for a person's hands.
+    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
+        &mut self.world
+    }
+
+    /// How frames travel.
+    #[must_use]
+    pub const fn transport(&self) -> CanTransport {
+        self.switches.transport
+    }
+
+    /// It is switched off and on: the track loses power, and for some seconds nothing is read. Then it knows no locomotive's
+    /// speed.
+    pub fn restart(&mut self) {
+        let now = self.now;
+        self.world.power(false, now);
+        self.world.forget_all_told();
+        self.slots.iter_mut().for_each(|slot| slot.speed = 0);
+        self.network.clear();
+        self.incoming.clear();
+        self.outgoing.clear();
+        self.adapter = Adapter::default();
+        self.dark_until = Some(now + BOOT);
+    }
+
+    /// A client sends a datagram, or more of its stream.
+    pub fn write(&mut self, client: usize, bytes: &[u8]) {
+        match self.switches.transport {
+            CanTransport::Datagrams => {
+                if !self.clients.contains(&client) && self.clients.len() < MOST_CLIENTS {
+                    self.clients.push(client);
+                }
+                self.network.send_to_station(self.now, client, bytes);
+            }
+            CanTransport::Stream => {
+                for byte in bytes {
+                    if let Some(frame) = self.framing.push(*byte) {
+                        self.take_in(frame);
+                    }
+                }
+            }
+            CanTransport::Adapter => {
+                for byte in bytes {
+                    let (answer, frame) = self.adapter.push(*byte);
+                    if let Some(answer) = answer {
+                        self.put_out(self.now, answer.as_bytes().to_vec());
+                    }
+                    if let Some(frame) = frame {
+                        self.take_in(frame);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Goes on until a time, or until bytes reach a client before it.
+    pub fn advance(&mut self, until: Timestamp) -> Option<(usize, Vec<u8>)> {
+        loop {
+            let next = self.next().filter(|(at, _)| *at <= until);
+            self.now = next.map_or(until, |(at, _)| at).max(self.now);
+            self.world.advance(self.now);
+            match next {
+                Some((_, Next::ToClient)) => return self.network.take_to_client(),
+                Some((_, Next::ToHost)) => return self.outgoing.pop_front().map(|(_, bytes)| (0, bytes)),
+                Some((_, next)) => self.happen(next),
+                None => return None,
+            }
+        }
+    }
+
+    /// What happens next, and when; of things at one time the first in the order of this list.
+    fn next(&self) -> Option<(Timestamp, Next)> {
+        let coming = [
+            (self.network.next_to_station(), Next::Datagram),
+            (self.incoming.front().map(|(at, _)| *at), Next::Frame),
+            (Some(self.scanning.due()), Next::Scan),
+            (self.scanning.next_report(), Next::Report),
+            (self.network.next_to_client(), Next::ToClient),
+            (self.outgoing.front().map(|(at, _)| *at), Next::ToHost),
+            (Some(self.ping_due), Next::Ping),
+            (self.dark_until, Next::Light),
+        ];
+        coming.into_iter().filter_map(|(at, next)| Some((at?, next))).min_by_key(|(at, _)| *at)
+    }
+
+    fn happen(&mut self, next: Next) {
+        let is_dark = self.dark_until.is_some();
+        match next {
+            Next::Datagram => {
+                let datagram = self.network.take_to_station().map(|(_, datagram)| datagram);
+                let frame = datagram.and_then(|bytes| bytes.try_into().ok()).and_then(Frame::decode);
+                if let Some(frame) = frame.filter(|_| !is_dark) {
+                    self.obey(&frame);
+                }
+            }
+            Next::Frame => {
+                if let Some((_, frame)) = self.incoming.pop_front()
+                    && !is_dark
+                {
+                    self.obey(&frame);
+                }
+            }
+            Next::Scan => self.scanning.scan(&mut self.world, self.switches.has_times, &mut self.draws),
+            Next::Report => {
+                if let Some(report) = self.scanning.take_report()
+                    && !is_dark
+                {
+                    self.post(self.now, report, true);
+                }
+            }
+            Next::Ping => {
+                self.ping_due += PING_EVERY;
+                if !is_dark {
+                    self.post(self.now, Message::Ping, false);
+                }
+            }
+            Next::Light => self.dark_until = None,
+            Next::ToClient | Next::ToHost => {}
+        }
+    }
+
+    /// A frame has come whole from the host of a stream or an adapter.
+    fn take_in(&mut self, frame: Frame) {
+        let due = self.now + TimeSpan::from_s(self.draws.uniform(LINE_S));
+        let due = self.incoming.back().map_or(due, |(last, _)| due.max(*last));
+        self.incoming.push_back((due, frame));
+    }
+
+    /// Says something in a while.
+    fn say(&mut self, message: Message) {
+        let due = self.now + TimeSpan::from_s(self.draws.uniform(ANSWER_S));
+        self.post(due, message, true);
+    }
+
+    /// Puts a frame on the bus, behind those that are on it.
+    fn post(&mut self, due: Timestamp, message: Message, is_response: bool) {
+        let leaves = self.bus_is_free.max(due) + FRAME_TIME;
+        self.bus_is_free = leaves;
+        let frame = message.frame(is_response, HASH);
+        match self.switches.transport {
+            CanTransport::Datagrams => {
+                for client in self.clients.clone() {
+                    self.network.send_to_client(leaves, client, &frame.encode());
+                }
+            }
+            CanTransport::Stream => self.put_out(leaves, frame.encode().to_vec()),
+            CanTransport::Adapter if self.adapter.is_open() => {
+                self.put_out(leaves, (frame.to_text() + "\r").into_bytes());
+            }
+            CanTransport::Adapter => {}
+        }
+    }
+
+    /// Bytes leave for the host of a stream or an adapter; what left before arrives before.
+    fn put_out(&mut self, leaves: Timestamp, mut bytes: Vec<u8>) {
+        let due = leaves + TimeSpan::from_s(self.draws.uniform(LINE_S));
+        let mut due = self.outgoing.back().map_or(due, |(last, _)| due.max(*last));
+        if self.switches.is_split {
+            let second = bytes.split_off(self.draws.below(bytes.len() + 1));
+            self.outgoing.push_back((due, bytes));
+            due += TimeSpan::from_s(self.draws.uniform(SPLIT_S));
+            bytes = second;
+        }
+        self.outgoing.push_back((due, bytes));
+    }
+
+    /// The decoder of a turnout powers its coil for long enough and lets go by itself.
+    fn lay(&mut self, uid: Uid, curved: bool) {
+        let protocols = [AccessoryProtocol::Motorola, AccessoryProtocol::Dcc];
+        let address = protocols.into_iter().find_map(|protocol| protocol.address(uid));
+        if let Some(turnout) = address.filter(|_| self.world.is_powered()).map(TurnoutId) {
+            self.world.points.power(turnout, Leg::from_curved(curved), self.now);
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The S88 bus: all contacts are loaded at once, a cycle apart, then shifted out one by one.
+
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_wire::marklin_can::{ContactChange, Message};
+use footplate_wire::marklin_serial::CONTACTS_PER_MODULE;
+
+use crate::draws::Draws;
+use crate::living::world::LivingLayout;
+
+/// What one bit takes on the bus (Link S88: 167 µs unless its owner has set another).
+const BIT_TIME: TimeSpan = TimeSpan::from_us(167);
+/// What the station needs from there until the report is on the CAN bus (s; chosen).
+const HANDS_ON_S: std::ops::Range<f64> = 0.000_5..0.003;
+/// The unit of the time that a report carries.
+const TICK: TimeSpan = TimeSpan::from_ms(10);
+
+/// The bus and what the station knows of its contacts.
+#[derive(Debug, Clone)]
+pub(super) struct Scanning {
+    cycle: TimeSpan,
+    due: Timestamp,
+    /// By the contact's place from 0: whether it is occupied, and since which scan.
+    contacts: Vec<(bool, Timestamp)>,
+    reports: Vec<(Timestamp, Message)>,
+}
+
+impl Scanning {
+    pub(super) fn begin(
+        world: &LivingLayout<'_>,
+        now: Timestamp,
+        cycle: TimeSpan,
+        draws: &mut Draws,
+    ) -> Self {
+        let count =
+            world.s88.sensors().iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or_default();
+        let due = now + TimeSpan::from_s(draws.uniform(0.0..cycle.as_s()));
+        Self { cycle, due, contacts: vec![(false, now); count], reports: Vec::new() }
+    }
+
+    /// When all contacts are loaded next.
+    pub(super) const fn due(&self) -> Timestamp {
+        self.due
+    }
+
+    /// Loads all contacts; what has changed is reported when it has been shifted out.
+    pub(super) fn scan(&mut self, world: &mut LivingLayout<'_>, has_times: bool, draws: &mut Draws) {
+        let at = self.due;
+        self.due += self.cycle;
+        let per_module = usize::from(CONTACTS_PER_MODULE);
+        let modules = self.contacts.len().div_ceil(per_module);
+        for module in 0..modules {
+            let state = world.s88.read(module as u8 + 1, at, true, true);
+            let occupied: Vec<u16> = state.closed().map(|sensor| sensor.0).collect();
+            let places = module * per_module..((module + 1) * per_module).min(self.contacts.len());
+            for place in places {
+                let is_occupied = occupied.contains(&(place as u16));
+                let (was_occupied, since) = self.contacts[place];
+                if was_occupied == is_occupied {
+                    continue;
+                }
+                self.contacts[place] = (is_occupied, at);
+                let ticks = (at - since).as_ns() / TICK.as_ns();
+                let lasted = has_times.then(|| u16::try_from(ticks).unwrap_or(u16::MAX)).or(Some(0));
+                let contact = place as u16 + 1;
+                let shifted = TimeSpan::from_ns(BIT_TIME.as_ns() * i64::from(contact));
+                let due = at + shifted + TimeSpan::from_s(draws.uniform(HANDS_ON_S));
+                let change = Some(ContactChange { was_occupied, is_occupied, lasted });
+                self.reports.push((due, Message::Contact { device: 0, contact, change }));
+            }
+        }
+    }
+
+    pub(super) fn next_report(&self) -> Option<Timestamp> {
+        self.reports.iter().map(|(due, _)| *due).min()
+    }
+
+    pub(super) fn take_report(&mut self) -> Option<Message> {
+        let first = self.reports.iter().enumerate().min_by_key(|(_, (due, _))| *due);
+        let at = first.map(|(at, _)| at)?;
+        Some(self.reports.remove(at).1)
+    }
+
+    /// The contacts of a module, the first in the lowest bit.
+    pub(super) fn module(&self, module: u8) -> u16 {
+        let first = (usize::from(module.max(1)) - 1) * usize::from(CONTACTS_PER_MODULE);
+        let contacts = self.contacts.iter().skip(first).take(usize::from(CONTACTS_PER_MODULE));
+        contacts.enumerate().fold(0, |bits, (bit, (occupied, _))| bits | u16::from(*occupied) << bit)
+    }
+
+    /// Whether a contact is occupied, and for how long it has been so or free.
+    pub(super) fn contact(&self, contact: u16, now: Timestamp) -> Option<ContactChange> {
+        let (occupied, since) = *self.contacts.get(usize::from(contact.checked_sub(1)?))?;
+        let ticks = (now - since).as_ns() / TICK.as_ns();
+        let lasted = Some(u16::try_from(ticks).unwrap_or(u16::MAX));
+        Some(ContactChange { was_occupied: occupied, is_occupied: occupied, lasted })
+    }
+}

@@ -1,0 +1,185 @@
+//! Which contacts are occupied, and what a report about one of them means, whatever the network lost, repeated or reordered.
+
+use alloc::vec::Vec;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::message::ContactChange;
+use super::time_model::{NETWORK_LONGEST, Span};
+
+/// Reports that overtake each other on a network do so within this time.
+const REORDERED_WITHIN: TimeSpan = TimeSpan::from_ms(100);
+
+/// A contact that the station has spoken of.
+#[derive(Debug, Clone, Copy)]
+struct Contact {
+    number: u16,
+    is_occupied: bool,
+    /// When the state was heard of last.
+    known: Timestamp,
+    /// When the station saw the last change, if it reported it.
+    seen: Option<Span>,
+    /// The last report and when it came.
+    report: Option<(ContactChange, Timestamp)>,
+    /// It became free, and the report of its having become occupied was not heard.
+    is_inferred: bool,
+}
+
+/// All of them, in the order of their numbers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Contacts(Vec<Contact>);
+
+/// What a report means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum News {
+    /// The contact has become occupied, and when the station saw it.
+    Occupied(Span),
+    /// It is occupied, and was before it was first asked for.
+    HeldFromStart,
+    /// Nothing new, or free.
+    None,
+}
+
+impl Contacts {
+    /// The station reports a change.
+    pub(super) fn changed(&mut self, now: Timestamp, number: u16, change: ContactChange) -> News {
+        let place = self.contact(now, number, change.was_occupied);
+        let Some(contact) = self.0.get_mut(place) else { return News::None };
+        let is_repeated = contact.report.is_some_and(|(last, at)| {
+            let is_same = last == change || last == ContactChange { lasted: None, ..change };
+            is_same && now - at <= REORDERED_WITHIN
+        });
+        let is_late = change.is_occupied && contact.is_inferred && now - contact.known <= REORDERED_WITHIN;
+        if is_repeated || is_late || change.was_occupied == change.is_occupied {
+            contact.is_inferred = false;
+            return News::None;
+        }
+        let window = Span::of_report(now);
+        // A time of 0 is said by stations that do not measure it, too.
+        let lasted = change.lasted.filter(|ticks| *ticks > 0);
+        let before = contact.seen.filter(|_| contact.is_occupied == change.was_occupied);
+        let expected = before.zip(lasted).and_then(|(before, ticks)| before.later_by(ticks));
+        let seen = expected.and_then(|expected| expected.and(window)).unwrap_or(window);
+        // It became free and had not been heard to be occupied: that report was lost.
+        let is_inferred = !change.is_occupied && !contact.is_occupied && change.was_occupied;
+        let known = contact.known;
+        (contact.is_occupied, contact.known, contact.seen) = (change.is_occupied, now, Some(seen));
+        (contact.report, contact.is_inferred) = (Some((change, now)), is_inferred);
+        if change.is_occupied {
+            return News::Occupied(seen);
+        }
+        if !is_inferred {
+            return News::None;
+        }
+        let since = Span { earliest: known - NETWORK_LONGEST, latest: window.latest };
+        News::Occupied(lasted.and_then(|ticks| window.earlier_by(ticks)?.and(since)).unwrap_or(since))
+    }
+
+    /// The station was asked for the state of a contact. `listing`: for the first time.
+    pub(super) fn asked(&mut self, now: Timestamp, number: u16, is_occupied: bool, listing: bool) -> News {
+        let is_new = self.place(number).is_err();
+        let place = self.contact(now, number, is_occupied);
+        let Some(contact) = self.0.get_mut(place) else { return News::None };
+        if is_new {
+            return if is_occupied && listing { News::HeldFromStart } else { News::None };
+        }
+        // An answer may have been overtaken by a report.
+        let is_overtaken = contact.report.is_some_and(|(_, at)| now - at <= REORDERED_WITHIN);
+        if is_overtaken {
+            return News::None;
+        }
+        let (was_occupied, known) = (contact.is_occupied, contact.known);
+        (contact.is_occupied, contact.known) = (is_occupied, now);
+        if was_occupied == is_occupied {
+            return News::None;
+        }
+        contact.seen = None;
+        if !is_occupied {
+            return News::None;
+        }
+        // What follows as a report of this change is that change.
+        let change = ContactChange { was_occupied: false, is_occupied: true, lasted: None };
+        contact.report = Some((change, now));
+        News::Occupied(Span { earliest: known - NETWORK_LONGEST, latest: now })
+    }
+
+    fn place(&self, number: u16) -> Result<usize, usize> {
+        self.0.binary_search_by_key(&number, |contact| contact.number)
+    }
+
+    /// The place of a contact; one that is new is in a state.
+    fn contact(&mut self, now: Timestamp, number: u16, is_occupied: bool) -> usize {
+        self.place(number).unwrap_or_else(|place| {
+            let (seen, report, is_inferred) = (None, None, false);
+            self.0.insert(place, Contact { number, is_occupied, known: now, seen, report, is_inferred });
+            place
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(was_occupied: bool, is_occupied: bool, lasted: u16) -> ContactChange {
+        ContactChange { was_occupied, is_occupied, lasted: Some(lasted) }
+    }
+
+    fn ms(ms: i64) -> Timestamp {
+        Timestamp::ZERO + TimeSpan::from_ms(ms)
+    }
+
+    fn is_occupied(news: News) -> bool {
+        matches!(news, News::Occupied(_))
+    }
+
+    #[test]
+    fn a_contact_is_reported_once_each_time_it_becomes_occupied() {
+        let mut contacts = Contacts::default();
+        assert_eq!(contacts.asked(ms(0), 3, true, true), News::HeldFromStart);
+        assert_eq!(contacts.asked(ms(0), 5, false, true), News::None);
+        assert!(is_occupied(contacts.changed(ms(2_000), 5, change(false, true, 200))));
+        // The same datagram again, and an answer that was made before.
+        assert_eq!(contacts.changed(ms(2_030), 5, change(false, true, 200)), News::None);
+        assert_eq!(contacts.asked(ms(2_040), 5, false, false), News::None);
+        assert_eq!(contacts.changed(ms(2_300), 5, change(true, false, 30)), News::None);
+        // A second occupation after exactly as long is another one.
+        assert!(is_occupied(contacts.changed(ms(4_300), 5, change(false, true, 200))));
+        assert_eq!(contacts.changed(ms(9_000), 3, change(true, false, 900)), News::None);
+    }
+
+    #[test]
+    fn a_report_that_was_lost_is_made_up_for_by_the_next_one_or_by_asking() {
+        let mut contacts = Contacts::default();
+        contacts.asked(ms(0), 5, false, true);
+        // It became free after 300 ms: it became occupied 300 ms before that.
+        let News::Occupied(span) = contacts.changed(ms(2_300), 5, change(true, false, 30)) else { panic!() };
+        assert!(span.earliest <= ms(2_000) && ms(2_000) <= span.latest, "{span:?}");
+        assert!(span.latest - span.earliest <= TimeSpan::from_ms(41), "{span:?}");
+        // Its report was only late.
+        assert_eq!(contacts.changed(ms(2_320), 5, change(false, true, 200)), News::None);
+        assert_eq!(contacts.asked(ms(3_000), 5, false, false), News::None);
+        let News::Occupied(span) = contacts.asked(ms(4_000), 5, true, false) else { panic!() };
+        assert_eq!((span.earliest, span.latest), (ms(3_000) - NETWORK_LONGEST, ms(4_000)));
+        // The report that was overtaken by the answer is no second one.
+        assert_eq!(contacts.changed(ms(4_010), 5, change(false, true, 170)), News::None);
+        assert_eq!(contacts.changed(ms(4_500), 5, change(true, false, 50)), News::None);
+    }
+
+    #[test]
+    fn the_time_that_a_report_carries_narrows_what_the_network_left_open() {
+        let mut contacts = Contacts::default();
+        contacts.asked(ms(0), 5, false, true);
+        contacts.changed(ms(1_000), 5, change(false, true, 100));
+        contacts.changed(ms(1_200), 5, change(true, false, 20));
+        // Held up by 18 ms on the network: the station saw it near 3200.
+        let News::Occupied(span) = contacts.changed(ms(3_218), 5, change(false, true, 200)) else { panic!() };
+        assert!(span.latest <= ms(3_210) && ms(3_200) <= span.latest, "{span:?}");
+        // Without that time the span is as wide as the network makes it.
+        let news = contacts.changed(ms(3_400), 5, ContactChange { lasted: None, ..change(true, false, 0) });
+        assert_eq!(news, News::None);
+        let unknown = ContactChange { lasted: Some(0), ..change(false, true, 0) };
+        let News::Occupied(span) = contacts.changed(ms(5_000), 5, unknown) else { panic!() };
+        assert_eq!(span, Span::of_report(ms(5_000)));
+    }
+}

@@ -1,0 +1,272 @@
+//! What becomes of the frames that come.
+
+use alloc::format;
+
+use footplate_core::{Command, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+
+use super::super::contacts::News;
+use super::super::frame::Frame;
+use super::super::message::{ContactChange, Direction, Message, kind_in_words};
+use super::super::opening::Opening;
+use super::super::outstanding::Awaited;
+use super::super::speed::step_of;
+use super::super::time_model::{CONTACTS_PER_MODULE, Order};
+use super::super::uid::Uid;
+use super::{Client, Query};
+use crate::session::LinkNotice;
+
+/// What this program says of itself when it is asked: the version of the protocol that it speaks, and a device without a cable of its
+/// own on the bus.
+const VERSION: (u8, u8) = (2, 0);
+const KIND: u16 = 0xFFE0;
+
+impl Client {
+    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+        let frame = self.framing.push(byte);
+        let unread = self.framing.take_unread() + self.framing.take_refused();
+        if unread > 0
+            && let Some(notice) = self.silence.heard_noise(unread)
+        {
+            self.notify(notice);
+        }
+        let Some(frame) = frame else { return };
+        let is_own = frame.hash == self.hash && !frame.is_response;
+        if is_own {
+            // An echo says nothing of the station.
+            return;
+        }
+        let was_silent = self.silence.heard();
+        self.heard = now;
+        self.take(now, &frame);
+        if was_silent && self.opening.is_open() {
+            self.verify();
+        }
+        self.end_if_confirmed();
+    }
+
+    fn take(&mut self, now: Timestamp, frame: &Frame) {
+        let message = Message::of(frame);
+        match (message, frame.is_response) {
+            (Message::Ping, false) => {
+                let participant =
+                    Message::Participant { uid: self.settings.uid, version: VERSION, kind: KIND };
+                self.write(participant, true);
+            }
+            (Message::StreamBegins { length, .. }, _) => {
+                self.outstanding.goes_on(Awaited::Roster, now);
+                self.roster.begins(length);
+            }
+            (Message::StreamGoesOn(bytes), _) => {
+                self.outstanding.goes_on(Awaited::Roster, now);
+                if self.roster.goes_on(bytes) == Some(true) {
+                    self.outstanding.take(Awaited::Roster);
+                }
+            }
+            (Message::Overload { .. }, _) => self.hear_power(false),
+            (message, true) => self.respond(now, message),
+            // What others ask of the station is none of this program's business until it is confirmed.
+            _ => {}
+        }
+    }
+
+    /// The station confirms or reports something.
+    fn respond(&mut self, now: Timestamp, message: Message) {
+        let answered = self.outstanding.answered(message).map(|outstanding| outstanding.awaited);
+        match message {
+            Message::Participant { uid, version, kind } => self.hear_of_participant(uid, version, kind),
+            Message::Go(_) => self.hear_power(true),
+            Message::Stop(_) => self.hear_power(false),
+            Message::Halt(_) => {
+                for train in self.running() {
+                    self.suspect(train, Query::Speed);
+                }
+            }
+            Message::EmergencyStop(uid) => {
+                if let Some(train) = self.train(uid) {
+                    self.suspect(train, Query::Speed);
+                }
+            }
+            Message::Speed { uid, speed: Some(speed) } => {
+                if let Some(train) = self.train(uid) {
+                    self.hear_of_speed(train, step_of(speed), answered);
+                }
+            }
+            Message::Direction { uid, direction: Some(direction) } => {
+                if let (Some(train), Direction::Forward | Direction::Backward) = (self.train(uid), direction)
+                {
+                    self.hear_of_direction(train, direction == Direction::Forward, answered);
+                }
+            }
+            Message::Accessory { uid, position, current, .. } => {
+                let address = self.settings.turnouts.address(uid);
+                if let Some(turnout) = address.filter(|_| current > 0 && position < 2).map(TurnoutId) {
+                    self.hear_of_turnout(now, turnout, position == 0, answered.is_some());
+                }
+            }
+            Message::ModuleState { module, contacts, .. } => self.hear_of_module(now, module, contacts),
+            Message::Contact { device, contact, change: Some(change) } => {
+                if self.settings.device.is_none_or(|wanted| wanted == device) {
+                    self.hear_of_contact(now, contact, change);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The train of a number on the bus, if it was ever commanded here.
+    fn train(&self, uid: Uid) -> Option<TrainId> {
+        let known = self.locomotives.iter().map(|locomotive| locomotive.train);
+        known.chain(self.waiting.iter().filter_map(super::train_of)).find(|train| self.uid(*train) == uid)
+    }
+
+    fn running(&self) -> alloc::vec::Vec<TrainId> {
+        let runs = self.locomotives.iter().filter(|known| known.is_driven && known.step != SpeedStep::STAND);
+        runs.map(|locomotive| locomotive.train).collect()
+    }
+
+    fn hear_of_participant(&mut self, uid: Uid, (major, minor): (u8, u8), kind: u16) {
+        if uid == self.settings.uid || self.participants.contains(&uid) {
+            return;
+        }
+        // A bus has few participants; a flood of made-up ones is not kept.
+        if self.participants.len() < usize::from(u8::MAX) {
+            self.participants.push(uid);
+        }
+        let identity = format!("{}, number {:08X}, version {major}.{minor}", kind_in_words(kind), uid.0);
+        self.notify(LinkNotice::Identified { identity });
+    }
+
+    /// Asks for all states, and how each locomotive is driven.
+    pub(super) fn verify(&mut self) {
+        self.opening = if self.roster.list().is_empty() { Opening::begin() } else { Opening::again() };
+        self.has_modules = true;
+        let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
+        let queries = known.flat_map(|known| [(known.train, Query::Direction), (known.train, Query::Speed)]);
+        self.unverified = queries.collect();
+    }
+
+    /// Everything that has to be known is known.
+    pub(super) fn opened(&mut self) {
+        self.opening = Opening::Open;
+        self.is_blind = false;
+        self.notify(LinkNotice::Answers);
+    }
+
+    fn hear_power(&mut self, on: bool) {
+        if self.is_powered && !on && self.power && !self.outstanding.has(Awaited::Power(false)) {
+            self.notify(LinkNotice::PowerLost);
+        }
+        self.is_powered = on;
+        if !on {
+            self.power_went_off();
+        }
+    }
+
+    /// Something else was said of a train than was commanded: an old frame, or another throttle. It is asked for.
+    fn suspect(&mut self, train: TrainId, query: Query) {
+        if !self.suspected.contains(&train) {
+            self.suspected.push(train);
+        }
+        if !self.unverified.contains(&(train, query)) {
+            self.unverified.push((train, query));
+        }
+    }
+
+    fn hear_of_speed(&mut self, train: TrainId, step: SpeedStep, answered: Option<Awaited>) {
+        let is_outstanding = self.outstanding.has(Awaited::Speed(train, Uid::ALL, step));
+        let Some(locomotive) = self.locomotives.get_mut(train).filter(|known| known.is_driven) else {
+            return;
+        };
+        if matches!(answered, Some(Awaited::Speed(..))) {
+            locomotive.is_stopped = step == SpeedStep::STAND && locomotive.step == SpeedStep::STAND;
+            return;
+        }
+        if locomotive.step == step || is_outstanding {
+            return;
+        }
+        if answered.is_none() {
+            return self.suspect(train, Query::Speed);
+        }
+        // It was asked for and is not what was commanded.
+        let was_blind = self.is_blind;
+        (locomotive.step, locomotive.is_stopped) = (step, false);
+        if self.farewell.has_begun() {
+            // Stops are always taken.
+            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
+        }
+        if was_blind && step == SpeedStep::STAND {
+            self.notify(LinkNotice::Restarted);
+            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
+        } else {
+            self.notify(LinkNotice::OtherThrottle { train, reversed: false });
+        }
+    }
+
+    fn hear_of_direction(&mut self, train: TrainId, forward: bool, answered: Option<Awaited>) {
+        let is_outstanding = self.outstanding.has(Awaited::Direction(train, Uid::ALL, forward));
+        self.locomotives.know(train);
+        let Some(locomotive) = self.locomotives.get_mut(train) else { return };
+        if matches!(answered, Some(Awaited::Direction(..))) {
+            // A station sets the speed to 0 with it.
+            locomotive.is_stopped |= locomotive.step == SpeedStep::STAND;
+            return;
+        }
+        if is_outstanding || locomotive.forward == Some(forward) {
+            return;
+        }
+        if locomotive.forward.is_none() || !locomotive.is_driven {
+            locomotive.forward = Some(forward);
+            return;
+        }
+        if answered.is_none() {
+            return self.suspect(train, Query::Direction);
+        }
+        (locomotive.forward, locomotive.step) = (Some(forward), SpeedStep::STAND);
+        self.notify(LinkNotice::OtherThrottle { train, reversed: true });
+    }
+
+    fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool, was_asked: bool) {
+        let before = match self.turnouts.iter_mut().find(|(known, _)| *known == turnout) {
+            Some((_, lies)) => Some(core::mem::replace(lies, curved)),
+            None => {
+                self.turnouts.push((turnout, curved));
+                None
+            }
+        };
+        let is_own = was_asked || self.outstanding.has(Awaited::Accessory(turnout, Uid::ALL, 0, 0));
+        if !is_own && before != Some(curved) {
+            // Somebody else has thrown it: that is how it lies from now on.
+            self.enter(now, EventKind::Turnout { turnout, curved });
+        }
+    }
+
+    fn hear_of_module(&mut self, now: Timestamp, module: u8, contacts: u16) {
+        let Some(before) = module.checked_sub(1).filter(|_| module <= self.settings.modules) else { return };
+        self.has_modules = true;
+        let listing = !self.opening.is_open();
+        for bit in 0..CONTACTS_PER_MODULE {
+            let contact = u16::from(before) * CONTACTS_PER_MODULE + bit + 1;
+            let Some(number) = contact.checked_sub(self.settings.first_contact) else { continue };
+            let news = self.contacts.asked(now, contact, contacts & 1 << bit != 0, listing);
+            self.report(now, contact, SensorId(number), news);
+        }
+    }
+
+    fn hear_of_contact(&mut self, now: Timestamp, contact: u16, change: ContactChange) {
+        let Some(number) = contact.checked_sub(self.settings.first_contact) else { return };
+        let news = self.contacts.changed(now, contact, change);
+        self.report(now, contact, SensorId(number), news);
+    }
+
+    fn report(&mut self, now: Timestamp, contact: u16, sensor: SensorId, news: News) {
+        match news {
+            News::Occupied(span) => {
+                let order = Order { not_before: self.last_entry, now };
+                let (latest, width) = span.entry(contact, self.settings.scan, order);
+                self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+            }
+            News::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            News::None => {}
+        }
+    }
+}

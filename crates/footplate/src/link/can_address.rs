@@ -1,0 +1,223 @@
+//! What a person writes to name a Central Station or a track box on Märklin's CAN bus: `marklin-can:192.168.0.5` over UDP,
+//! `marklin-can:tcp://192.168.0.5:15731`, `marklin-can:/dev/ttyACM0` through a serial CAN adapter, with
+//! `[?locos=dcc&turnouts=dcc&first-contact=17&device=0&modules=5&scan=20&receive=15730&speed=20]`.
+
+use footplate_core::{Ratio, TimeSpan};
+use footplate_sim::CanSwitches;
+use footplate_wire::marklin_can::{AccessoryProtocol, LocomotiveProtocol, Settings, Transport, Uid};
+
+use super::address::{number, times};
+use super::port::{Port, host_and_port};
+
+const SCHEME: &str = "marklin-can:";
+/// The port at which stations listen, for datagrams and for connections.
+const PORT: u16 = 15_731;
+/// The port to which they send datagrams.
+const RECEIVE: u16 = 15_730;
+/// The cycles of contacts that can be set on a station, in ms.
+const SCANS_MS: std::ops::RangeInclusive<u16> = 10..=1000;
+
+/// Where the bus is reached.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum CanPlace {
+    /// At a station that exchanges datagrams.
+    Datagrams {
+        /// Its name or address in the network.
+        host: String,
+        /// Its port.
+        port: u16,
+        /// The port at which it is listened to; 0 for any.
+        receive_at: u16,
+    },
+    /// At a station that takes connections, or an adapter at a serial port.
+    Line(Port),
+}
+
+/// A station on the bus.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CanAddress {
+    /// Where it is.
+    pub(crate) place: CanPlace,
+    /// What it is like.
+    pub(crate) settings: Settings,
+    /// S88 modules behind it; left out, those that the layout's contacts are on.
+    pub(crate) modules: Option<u8>,
+    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    pub(crate) speed: f64,
+}
+
+impl CanAddress {
+    /// A station at a place.
+    ///
+    /// # Errors
+    /// When no place is named.
+    pub(super) fn of(place: &str) -> Result<Self, String> {
+        let wanted = || {
+            format!(
+                "`{SCHEME}{place}` names no station: write {SCHEME}192.168.0.5, {SCHEME}tcp://HOST:{PORT}, or {SCHEME}/dev/ttyACM0 for \
+                 a CAN adapter"
+            )
+        };
+        let is_device = place.starts_with(['/', '\\']) || place.starts_with("COM");
+        let place = if place.is_empty() {
+            return Err(wanted());
+        } else if is_device || place.starts_with("tcp://") {
+            CanPlace::Line(Port::named(SCHEME, place, "/dev/ttyACM0", PORT)?)
+        } else {
+            let named = place.strip_prefix("udp://").unwrap_or(place);
+            let (host, port) = host_and_port(named, PORT).ok_or_else(wanted)?;
+            CanPlace::Datagrams { host, port, receive_at: RECEIVE }
+        };
+        let transport = match &place {
+            CanPlace::Line(Port::Device(_)) => Transport::Adapter,
+            CanPlace::Line(Port::Tcp { .. }) | CanPlace::Datagrams { .. } => Transport::Network,
+        };
+        // A number of its own for each program that runs, so that it knows its own frames.
+        let uid = Uid(Settings::default().uid.0 & 0xFFFF_0000 | std::process::id() & 0xFFFF);
+        let settings = Settings { transport, uid, ..Settings::default() };
+        Ok(Self { place, settings, modules: None, speed: 1.0 })
+    }
+
+    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match (key, value) {
+            ("locos", _) => self.settings.locomotives = locomotives_named(value)?,
+            ("turnouts", "mm") => self.settings.turnouts = AccessoryProtocol::Motorola,
+            ("turnouts", "dcc") => self.settings.turnouts = AccessoryProtocol::Dcc,
+            ("turnouts", _) => {
+                return Err(format!("`{value}` is no protocol of turnouts: use turnouts=mm or turnouts=dcc"));
+            }
+            ("first-contact", _) => self.settings.first_contact = number(key, value, "17")?,
+            ("device", _) => self.settings.device = Some(number(key, value, "0")?),
+            ("modules", _) => {
+                let modules: u8 = number(key, value, "5")?;
+                if !(1..=31).contains(&modules) {
+                    return Err(format!("{modules} sensor modules; the bus has 1 to 31"));
+                }
+                self.modules = Some(modules);
+            }
+            ("scan", _) => {
+                let ms: u16 = number(key, value, "20")?;
+                if !SCANS_MS.contains(&ms) {
+                    return Err(format!(
+                        "scan {ms} is not between {} and {} ms, as a station's cycle is",
+                        SCANS_MS.start(),
+                        SCANS_MS.end()
+                    ));
+                }
+                self.settings.scan = TimeSpan::from_ms(ms.into());
+            }
+            ("receive", _) => match &mut self.place {
+                CanPlace::Datagrams { receive_at, .. } => *receive_at = number(key, value, "15730")?,
+                CanPlace::Line(_) => {
+                    return Err(format!("`receive` is for datagrams: write {SCHEME}HOST?receive={value}"));
+                }
+            },
+            ("speed", _) => self.speed = times(value)?,
+            _ => {
+                return Err(format!(
+                    "a Märklin CAN link has no `{key}`; it has locos, turnouts, first-contact, device, modules, scan, receive and \
+                     speed"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn locomotives_named(value: &str) -> Result<LocomotiveProtocol, String> {
+    match value {
+        "mm" => Ok(LocomotiveProtocol::Motorola),
+        "mfx" => Ok(LocomotiveProtocol::Mfx),
+        "dcc" => Ok(LocomotiveProtocol::Dcc),
+        _ => Err(format!("`{value}` is no protocol of locomotives: use locos=mm, locos=mfx or locos=dcc")),
+    }
+}
+
+/// How often a datagram is lost, comes twice or is overtaken in a simulated network that is bad: one in fifty.
+const BAD: Ratio = Ratio::from_percent(2.0);
+/// The cycle of a station whose owner has set the shortest.
+const FAST_SCAN: TimeSpan = TimeSpan::from_ms(10);
+
+/// The quirks of a simulated Central Station, as they are listed for people.
+pub(super) const QUIRKS: &str = "lossy, twice and overtaken (datagrams), split (frames arrive in parts), mute (nothing is confirmed), \
+                                 no-times (reports do not say how long the state before lasted), no-polls and no-list (it does not \
+                                 answer for its modules or locomotives), fast-scan (contacts are read every 10 ms), mm and dcc \
+                                 (decoders in the place of mfx)";
+
+/// Sets a quirk of a simulated Central Station; returns whether there is one of that name.
+pub(super) fn set_quirk(switches: &mut CanSwitches, name: &str) -> bool {
+    match name {
+        "lossy" => switches.lost = BAD,
+        "twice" => switches.duplicated = BAD,
+        "overtaken" => switches.overtaken = BAD,
+        "split" => switches.is_split = true,
+        "mute" => switches.is_mute = true,
+        "no-times" => switches.has_times = false,
+        "no-polls" => switches.answers_polls = false,
+        "no-list" => switches.has_list = false,
+        "fast-scan" => switches.scan = FAST_SCAN,
+        "mm" => switches.locomotives = LocomotiveProtocol::Motorola,
+        "dcc" => switches.locomotives = LocomotiveProtocol::Dcc,
+        _ => return false,
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::address::Address;
+    use super::*;
+
+    #[test]
+    fn a_station_is_named_by_its_place() {
+        let datagrams =
+            |host: &str, port, receive_at| CanPlace::Datagrams { host: host.into(), port, receive_at };
+        let places = [
+            ("marklin-can:192.168.0.5", datagrams("192.168.0.5", 15_731, 15_730)),
+            ("marklin-can:cs3.home?receive=0", datagrams("cs3.home", 15_731, 0)),
+            ("marklin-can:udp://127.0.0.1:3000", datagrams("127.0.0.1", 3_000, 15_730)),
+            ("marklin-can:tcp://cs3:15731", CanPlace::Line(Port::Tcp { host: "cs3".into(), port: 15_731 })),
+            ("marklin-can:/dev/ttyACM0", CanPlace::Line(Port::Device("/dev/ttyACM0".into()))),
+        ];
+        for (text, place) in places {
+            let Ok(Address::Can(can)) = text.parse() else { panic!("{text}") };
+            let is_adapter = text.contains("/dev/");
+            assert_eq!(
+                (can.settings.transport == Transport::Adapter, can.place),
+                (is_adapter, place),
+                "{text}"
+            );
+        }
+        let written = "marklin-can:cs3?locos=dcc&turnouts=dcc&first-contact=17&device=2&modules=3&scan=20";
+        let Ok(Address::Can(can)) = written.parse() else { panic!("a station") };
+        let expected = Settings {
+            uid: can.settings.uid,
+            locomotives: LocomotiveProtocol::Dcc,
+            turnouts: AccessoryProtocol::Dcc,
+            first_contact: 17,
+            device: Some(2),
+            scan: TimeSpan::from_ms(20),
+            ..Settings::default()
+        };
+        assert_eq!((can.settings, can.modules), (expected, Some(3)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_answered_with_what_would_be_right() {
+        let cases = [
+            ("marklin-can:", "marklin-can:192.168.0.5"),
+            ("marklin-can:tcp://host", "tcp://127.0.0.1:15731"),
+            ("marklin-can:host:many", "marklin-can:192.168.0.5"),
+            ("marklin-can:cs3?locos=sx", "locos=mfx"),
+            ("marklin-can:cs3?turnouts=servo", "turnouts=dcc"),
+            ("marklin-can:cs3?scan=5", "between 10 and 1000 ms"),
+            ("marklin-can:cs3?modules=32", "1 to 31"),
+            ("marklin-can:tcp://cs3:15731?receive=1", "marklin-can:HOST?receive=1"),
+            ("marklin-can:cs3?pace=fast", "locos, turnouts, first-contact"),
+        ];
+        for (text, right) in cases {
+            let refused = text.parse::<Address>().expect_err(text);
+            assert!(refused.contains(right), "{text}: {refused}");
+        }
+    }
+}
