@@ -61,10 +61,7 @@ impl Silence {
             return None;
         }
         self.is_noise_known = true;
-        Some(LinkNotice::Unreadable {
-            bytes: self.unread_in_all,
-            check: self.checks.noise,
-        })
+        Some(LinkNotice::Unreadable { bytes: self.unread_in_all, check: self.checks.noise })
     }
 
     /// Whether it is silent by now; says so once.

@@ -316,7 +316,8 @@ impl<'l> VirtualZ21<'l> {
                 client.told.has(Broadcasts::ALL_RAIL_COM)
                     || client.told.has(Broadcasts::RAIL_COM) && client.subscribed.contains(&slot.address)
             };
-            let ids: Vec<usize> = self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();
+            let ids: Vec<usize> =
+                self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();
             ids.into_iter().for_each(|id| self.say(id, &rail_com));
         }
     }

@@ -64,7 +64,10 @@ fn requests_are_answered_one_dataset_after_the_other() {
         [Reply::Locomotive(state)] => state,
         _ => panic!("{answers:?}"),
     };
-    ask(&mut station, &[drive(62, true), Request::Function { address: 24, function: 3, switch: FunctionSwitch::On }]);
+    ask(
+        &mut station,
+        &[drive(62, true), Request::Function { address: 24, function: 3, switch: FunctionSwitch::On }],
+    );
     let driven = state(ask(&mut station, &[Request::Locomotive { address: 24 }]));
     assert_eq!((driven.throttle, driven.forward, driven.functions), (Throttle::Step(62), true, 1 << 3));
     // What it does not know it says so; what is not on the X-BUS it does not answer.
@@ -116,7 +119,10 @@ fn sensors_are_reported_within_a_cycle_of_their_bus_or_by_their_detectors() {
         let layout = two_loops();
         let switches = Z21Switches { feedback, ..Z21Switches::default() };
         let mut station = station(&layout, End::Nose, switches);
-        ask(&mut station, &[Request::SetBroadcasts(feedback.broadcasts()), Request::Power { on: true }, drive(99, true)]);
+        ask(
+            &mut station,
+            &[Request::SetBroadcasts(feedback.broadcasts()), Request::Power { on: true }, drive(99, true)],
+        );
         let until = station.now() + TimeSpan::from_s(40.0);
         let mut known = [false; 200];
         let mut delays = Vec::new();
@@ -128,7 +134,8 @@ fn sensors_are_reported_within_a_cycle_of_their_bus_or_by_their_detectors() {
                         continue;
                     }
                     let truth = station.world().truth();
-                    let pass = truth.passes().iter().rfind(|pass| pass.sensor.0 + 1 == number).expect("a pass");
+                    let pass =
+                        truth.passes().iter().rfind(|pass| pass.sensor.0 + 1 == number).expect("a pass");
                     delays.push((station.now() - pass.at).as_ms());
                 }
             }
@@ -192,7 +199,8 @@ fn a_train_with_a_long_address_is_driven() {
     let world = station.world_mut();
     world.lift(TRAIN);
     world.add(long, Train::draw(24, LawFamily::Constant), 1.0);
-    let edge = layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
+    let edge =
+        layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
     world.place(long, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
     let throttle = Throttle::Step(72);
     let request = Request::Drive { address: 3_078, steps: Steps::All, throttle, forward: true };

@@ -47,7 +47,8 @@ impl Feedback {
     pub fn detections(self, reply: &Reply) -> impl Iterator<Item = (u16, bool)> {
         let (first, count, bits) = match (self, reply) {
             (Self::RBus, Reply::Feedback { group, inputs }) => {
-                let bits = inputs.iter().rev().fold(0_u128, |bits, byte| bits << MODULE_INPUTS | u128::from(*byte));
+                let bits =
+                    inputs.iter().rev().fold(0_u128, |bits, byte| bits << MODULE_INPUTS | u128::from(*byte));
                 (u16::from(*group) * GROUP_INPUTS + 1, GROUP_INPUTS, bits)
             }
             (Self::Can, Reply::Can(CanDetection { address, port, kind: CAN_OCCUPANCY, value, .. })) => {

@@ -56,8 +56,10 @@ impl Outstanding {
 
     /// Whether it may be given up: what older stations do not know, and what is asked again anyway.
     pub(super) const fn may_be_given_up(&self) -> bool {
-        let is_extra =
-            matches!(self.awaited, Awaited::Hardware | Awaited::LockCode | Awaited::Feedback(_) | Awaited::Status);
+        let is_extra = matches!(
+            self.awaited,
+            Awaited::Hardware | Awaited::LockCode | Awaited::Feedback(_) | Awaited::Status
+        );
         is_extra || self.command.is_some() && !self.is_urgent()
     }
 }
@@ -130,9 +132,8 @@ impl AllOutstanding {
 
     /// Whether something is asked that has to be known before trains are driven.
     pub(super) fn has_question(&self) -> bool {
-        let concerns_one = |awaited| {
-            matches!(awaited, Awaited::Locomotive(_) | Awaited::Driven(..) | Awaited::Turnout(..))
-        };
+        let concerns_one =
+            |awaited| matches!(awaited, Awaited::Locomotive(_) | Awaited::Driven(..) | Awaited::Turnout(..));
         self.0.iter().any(|outstanding| !concerns_one(outstanding.awaited))
     }
 

@@ -150,7 +150,9 @@ impl Reply {
         match self {
             Self::Power { on } => Some(*on),
             Self::ShortCircuit | Self::Stopped => Some(false),
-            Self::Status(state) | Self::SystemState(SystemState { central: state, .. }) => Some(state.is_powered()),
+            Self::Status(state) | Self::SystemState(SystemState { central: state, .. }) => {
+                Some(state.is_powered())
+            }
             _ => None,
         }
     }

@@ -101,7 +101,9 @@ impl Throttle {
             _ if coarse == 0 => Self::Stop,
             _ if coarse == 1 => Self::EmergencyStop,
             (Steps::Fourteen, _) => Self::Step(coarse - 1),
-            (Steps::TwentyEight, code) => Self::Step(2 * (coarse - 1) - if code & UPPER == 0 { 1 } else { 0 }),
+            (Steps::TwentyEight, code) => {
+                Self::Step(2 * (coarse - 1) - if code & UPPER == 0 { 1 } else { 0 })
+            }
         }
     }
 
@@ -129,7 +131,8 @@ mod tests {
     #[test]
     fn every_code_is_a_throttle_and_back() {
         for steps in EVERY {
-            let all = (1..=steps.highest()).map(Throttle::Step).chain([Throttle::Stop, Throttle::EmergencyStop]);
+            let all =
+                (1..=steps.highest()).map(Throttle::Step).chain([Throttle::Stop, Throttle::EmergencyStop]);
             for throttle in all {
                 assert_eq!(Throttle::of_code(throttle.code(steps), steps), throttle, "{steps:?}");
             }
@@ -152,8 +155,11 @@ mod tests {
 
     #[test]
     fn a_speed_is_recognised_in_the_steps_that_a_station_keeps() {
-        let is_like = |one, steps, other, others| Throttle::Step(one).is_like(steps, Throttle::Step(other), others);
-        assert!(is_like(72, Steps::All, 8, Steps::Fourteen) && is_like(72, Steps::All, 16, Steps::TwentyEight));
+        let is_like =
+            |one, steps, other, others| Throttle::Step(one).is_like(steps, Throttle::Step(other), others);
+        assert!(
+            is_like(72, Steps::All, 8, Steps::Fourteen) && is_like(72, Steps::All, 16, Steps::TwentyEight)
+        );
         assert!(!is_like(72, Steps::All, 9, Steps::Fourteen) && !is_like(72, Steps::All, 73, Steps::All));
         assert!(!Throttle::Stop.is_like(Steps::All, Throttle::Step(1), Steps::Fourteen));
         assert!(Throttle::Stop.is_like(Steps::All, Throttle::EmergencyStop, Steps::All));

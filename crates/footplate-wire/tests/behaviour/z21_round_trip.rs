@@ -27,7 +27,8 @@ fn addresses() -> impl Strategy<Value = u16> {
 }
 
 fn requests() -> impl Strategy<Value = Request> {
-    let switches = prop_oneof![Just(FunctionSwitch::Off), Just(FunctionSwitch::On), Just(FunctionSwitch::Toggle)];
+    let switches =
+        prop_oneof![Just(FunctionSwitch::Off), Just(FunctionSwitch::On), Just(FunctionSwitch::Toggle)];
     prop_oneof![
         Just(Request::SerialNumber),
         Just(Request::Hardware),
@@ -74,25 +75,27 @@ fn replies() -> impl Strategy<Value = Reply> {
             Reply::Locomotive(LocomotiveState { address, busy, steps, throttle, forward, functions })
         },
     );
-    let system = (any::<[i16; 4]>(), any::<[u16; 2]>(), any::<[u8; 3]>()).prop_map(|(signed, volts, bytes)| {
-        let [main_ma, programming_ma, filtered_ma, temperature_c] = signed;
-        let ([supply_mv, track_mv], [central, central_more, capabilities]) = (volts, bytes);
-        let central = CentralState(central);
-        Reply::SystemState(SystemState {
-            main_ma,
-            programming_ma,
-            filtered_ma,
-            temperature_c,
-            supply_mv,
-            track_mv,
-            central,
-            central_more,
-            capabilities,
-        })
-    });
-    let can = (any::<[u16; 4]>(), any::<[u8; 2]>()).prop_map(|([network, address, value, more], [port, kind])| {
-        Reply::Can(CanDetection { network, address, port, kind, value, more })
-    });
+    let system =
+        (any::<[i16; 4]>(), any::<[u16; 2]>(), any::<[u8; 3]>()).prop_map(|(signed, volts, bytes)| {
+            let [main_ma, programming_ma, filtered_ma, temperature_c] = signed;
+            let ([supply_mv, track_mv], [central, central_more, capabilities]) = (volts, bytes);
+            let central = CentralState(central);
+            Reply::SystemState(SystemState {
+                main_ma,
+                programming_ma,
+                filtered_ma,
+                temperature_c,
+                supply_mv,
+                track_mv,
+                central,
+                central_more,
+                capabilities,
+            })
+        });
+    let can =
+        (any::<[u16; 4]>(), any::<[u8; 2]>()).prop_map(|([network, address, value, more], [port, kind])| {
+            Reply::Can(CanDetection { network, address, port, kind, value, more })
+        });
     let rail_com = (any::<[u16; 2]>(), any::<u32>(), any::<[u8; 3]>()).prop_map(
         |([address, errors], received, [options, speed, quality])| {
             Reply::RailCom(RailCom { address, received, errors, options, speed, quality })

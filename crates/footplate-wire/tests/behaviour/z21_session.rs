@@ -1,214 +1,19 @@
 //! The session with a Z21: its order, its pace, and what it does when datagrams are lost, come twice or overtake one another.
 
-use std::collections::BTreeMap;
-
-use footplate_core::{
-    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, EventKind, SensorId, SpeedStep, TrainId, TurnoutId};
 use footplate_wire::z21::{
-    Broadcasts, CanDetection, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection, LocomotiveState,
-    Reply, Request, Settings, Steps, Throttle, TurnoutPosition,
+    Broadcasts, CanDetection, Feedback, Lock, LocoNetDetection, Reply, Request, Settings, Steps, Throttle,
+    TurnoutPosition,
 };
-use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+use footplate_wire::{CommandError, LinkNotice, Session};
+
+use crate::z21_desk::{Desk, ms, state};
 
 const T24: TrainId = TrainId(24);
 const T58: TrainId = TrainId(58);
 
-fn ms(ms: i64) -> Timestamp {
-    Timestamp::ZERO + TimeSpan::from_ms(ms)
-}
-
 fn speed(train: TrainId, step: u8) -> Command {
     Command::Speed { train, step: SpeedStep::new(step).unwrap() }
-}
-
-/// As the station says how a locomotive is driven.
-fn state(address: u16, throttle: Throttle, forward: bool) -> LocomotiveState {
-    LocomotiveState { address, busy: false, steps: Steps::All, throttle, forward, functions: 0 }
-}
-
-/// From a request to the answer.
-const ANSWER: TimeSpan = TimeSpan::from_ms(3);
-
-/// A station that answers what it is asked, and tells by itself only what a test makes it tell.
-struct Station {
-    locomotives: BTreeMap<u16, LocomotiveState>,
-    turnouts: BTreeMap<u16, bool>,
-    inputs: [u8; 10],
-    told: Broadcasts,
-    /// What it can tell.
-    tells: Broadcasts,
-    power: bool,
-    lock: Lock,
-    /// Whether it answers at all, and which datagrams, by their count, are lost on their way to it.
-    answers: bool,
-    loses: fn(usize) -> bool,
-    count: usize,
-}
-
-impl Station {
-    fn answer(&mut self, datagram: &[u8]) -> Vec<Vec<u8>> {
-        self.count += 1;
-        if !self.answers || (self.loses)(self.count) {
-            return Vec::new();
-        }
-        let replies = Datasets::of(datagram).filter_map(|dataset| self.obey(Request::read(&dataset)?));
-        replies.map(bytes).collect()
-    }
-
-    fn obey(&mut self, request: Request) -> Option<Reply> {
-        Some(match request {
-            Request::SerialNumber => Reply::SerialNumber(82_850),
-            Request::Hardware => {
-                Reply::Hardware { kind: 0x203, firmware: Firmware { major: 1, minor: 0x42 } }
-            }
-            Request::LockCode => Reply::LockCode(self.lock),
-            Request::SetBroadcasts(wanted) => {
-                self.told = Broadcasts(wanted.0 & self.tells.0);
-                return None;
-            }
-            Request::Broadcasts => Reply::Broadcasts(self.told),
-            Request::Status => Reply::Status(CentralState(if self.power { 0 } else { 2 })),
-            Request::Power { on } => {
-                self.power = on;
-                Reply::Power { on }
-            }
-            Request::StopAll => Reply::Stopped,
-            Request::Feedback { group } => Reply::Feedback { group, inputs: self.inputs },
-            Request::Locomotive { address } => Reply::Locomotive(self.locomotive(address)),
-            Request::Drive { address, throttle, forward, .. } => {
-                self.locomotives.insert(address, state(address, throttle, forward));
-                return None;
-            }
-            Request::SetTurnout { address, second, activate: true, .. } => {
-                self.turnouts.insert(address, second);
-                return None;
-            }
-            Request::Turnout { address } => {
-                let second = *self.turnouts.get(&address)?;
-                Reply::Turnout { address, position: TurnoutPosition::Output { second } }
-            }
-            _ => return None,
-        })
-    }
-
-    fn locomotive(&self, address: u16) -> LocomotiveState {
-        self.locomotives.get(&address).copied().unwrap_or_else(|| state(address, Throttle::Stop, true))
-    }
-}
-
-fn bytes(reply: Reply) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    reply.write(&mut bytes);
-    bytes
-}
-
-/// A session, the station, and the network between them.
-struct Desk {
-    client: Client,
-    now: Timestamp,
-    station: Station,
-    coming: Vec<(Timestamp, Vec<u8>)>,
-    /// What was written, and when (ms).
-    written: Vec<(i64, Request)>,
-    events: Vec<Event>,
-    notices: Vec<LinkNotice>,
-}
-
-impl Desk {
-    fn new(settings: Settings) -> Self {
-        let station = Station {
-            locomotives: BTreeMap::from([(24, state(24, Throttle::Stop, false))]),
-            turnouts: BTreeMap::new(),
-            inputs: [0; 10],
-            told: Broadcasts::NONE,
-            tells: Broadcasts(u32::MAX),
-            power: false,
-            lock: Lock::None,
-            answers: true,
-            loses: |_| false,
-            count: 0,
-        };
-        let client = Client::new(ms(0), settings);
-        let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { client, now: ms(0), station, coming, written, events, notices }
-    }
-
-    fn opened() -> Self {
-        let mut desk = Self::new(Settings::default());
-        desk.run_until(ms(1_000));
-        assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers), "{:?}", desk.written);
-        desk.written.clear();
-        desk.notices.clear();
-        desk
-    }
-
-    fn run_until(&mut self, end: Timestamp) {
-        loop {
-            while let Some(output) = self.client.poll_output() {
-                match output {
-                    Transmit::Message(datagram) => {
-                        let requests =
-                            Datasets::of(&datagram).map(|dataset| Request::read(&dataset).expect("a request"));
-                        let at = (self.now - ms(0)).as_ns() / 1_000_000;
-                        self.written.extend(requests.map(|request| (at, request)));
-                        let due = self.now + ANSWER;
-                        self.coming.extend(self.station.answer(&datagram).into_iter().map(|bytes| (due, bytes)));
-                    }
-                    Transmit::Event(event) => self.events.push(event),
-                    Transmit::Notice(notice) => self.notices.push(notice),
-                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
-                }
-            }
-            self.coming.sort_by_key(|(at, _)| *at);
-            let next = [self.coming.first().map(|(at, _)| *at), self.client.next_timeout()];
-            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
-            self.now = self.now.max(at);
-            if self.coming.first().is_some_and(|(due, _)| *due <= at) {
-                let (_, datagram) = self.coming.remove(0);
-                self.client.handle_bytes(self.now, &datagram);
-            } else {
-                self.client.handle_timeout(at);
-                let next = self.client.next_timeout();
-                assert!(next.is_none_or(|next| next > at), "a session that is never done");
-            }
-        }
-        self.now = end;
-    }
-
-    fn run_for(&mut self, span_ms: i64) {
-        self.run_until(self.now + TimeSpan::from_ms(span_ms));
-    }
-
-    fn command(&mut self, command: Command) {
-        self.client.handle_command(self.now, command).unwrap();
-    }
-
-    fn hear(&mut self, reply: Reply) {
-        self.client.handle_bytes(self.now, &bytes(reply));
-    }
-
-    /// What was written but for the questions that are asked all the time.
-    fn commands(&self) -> Vec<Request> {
-        let is_command = |request: &Request| {
-            matches!(
-                request,
-                Request::Drive { .. } | Request::SetTurnout { .. } | Request::Power { .. } | Request::StopAll
-            )
-        };
-        self.written.iter().map(|(_, request)| *request).filter(is_command).collect()
-    }
-
-    fn reports(&self) -> Vec<(i64, u16, i64)> {
-        let report = |event: &Event| match event.kind {
-            EventKind::Sensor(Report { sensor, poll_interval }) => {
-                let at = (event.time - ms(0)).as_ns() / 1_000_000;
-                Some((at, sensor.0, poll_interval.unwrap().as_ns() / 1_000_000))
-            }
-            _ => None,
-        };
-        self.events.iter().filter_map(report).collect()
-    }
 }
 
 fn drive(address: u16, throttle: Throttle, forward: bool) -> Request {
@@ -280,8 +85,11 @@ fn the_direction_is_read_back_and_then_absolute() {
         desk.command(command);
         desk.run_for(100);
     }
-    let expected =
-        [drive(24, Throttle::Stop, false), drive(24, Throttle::Stop, true), drive(24, Throttle::Step(72), true)];
+    let expected = [
+        drive(24, Throttle::Stop, false),
+        drive(24, Throttle::Stop, true),
+        drive(24, Throttle::Step(72), true),
+    ];
     assert_eq!(desk.commands(), expected);
 }
 
@@ -293,7 +101,10 @@ fn each_number_of_steps_is_driven_in() {
         desk.command(speed(T58, 8));
         desk.run_for(1_000);
         let throttle = Throttle::Step(step);
-        assert_eq!(desk.commands().last(), Some(&Request::Drive { address: 58, steps, throttle, forward: true }));
+        assert_eq!(
+            desk.commands().last(),
+            Some(&Request::Drive { address: 58, steps, throttle, forward: true })
+        );
     }
 }
 
@@ -370,7 +181,11 @@ fn an_old_datagram_is_no_other_throttle() {
     desk.station.power = false;
     desk.hear(Reply::Power { on: false });
     desk.run_for(500);
-    assert!(desk.notices.contains(&LinkNotice::OtherThrottle { train: T24, reversed: true }), "{:?}", desk.notices);
+    assert!(
+        desk.notices.contains(&LinkNotice::OtherThrottle { train: T24, reversed: true }),
+        "{:?}",
+        desk.notices
+    );
     assert!(desk.notices.contains(&LinkNotice::PowerLost));
 }
 
@@ -437,11 +252,13 @@ fn detectors_on_loconet_are_heard_by_their_address() {
 fn a_detector_on_the_can_bus_that_reports_by_itself_has_the_span_of_its_delay() {
     let mut desk = Desk::new(Settings { feedback: Feedback::Can, ..Settings::default() });
     desk.run_until(ms(1_000));
-    let occupied = |value| Reply::Can(CanDetection { network: 0xd001, address: 1, port: 3, kind: 1, value, more: 0 });
+    let occupied =
+        |value| Reply::Can(CanDetection { network: 0xd001, address: 1, port: 3, kind: 1, value, more: 0 });
     desk.hear(occupied(0x0100));
     desk.run_for(300);
     // The detectors are asked every 400 ms; this is far from both times.
-    let asked = desk.written.iter().filter(|(_, request)| *request == Request::ALL_CAN).map(|(at, _)| *at).max();
+    let asked =
+        desk.written.iter().filter(|(_, request)| *request == Request::ALL_CAN).map(|(at, _)| *at).max();
     desk.run_until(ms(asked.unwrap() + 250));
     desk.hear(occupied(0x1100));
     desk.run_for(10);
@@ -529,11 +346,8 @@ fn the_end_is_confirmed_by_the_station() {
     desk.written.clear();
     desk.client.close(desk.now);
     desk.run_for(500);
-    let expected = [
-        drive(24, Throttle::Stop, false),
-        drive(58, Throttle::Stop, true),
-        Request::Power { on: false },
-    ];
+    let expected =
+        [drive(24, Throttle::Stop, false), drive(58, Throttle::Stop, true), Request::Power { on: false }];
     assert_eq!(desk.commands(), expected);
     assert_eq!(desk.written.last().map(|(_, request)| *request), Some(Request::LogOff));
     let closing = desk.client.closing();

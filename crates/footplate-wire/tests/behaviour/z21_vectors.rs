@@ -95,9 +95,12 @@ fn what_makes_no_sense_is_refused_and_what_is_not_used_is_skipped() {
 fn a_datagram_is_read_up_to_a_length_that_cannot_be_true() {
     let two = bytes("07 00 40 00 61 01 60 08 00 10 00 a2 43 01 00");
     assert_eq!(Datasets::of(&two).count(), 2);
-    for (text, whole, unread) in
-        [("07 00 40 00 61 01 60 03 00 10 00", 1, 4), ("08 00 10 00 a2", 0, 5), ("07", 0, 1), ("ff ff 40 00", 0, 4)]
-    {
+    for (text, whole, unread) in [
+        ("07 00 40 00 61 01 60 03 00 10 00", 1, 4),
+        ("08 00 10 00 a2", 0, 5),
+        ("07", 0, 1),
+        ("ff ff 40 00", 0, 4),
+    ] {
         let bytes = bytes(text);
         let mut datasets = Datasets::of(&bytes);
         assert_eq!((datasets.by_ref().count(), datasets.unread()), (whole, unread), "{text}");
@@ -106,7 +109,8 @@ fn a_datagram_is_read_up_to_a_length_that_cannot_be_true() {
 
 #[test]
 fn the_last_will_stops_every_locomotive_and_takes_the_power() {
-    let requests: Vec<Request> = Datasets::of(&LAST_WILL).filter_map(|dataset| Request::read(&dataset)).collect();
+    let requests: Vec<Request> =
+        Datasets::of(&LAST_WILL).filter_map(|dataset| Request::read(&dataset)).collect();
     assert_eq!(requests, [Request::StopAll, Request::Power { on: false }]);
     assert!(Datasets::of(&LAST_WILL).all(|dataset| dataset.is_sound()));
 }

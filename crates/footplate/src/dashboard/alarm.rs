@@ -115,9 +115,7 @@ impl Alarm {
             LinkNotice::Restarted
             | LinkNotice::PowerLost
             | LinkNotice::Unconfirmed { .. }
-            | LinkNotice::Locked => {
-                (Grade::Danger, "line-says", None, vec![notice.to_string()])
-            }
+            | LinkNotice::Locked => (Grade::Danger, "line-says", None, vec![notice.to_string()]),
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
         };
         Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })

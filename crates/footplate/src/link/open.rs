@@ -3,8 +3,8 @@
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{LivingSwitches, VirtualBoard, VirtualStation, VirtualZ21};
-use footplate_wire::{dcc_ex, z21};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
+use footplate_wire::{dcc_ex, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
 use super::{DatagramLink, Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
@@ -60,7 +60,9 @@ pub(crate) fn station<'l>(
     let SimulatedAddress { seed, trains, .. } = address;
     Ok(match address.station {
         StationKind::Marklin => VirtualStation::draw(layout, *seed, trains, &switches)?.into(),
-        StationKind::DccEx => VirtualBoard::draw(layout, *seed, trains, &switches, address.quirks.board)?.into(),
+        StationKind::DccEx => {
+            VirtualBoard::draw(layout, *seed, trains, &switches, address.quirks.board)?.into()
+        }
         StationKind::Z21 => VirtualZ21::draw(layout, *seed, trains, &switches, address.quirks.z21)?.into(),
     })
 }

@@ -35,7 +35,9 @@ impl Z21Address {
         let place = place.strip_prefix("//").unwrap_or(place);
         let (host, port) = match place.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
             Some((host, "")) => (host, PORT),
-            Some((host, rest)) => (host, rest.strip_prefix(':').and_then(|port| port.parse().ok()).ok_or_else(wanted)?),
+            Some((host, rest)) => {
+                (host, rest.strip_prefix(':').and_then(|port| port.parse().ok()).ok_or_else(wanted)?)
+            }
             None => match place.rsplit_once(':') {
                 Some((host, port)) => (host, port.parse().map_err(|_| wanted())?),
                 None => (place, PORT),
@@ -53,7 +55,9 @@ impl Z21Address {
             ("steps", "28") => self.settings.steps = Steps::TwentyEight,
             ("steps", "128" | "126") => self.settings.steps = Steps::All,
             ("steps", _) => {
-                return Err(format!("`{value}` is no number of decoder steps: use steps=14, steps=28 or steps=128"));
+                return Err(format!(
+                    "`{value}` is no number of decoder steps: use steps=14, steps=28 or steps=128"
+                ));
             }
             ("feedback", _) => self.settings.feedback = feedback_named(value)?,
             ("first-sensor", _) => self.settings.first_sensor = number(key, value, "17")?,
@@ -61,7 +65,9 @@ impl Z21Address {
             ("straight", "first") => self.settings.second_is_straight = false,
             ("straight", "second") => self.settings.second_is_straight = true,
             ("straight", _) => {
-                return Err(format!("`{value}` is no output of a turnout: use straight=first or straight=second"));
+                return Err(format!(
+                    "`{value}` is no output of a turnout: use straight=first or straight=second"
+                ));
             }
             ("sensor-delay", _) => {
                 let ms: u16 = number(key, value, "60")?;
@@ -87,7 +93,9 @@ fn feedback_named(value: &str) -> Result<Feedback, String> {
         "r-bus" => Ok(Feedback::RBus),
         "can" => Ok(Feedback::Can),
         "loconet" => Ok(Feedback::LocoNet),
-        _ => Err(format!("`{value}` is no kind of feedback: use feedback=r-bus, feedback=can or feedback=loconet")),
+        _ => Err(format!(
+            "`{value}` is no kind of feedback: use feedback=r-bus, feedback=can or feedback=loconet"
+        )),
     }
 }
 

@@ -122,7 +122,8 @@ impl Way {
     }
 
     fn take_first(&mut self) -> Option<(usize, Vec<u8>)> {
-        let first = self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
+        let first =
+            self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
         let at = first.map(|(at, _)| at)?;
         let OnItsWay { client, datagram, .. } = self.datagrams.swap_remove(at);
         Some((client, datagram))

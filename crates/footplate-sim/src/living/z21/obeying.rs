@@ -2,8 +2,8 @@
 
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
-    Broadcasts, CentralState, Dataset, Datasets, Feedback, Firmware, FunctionSwitch, Lock, LocomotiveState, Reply,
-    Request, Steps, SystemState, Throttle, TurnoutPosition,
+    Broadcasts, CentralState, Dataset, Datasets, Feedback, Firmware, FunctionSwitch, Lock, LocomotiveState,
+    Reply, Request, Steps, SystemState, Throttle, TurnoutPosition,
 };
 
 use super::{ANSWER_S, Connected, FORGOTTEN_AFTER, MOST_CLIENTS, MOST_SUBSCRIBED, Slot, VirtualZ21};
@@ -131,7 +131,9 @@ impl VirtualZ21<'_> {
             Request::Turnout { address } => {
                 self.say(id, &Reply::Turnout { address, position: self.position(address) });
             }
-            Request::SetTurnout { address, second, activate, .. } => self.set_turnout(id, address, second, activate),
+            Request::SetTurnout { address, second, activate, .. } => {
+                self.set_turnout(id, address, second, activate)
+            }
             Request::Feedback { group } => {
                 if self.switches.feedback == Feedback::RBus {
                     let inputs = self.group(u16::from(group));
@@ -233,9 +235,10 @@ impl VirtualZ21<'_> {
 
     fn state_of(&self, address: u16) -> LocomotiveState {
         let found = self.slots.iter().find(|slot| slot.address == address);
-        let (steps, throttle, forward, functions) = found.map_or((Steps::All, Throttle::Stop, true, 0), |slot| {
-            (slot.steps, slot.throttle, slot.forward, slot.functions)
-        });
+        let (steps, throttle, forward, functions) = found
+            .map_or((Steps::All, Throttle::Stop, true, 0), |slot| {
+                (slot.steps, slot.throttle, slot.forward, slot.functions)
+            });
         LocomotiveState { address, busy: false, steps, throttle, forward, functions }
     }
 

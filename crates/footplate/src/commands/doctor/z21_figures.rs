@@ -144,7 +144,10 @@ impl Z21Figures {
         let number = self.serial_number.unwrap_or_default();
         match self.hardware {
             Some((kind, firmware)) => {
-                writeln!(output, "station       hardware {kind:#06x}, firmware {firmware}, serial number {number}")?;
+                writeln!(
+                    output,
+                    "station       hardware {kind:#06x}, firmware {firmware}, serial number {number}"
+                )?;
             }
             None => writeln!(output, "station       serial number {number}, does not say what it is")?,
         }

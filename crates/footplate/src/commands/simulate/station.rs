@@ -5,8 +5,8 @@ use std::sync::mpsc::Receiver;
 
 use anyhow::{Context, anyhow, bail};
 use footplate_core::track::Layout;
-use footplate_wire::z21::Feedback;
 use footplate_sim::LawFamily;
+use footplate_wire::z21::Feedback;
 
 use crate::link::{
     Incoming, Quirks, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_on,
@@ -68,7 +68,9 @@ pub(super) fn serve(
     match (wanted.protocol, place) {
         (StationKind::Z21, Place::Udp(_)) => {}
         (StationKind::Z21, _) => bail!("a Z21 is spoken to over UDP: write --station udp:127.0.0.1:0"),
-        (_, Place::Udp(_)) => bail!("only a Z21 is spoken to over UDP: write --protocol z21, or --station tcp:127.0.0.1:0"),
+        (_, Place::Udp(_)) => {
+            bail!("only a Z21 is spoken to over UDP: write --protocol z21, or --station tcp:127.0.0.1:0")
+        }
         _ => {}
     }
     let station = station(&address, layout)?;
