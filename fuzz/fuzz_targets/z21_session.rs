@@ -4,7 +4,8 @@
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::z21::{
-    Broadcasts, CentralState, Client, Datasets, Feedback, LocomotiveState, Reply, Request, Settings, Steps, Throttle,
+    Broadcasts, CentralState, Client, Datasets, Feedback, LocomotiveState, Reply, Request, Settings, Steps,
+    Throttle,
 };
 use footplate_wire::{Session, Transmit};
 use libfuzzer_sys::fuzz_target;

@@ -1,5 +1,6 @@
 //! Speaks with the station: what stops first, one command a train at a time, and everything confirmed by its own words.
 
+mod asking;
 mod closing;
 mod hearing;
 
@@ -9,7 +10,6 @@ use alloc::vec::Vec;
 use footplate_core::{Command, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
-use super::detectors::Feedback;
 use super::opening::Opening;
 use super::outstanding::{AllOutstanding, Awaited, MOST_TRIES, Outstanding};
 use super::request::{LOCOMOTIVES, Request};
@@ -26,14 +26,6 @@ use crate::silence::{Checks, Silence};
 
 /// Many quick datagrams from a computer are lost now and then; some milliseconds between them are asked for.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(20), 3, TimeSpan::from_ms(5));
-
-/// How often something is asked for: what changed in a datagram that was lost is known after that. It also keeps the station from
-/// forgetting this client, which it does after a minute.
-const POLL_EVERY: TimeSpan = TimeSpan::from_ms(200);
-/// One question in so many is for a locomotive, so that all stay subscribed.
-const POLLS_A_LOCOMOTIVE: u32 = 8;
-/// One in so many is for what this client is told: a station that was restarted has forgotten it.
-const POLLS_A_SUBSCRIPTION: u32 = 25;
 
 /// The detectors of the CAN bus answer one after the other within this time after they were asked (chosen).
 const DETECTORS_WITHIN: TimeSpan = TimeSpan::from_ms(50);
@@ -241,53 +233,6 @@ impl Client {
             return Some(self.outgoing(now, command));
         }
         (now >= self.poll_due()).then(|| self.poll(now))
-    }
-
-    /// The next question of those that are asked all the time.
-    fn poll(&mut self, now: Timestamp) -> Outgoing {
-        (self.polled, self.polls) = (now, self.polls.wrapping_add(1));
-        let groups = self.settings.groups();
-        let nth = self.polls / POLLS_A_LOCOMOTIVE;
-        let driven = self.locomotives.iter().filter(|locomotive| locomotive.is_driven).count();
-        let turn = (nth as usize).checked_rem(driven).unwrap_or(0);
-        let locomotive = self.locomotives.iter().filter(|locomotive| locomotive.is_driven).nth(turn);
-        let request = if self.polls.is_multiple_of(POLLS_A_SUBSCRIPTION) {
-            Request::Broadcasts
-        } else if let Some(locomotive) = locomotive.filter(|locomotive| {
-            self.polls.is_multiple_of(POLLS_A_LOCOMOTIVE)
-                && self.outstanding.blocks(locomotive.train, false).is_none()
-        }) {
-            return query(locomotive.train);
-        } else {
-            match self.settings.feedback {
-                Feedback::RBus => {
-                    let group = self.polls % (u32::from(*groups.end()) + 1);
-                    Request::Feedback { group: u8::try_from(group).unwrap_or_default() }
-                }
-                Feedback::Can if self.polls.is_multiple_of(2) => Request::ALL_CAN,
-                Feedback::Can | Feedback::LocoNet => Request::Status,
-            }
-        };
-        Outgoing::of(request, self.awaited_of(request))
-    }
-
-    fn poll_due(&self) -> Timestamp {
-        let groups = i64::from(*self.settings.groups().end()) + 1;
-        self.polled + TimeSpan::from_ns(POLL_EVERY.as_ns() / groups)
-    }
-
-    /// What answers a question.
-    const fn awaited_of(&self, request: Request) -> Option<Awaited> {
-        Some(match request {
-            Request::SerialNumber => Awaited::SerialNumber,
-            Request::Hardware => Awaited::Hardware,
-            Request::LockCode => Awaited::LockCode,
-            Request::SetBroadcasts(_) | Request::Broadcasts => Awaited::Broadcasts(self.wanted),
-            Request::Status => Awaited::Status,
-            Request::Feedback { group } => Awaited::Feedback(group),
-            Request::Power { on } => Awaited::Power(on),
-            _ => return None,
-        })
     }
 
     /// A request that was not answered in time, unless something newer waits or it was repeated often enough.

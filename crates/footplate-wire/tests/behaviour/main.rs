@@ -19,6 +19,7 @@ mod marklin_serial_recovery;
 mod marklin_serial_round_trip;
 mod marklin_serial_transcript;
 mod marklin_serial_vectors;
+mod z21_desk;
 mod z21_round_trip;
 mod z21_session;
 mod z21_vectors;
