@@ -1,7 +1,7 @@
 //! The virtual Z21 answers as such stations were seen to, to each of its clients, and its world does what it is asked.
 
 use footplate_core::track::{Layout, Leg, Position};
-use footplate_core::{Length, Ratio, TimeSpan, TurnoutId};
+use footplate_core::{Length, Ratio, TimeSpan, TrainId, TurnoutId};
 use footplate_sim::{End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualZ21, Z21Switches};
 use footplate_wire::z21::{
     Broadcasts, Datasets, Feedback, FunctionSwitch, Reply, Request, Steps, Throttle, TurnoutPosition,
@@ -182,6 +182,23 @@ fn directions_are_absolute_and_every_number_of_steps_is_driven() {
             assert!(odometer(&station) > 100.0, "{steps:?}: {}", odometer(&station));
         }
     }
+}
+
+#[test]
+fn a_train_with_a_long_address_is_driven() {
+    let layout = two_loops();
+    let long = TrainId(3_078);
+    let mut station = station(&layout, End::Nose, Z21Switches::default());
+    let world = station.world_mut();
+    world.lift(TRAIN);
+    world.add(long, Train::draw(24, LawFamily::Constant), 1.0);
+    let edge = layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
+    world.place(long, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
+    let throttle = Throttle::Step(72);
+    let request = Request::Drive { address: 3_078, steps: Steps::All, throttle, forward: true };
+    ask(&mut station, &[Request::Power { on: true }, request]);
+    wait(&mut station, 3_000);
+    assert!(station.world().truth().train(long).unwrap().odometer.as_mm() > 100.0);
 }
 
 #[test]

@@ -35,6 +35,9 @@ const POLLS_A_LOCOMOTIVE: u32 = 8;
 /// One in so many is for what this client is told: a station that was restarted has forgotten it.
 const POLLS_A_SUBSCRIPTION: u32 = 25;
 
+/// The detectors of the CAN bus answer one after the other within this time after they were asked (chosen).
+const DETECTORS_WITHIN: TimeSpan = TimeSpan::from_ms(50);
+
 /// What a person should check.
 const CHECKS: Checks = Checks {
     nothing_heard: "check its power, the network cable, that its address is right (a Z21 has 192.168.0.111 unless changed) and \
@@ -75,6 +78,8 @@ pub struct Client {
     serial_number: u32,
     polls: u32,
     polled: Timestamp,
+    /// When the detectors of the CAN bus were asked last.
+    asked_detectors: Option<Timestamp>,
     /// When the last message came, and whether none was heard before the states were asked for again.
     heard: Timestamp,
     is_blind: bool,
@@ -130,6 +135,7 @@ impl Client {
             serial_number: 0,
             polls: 0,
             polled: now,
+            asked_detectors: None,
             heard: now,
             is_blind: false,
             last_entry: now,
@@ -353,6 +359,9 @@ impl Client {
     fn send(&mut self, now: Timestamp, outgoing: Outgoing) {
         let Outgoing { request, awaited, command, tries } = outgoing;
         self.pacing.sent(now);
+        if request == Request::ALL_CAN {
+            self.asked_detectors = Some(now);
+        }
         let mut bytes = Vec::new();
         request.write(&mut bytes);
         if let Some(question) = question_with(request) {

@@ -6,7 +6,7 @@ use footplate_core::{
     Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 use footplate_wire::z21::{
-    Broadcasts, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection, LocomotiveState,
+    Broadcasts, CanDetection, CentralState, Client, Datasets, Feedback, Firmware, Lock, LocoNetDetection, LocomotiveState,
     Reply, Request, Settings, Steps, Throttle, TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
@@ -431,6 +431,21 @@ fn detectors_on_loconet_are_heard_by_their_address() {
     desk.hear(Reply::LocoNet(LocoNetDetection { kind: 1, address: 3, info: 1 }));
     desk.run_for(10);
     assert_eq!(desk.reports(), [(999, 3, 39)]);
+}
+
+#[test]
+fn a_detector_on_the_can_bus_that_reports_by_itself_has_the_span_of_its_delay() {
+    let mut desk = Desk::new(Settings { feedback: Feedback::Can, ..Settings::default() });
+    desk.run_until(ms(1_000));
+    let occupied = |value| Reply::Can(CanDetection { network: 0xd001, address: 1, port: 3, kind: 1, value, more: 0 });
+    desk.hear(occupied(0x0100));
+    desk.run_for(300);
+    // The detectors are asked every 400 ms; this is far from both times.
+    let asked = desk.written.iter().filter(|(_, request)| *request == Request::ALL_CAN).map(|(at, _)| *at).max();
+    desk.run_until(ms(asked.unwrap() + 250));
+    desk.hear(occupied(0x1100));
+    desk.run_for(10);
+    let [(_, 3, 39)] = desk.reports()[..] else { panic!("{:?}", desk.reports()) };
 }
 
 #[test]

@@ -1,4 +1,4 @@
-"""z21aio, a client that Footplate shares no line with, drives a train behind the virtual Z21 while the program's own client is there, too.
+"""z21aio, a client that Footplate shares no line with, drives a train behind the virtual Z21.
 
 Needs FOOTPLATE, the program.
 """
@@ -83,12 +83,12 @@ async def drive(port):
         await far.drive(10.0)
         await until("a long address", lambda: states[-1].address == 3078)
 
+        turnouts = []
         turnout = await Turnout.control(station, 6)
-        for position in (TurnoutPosition.P0, TurnoutPosition.P1):
-            await turnout.switch(position, queue_mode=False)
-            assert (await turnout.get_state()).position == position
-        await turnout.switch(TurnoutPosition.P0)
-        assert (await turnout.get_state()).position == TurnoutPosition.P0
+        turnout.subscribe_state(turnouts.append)
+        for position, queued in ((TurnoutPosition.P0, False), (TurnoutPosition.P1, False), (TurnoutPosition.P0, True)):
+            await turnout.switch(position, queue_mode=queued)
+            await until(position.name, lambda: turnouts and turnouts[-1].position == position)
         await station.voltage_off()
         await until("power off", lambda: not power[-1])
         print(f"z21aio drove a train over {len(states)} states, {len(inputs)} reports of sensors and {len(rail_com)} of RailCom")

@@ -14,7 +14,7 @@ use super::super::sensors::Change;
 use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
-use super::Client;
+use super::{Client, DETECTORS_WITHIN};
 use crate::session::LinkNotice;
 
 impl Client {
@@ -66,7 +66,9 @@ impl Client {
             }
             Reply::Feedback { .. } | Reply::Can(_) | Reply::LocoNet(_) => {
                 // What is found when it is asked for may have been so since it was said to be free.
-                let was_missed = answered.is_some() || matches!(reply, Reply::Can(_)) || self.is_blind;
+                let is_answer = matches!(reply, Reply::Can(_))
+                    && self.asked_detectors.is_some_and(|asked| now - asked < DETECTORS_WITHIN);
+                let was_missed = answered.is_some() || is_answer || self.is_blind;
                 let detections: Vec<(u16, bool)> = self.settings.feedback.detections(reply).collect();
                 for (number, is_occupied) in detections {
                     self.hear_of_sensor(now, number, is_occupied, was_missed);
