@@ -199,6 +199,7 @@ step_browser() {
 readonly DCC_EX_PY=DCC-EX-py==1.0.0
 readonly DCC_EX_COMMANDS=@cloudthrottle/dcc-ex--commands@0.12.0
 readonly Z21AIO=z21aio==1.0.7
+readonly PYTHON_CAN="python-can[serial]==4.6.1"
 
 # Two ends of our own that agree prove nothing.
 step_stations() {
@@ -211,12 +212,14 @@ step_stations() {
   [[ -x $at/venv/bin/python ]] || python3 -m venv "$at/venv"
   "$at/venv/bin/python" -c "import dcc_ex_py" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$DCC_EX_PY"
   "$at/venv/bin/python" -c "import z21aio" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$Z21AIO"
+  "$at/venv/bin/python" -c "import can, serial" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$PYTHON_CAN"
   [[ -d $at/node_modules/@cloudthrottle ]] || npm install --silent --no-save --prefix "$at" "$DCC_EX_COMMANDS"
   cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/dcc_ex_client.py
   FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/dcc_ex_commands.mjs
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/z21_client.py
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/z21_server.py
+  FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/can_client.py
 }
 
 refresh_table() {

@@ -416,6 +416,25 @@ fn what_was_not_confirmed_at_the_end_is_named() {
 }
 
 #[test]
+fn the_end_on_a_line_from_which_nothing_is_heard_stops_trains_at_once_and_takes_the_power() {
+    let mut desk = Desk::opened();
+    for command in [speed(T24, 8), speed(T58, 9)] {
+        desk.command(command);
+    }
+    desk.run_for(500);
+    desk.written.clear();
+    desk.ignores = |_| true;
+    let began = (desk.now - ms(0)).as_ns() / 1_000_000;
+    desk.client.handle_reopened(desk.now);
+    desk.client.close(desk.now);
+    desk.run_for(3_000);
+    let first = |message| desk.written.iter().find(|(_, other)| *other == message).expect("it is written").0 - began;
+    assert!(first(drives(24, 0)) <= 20 && first(drives(58, 0)) <= 20, "{:?}", desk.written);
+    assert!(first(Message::Stop(Uid::ALL)) <= 1_510, "{:?}", desk.written);
+    assert!(!desk.client.closing().is_complete());
+}
+
+#[test]
 fn noise_is_called_noise_once() {
     let mut desk = Desk::opened();
     for _ in 0..40 {

@@ -2,6 +2,7 @@
 //! promise, checked against trains whose truth is known.
 
 mod board;
+mod central_station;
 mod calibrate;
 mod calibrations_are_true;
 mod compare;

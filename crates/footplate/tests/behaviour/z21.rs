@@ -14,7 +14,7 @@ const LINK: &str = "sim:track-a?faults=none&trains=24&station=z21&seed=";
 const OTHER_LINK: &str = "sim:track-a?faults=none&trains=24&station=marklin&seed=";
 
 /// The true errors of stops in mm, without their signs, and how many of them were outside of what was promised.
-fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
+pub(crate) fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
     let number =
         |stop: &Value, field: &str| stop[field].as_f64().unwrap_or_else(|| panic!("{field}: {stop}"));
     // A stop whose train was lost on its way has no error.
@@ -28,7 +28,7 @@ fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
 }
 
 /// Their mean and their median.
-fn mean_and_median(mut errors: Vec<f64>) -> [f64; 2] {
+pub(crate) fn mean_and_median(mut errors: Vec<f64>) -> [f64; 2] {
     errors.sort_by(f64::total_cmp);
     [errors.iter().sum::<f64>() / errors.len() as f64, errors[errors.len() / 2]]
 }
