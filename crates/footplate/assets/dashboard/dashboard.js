@@ -4,6 +4,7 @@ import "./halt.js";
 import { Alarmed } from "./alarms.js";
 import { make } from "./dom.js";
 import { calibrationPage } from "./calibration_page.js";
+import { editorPage } from "./editor_page.js";
 import { healthPage } from "./health_page.js";
 import { layoutPage } from "./layout_page.js";
 import { Live } from "./live.js";
@@ -16,6 +17,7 @@ import { say, translate } from "./words.js";
 const AGAIN_MS = 3000;
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
+  editor: editorPage,
 };
 const COLOURS = { connecting: "amber", connected: "green", lost: "red" };
 

@@ -207,4 +207,17 @@ export const ENGLISH = {
   "score-speed": "Speed error: {0} m/s rms, {1} m/s at most.",
   "score-distance": "Distance error at the end: {0} m, with a 99.99 % interval {1} m wide.",
   "score-noticed": "The slip or slide was detected after {0} s.",
+
+  // the editor
+  "editor": "Draw a layout", "draft": "The layout that is being drawn; click a joint to select it", "draft-undo": "Undo", "draft-redo": "Redo", "draft-clear": "Clear",
+  "draft-next": "The next piece goes where the arrow is. Click another open end to go on there.",
+  "draft-joint": "A joint is selected. Put a sensor there, or click an open end to lay the next piece.",
+  "draft-sensor": "Sensor here", "draft-no-sensor-here": "Remove this sensor", "draft-remove": "Remove this piece", "draft-pieces": "Pieces",
+  "library": "Track system", "joined-at": "Turnouts join at", "draft-toe": "the toe", "draft-straight-leg": "the straight leg", "draft-curved-leg": "the curved leg",
+  "hand": "Hand of curves and turnouts", "hand-left": "Left", "hand-right": "Right", "draft-straights": "Straights", "draft-curves": "Curves", "draft-turnouts": "Turnouts",
+  "draft-arc": "{0} mm along the curve", "draft-file": "Layout file", "draft-name": "Name", "draft-unnamed": "my layout", "draft-save": "Save",
+  "draft-saved": "Saved as {0}. Set the sensor and turnout numbers to those of your wiring, then run `footplate layout check {0}`.", "draft-written": "The file",
+  "draft-empty": "Choose a piece to begin.", "draft-no-sensor": "No sensor yet: click a joint between two pieces, then `Sensor here`.",
+  "draft-too-many": "More than {0} sensors: five modules of 16 contacts have no more.", "draft-gap": "Two open ends are {0} mm apart and do not join.",
+  "draft-ends": "Track ends: {0}. Turnouts: {1}. Sensors: {2}.",
 };

@@ -207,4 +207,17 @@ export const GERMAN = {
   "score-speed": "Fehler des Tempos: {0} m/s rms, höchstens {1} m/s.",
   "score-distance": "Fehler der Strecke am Ende: {0} m, bei einem 99,99-%-Intervall von {1} m Breite.",
   "score-noticed": "Gleiten oder Schleudern wurde nach {0} s erkannt.",
+
+  // the editor
+  "editor": "Anlage zeichnen", "draft": "Die Anlage, die gezeichnet wird; auf einen Stoß klicken, um ihn zu wählen", "draft-undo": "Rückgängig", "draft-redo": "Wiederholen", "draft-clear": "Leeren",
+  "draft-next": "Das nächste Stück kommt an den Pfeil. Auf ein anderes offenes Ende klicken, um dort weiterzumachen.",
+  "draft-joint": "Ein Stoß ist gewählt. Dort einen Rückmelder setzen oder auf ein offenes Ende klicken, um weiterzubauen.",
+  "draft-sensor": "Rückmelder hier", "draft-no-sensor-here": "Rückmelder entfernen", "draft-remove": "Stück entfernen", "draft-pieces": "Gleisstücke",
+  "library": "Gleissystem", "joined-at": "Weichen anlegen mit", "draft-toe": "der Spitze", "draft-straight-leg": "dem geraden Strang", "draft-curved-leg": "dem Abzweig",
+  "hand": "Richtung von Bögen und Weichen", "hand-left": "Links", "hand-right": "Rechts", "draft-straights": "Geraden", "draft-curves": "Bögen", "draft-turnouts": "Weichen",
+  "draft-arc": "{0} mm entlang des Bogens", "draft-file": "Anlagendatei", "draft-name": "Name", "draft-unnamed": "meine Anlage", "draft-save": "Speichern",
+  "draft-saved": "Gespeichert als {0}. Nummern der Rückmelder und Weichen an die Verdrahtung anpassen, dann `footplate layout check {0}` aufrufen.", "draft-written": "Die Datei",
+  "draft-empty": "Ein Gleisstück wählen, um zu beginnen.", "draft-no-sensor": "Noch kein Rückmelder: auf einen Stoß zwischen zwei Stücken klicken, dann `Rückmelder hier`.",
+  "draft-too-many": "Mehr als {0} Rückmelder: Fünf Module mit 16 Kontakten haben nicht mehr.", "draft-gap": "Zwei offene Enden sind {0} mm voneinander entfernt und schließen nicht.",
+  "draft-ends": "Gleisenden: {0}. Weichen: {1}. Rückmelder: {2}.",
 };
