@@ -7,6 +7,13 @@ import { bezier, between, lengthOf } from "./plan_curve.js";
 const MOST_BEND = 1.75;
 /** And one that would turn back at an end does not follow the points that it is drawn through (rad). */
 const TURNS_BACK = 2.7;
+/** A plan is to scale if this share of its rails is as long as their points are apart, within 2 %. */
+const STRAIGHT_SHARE = 0.3;
+const TO_SCALE = 1.02;
+/** Two points do not say how a rail runs that bends more than half round between them. */
+const LEAST_STRAIGHT = 0.62;
+/** A rail that bends says so much less of the direction at its ends. */
+const BENDS_LESS = 8;
 /** Rails nearer to each other than this part of the drawing are one line to the eye. */
 const ONE_LINE = 0.004;
 
@@ -23,13 +30,14 @@ export function planOf(layout) {
   return planOfPoints(layout) ?? planWithoutPoints(layout);
 }
 
-/** The drawing by the points of the file; none if they leave out a place, or put two rails onto one line. */
+/** The drawing by the points of the file; none if they leave out a place, put two rails onto one line, or do not say how a rail runs. */
 function planOfPoints(layout) {
   const points = new Map(layout.nodes.filter(({ point }) => point).map(({ id, point }) => [placeOf(id), point]));
   const places = new Set(layout.nodes.map(({ id }) => placeOf(id)));
   const ends = new Set(layout.nodes.filter(({ kind }) => kind === "end").map(({ id }) => placeOf(id)));
   if ([...places].some((place) => !points.has(place) && !ends.has(place))) return undefined;
-  const headings = headingsAt(layout, points);
+  const straight = straightness(layout, points);
+  const headings = headingsAt(layout, points, straight);
   setEnds(layout, points, headings);
   const rails = new Map();
   for (const edge of layout.edges) {
@@ -39,8 +47,10 @@ function planOfPoints(layout) {
     const chord = Math.atan2(to[1] - from[1], to[0] - from[0]);
     const leaves = along(headings, edge.from) ?? chord;
     const arrives = along(headings, edge.to) ?? chord;
+    const apart = Math.hypot(to[0] - from[0], to[1] - from[1]);
+    if (apart > 0 && straight(edge.length_mm, apart) < LEAST_STRAIGHT) return undefined;
     const bends = [leaves, arrives].map((heading) => turn(heading, chord));
-    if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 0 && Math.max(...bends) > TURNS_BACK) return undefined;
+    if (apart > 0 && Math.max(...bends) > TURNS_BACK) return undefined;
     const [first, last] = [leaves, arrives].map((heading, nth) => (bends[nth] > MOST_BEND ? chord : heading));
     rails.set(edge.id >> 1, bezier(from, first, to, last));
   }
@@ -55,8 +65,23 @@ function along(headings, node) {
   return heading === undefined ? undefined : heading + (senseOf(node) < 0 ? Math.PI : 0);
 }
 
-/** Through each place the rails run straight: where its neighbours lie says in which direction, the nearer the more. */
-function headingsAt(layout, points) {
+/**
+ * How straight each edge is, if the points are to scale: 1 if it is as long as its points are apart, less if it bends. Where the
+ * plan is none to scale nothing is known of that.
+ */
+function straightness(layout, points) {
+  const ratios = layout.edges.flatMap(({ from, to, length_mm: mm }) => {
+    const [one, other] = [points.get(placeOf(from)), points.get(placeOf(to))];
+    const apart = one && other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0;
+    return apart > 0 && mm > 0 ? [mm / apart] : [];
+  });
+  const scale = Math.min(...ratios);
+  const isToScale = ratios.filter((ratio) => ratio < scale * TO_SCALE).length > ratios.length * STRAIGHT_SHARE;
+  return (mm, apart) => (isToScale && mm > 0 ? Math.min(scale * apart / mm, 1) : 1);
+}
+
+/** Through each place the rails run straight: where its neighbours lie says in which direction, the nearer and straighter the more. */
+function headingsAt(layout, points, straight) {
   const sums = new Map();
   for (const edge of layout.edges) {
     const [from, to] = [points.get(placeOf(edge.from)), points.get(placeOf(edge.to))];
@@ -65,7 +90,7 @@ function headingsAt(layout, points) {
     const square = dx * dx + dy * dy;
     if (square === 0) continue;
     // The straight leg is the one that goes on.
-    const weight = senseOf(edge.from) * (edge.leg === "curved" ? 0.3 : 1) / square;
+    const weight = senseOf(edge.from) * (edge.leg === "curved" ? 0.3 : 1) * straight(edge.length_mm, Math.sqrt(square)) ** BENDS_LESS / square;
     const sum = sums.get(placeOf(edge.from)) ?? [0, 0];
     sums.set(placeOf(edge.from), [sum[0] + dx * weight, sum[1] + dy * weight]);
   }

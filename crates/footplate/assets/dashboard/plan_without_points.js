@@ -10,6 +10,8 @@ const LEAST_PART = 0.02;
 const GAP_PART = 0.03;
 /** Each straight of the oval, as a part of its way round. */
 const STRAIGHT_PART = 0.32;
+/** A way over a curved leg counts as so much shorter: the main line is the one that goes straight on. */
+const CURVED_COUNTS = 0.8;
 /** Ways that are tried for the main line: enough for any layout whose turnouts a person can draw by hand. */
 const MOST_TRIED = 60_000;
 /** Points of a rail: 25 at least, and 160 for a whole way round. */
@@ -68,7 +70,7 @@ class Drawing {
       if (long > line.long + 1e-6) Object.assign(line, { long, way: [...way] });
       for (const edge of this.#leaving.get(node) ?? []) {
         if (most()) return;
-        const further = long + this.#long(edge);
+        const further = long + this.#long(edge) * (this.#isCurved(edge) ? CURVED_COUNTS : 1);
         if (edge.to === first && further > round.long + 1e-6) Object.assign(round, { long: further, way: [...way, edge] });
         if (seen.has(placeOf(edge.to))) continue;
         seen.add(placeOf(edge.to));
@@ -87,6 +89,9 @@ class Drawing {
     }
     return round.long > line.long / 2 ? round : line;
   }
+
+  /** Whether it leads from or to the curved leg of a turnout. */
+  #isCurved = (edge) => edge.leg === "curved" || this.#edges[edge.id ^ 1]?.leg === "curved";
 
   #arriving = (node) => (this.#leaving.get(node ^ 1) ?? []).length;
 
