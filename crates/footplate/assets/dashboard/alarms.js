@@ -1,10 +1,22 @@
-// Alarms in the reader's language, and the newest of them on every page until somebody has looked.
+// Alarms in the reader's language: one for each cause, on every page, with what can be done, until it is over or somebody ends it.
 
-import { put } from "./dom.js";
+import { make, put } from "./dom.js";
 import { say } from "./words.js";
 
-/** What went otherwise than it should have is no news after so long (s); danger stays until somebody looks. */
+/** What went otherwise than it should have is no news after so long (s); danger stays. */
 const WARNED_S = 30;
+/** A picture so long after an alarm (s) knows of it. */
+const KNOWS_S = 1;
+/** So many alarms stand in the frame, and one on a phone; all are on the page of health. */
+const SHOWN = 3;
+const phone = matchMedia("(max-width: 40rem)");
+
+/** What is over as soon as a train's position is known again: a person can say where it stands. */
+const OF_POSITION = new Set(["lost", "needs-person", "stands-lost", "mishap-lost", "held-as-unknown"]);
+/** Where a person can say where the train stands, though it is believed to be elsewhere. */
+const OF_PLACE = new Set([...OF_POSITION, "stands-elsewhere", "stands-untimely", "mishap-moved"]);
+/** What is over as soon as the train has been commanded to run again. */
+const OF_RUNNING = new Set(["diverged", "diverged-and-others", "track-ends", "held-back"]);
 
 /** Whether the pages have a sentence for an alarm; what they do not know they show as it was said. */
 const sentence = ({ what, blanks, text }) => {
@@ -16,44 +28,96 @@ const sentence = ({ what, blanks, text }) => {
 /** An alarm as a sentence, with the train that it is about. */
 export const told = (alarm) => (alarm.train == null ? sentence(alarm) : `${say("train", alarm.train)}: ${sentence(alarm)}`);
 
-/** Alarms that nothing has ended. */
-export function standing(alarms) {
-  const open = new Map();
-  for (const alarm of alarms) {
-    const about = String(alarm.train);
-    open.delete(about);
-    if (alarm.grade !== "over") open.set(about, alarm);
-  }
-  return [...open.values()];
+const isOfLine = ({ what }) => what.startsWith("line-");
+
+/** That a train is lost has several names; of the line and the contacts each says which it is. */
+function causeOf({ train, what, blanks }) {
+  if (OF_POSITION.has(what)) return `${train} position`;
+  return `${train} ${what} ${train == null ? blanks.join() : ""}`;
 }
 
-/** The newest danger that nobody has seen on the page of health, or else the newest warning, in the frame of all pages. */
-export class Alarmed {
-  #place; #live; #seen = 0; #page;
+/** What asks for a person is not overwritten by what does not. */
+const weight = (alarm) => (alarm ? (alarm.grade === "danger") + (alarm.what === "needs-person") : 0);
+
+/** Whether a picture shows that what an alarm is about is over. */
+function isOver({ what, train, t_s: since }, picture) {
+  const own = picture?.trains.find((one) => one.train === train);
+  if (!own || picture.t_s < since + KNOWS_S) return false;
+  return (OF_POSITION.has(what) && own.at !== null) || (OF_RUNNING.has(what) && own.step > 0 && own.at !== null);
+}
+
+/** The alarms that nothing has ended, the newest of each cause: dangers first. */
+export function standing(alarms, picture) {
+  const open = new Map();
+  for (const alarm of alarms) {
+    if (alarm.grade === "over") {
+      for (const [cause, one] of open) {
+        if (one.train === alarm.train && isOfLine(one) === isOfLine(alarm)) open.delete(cause);
+      }
+      continue;
+    }
+    const cause = causeOf(alarm);
+    if (weight(alarm) < weight(open.get(cause))) continue;
+    open.delete(cause);
+    open.set(cause, alarm);
+  }
+  const news = [...open.values()].filter((alarm) => !isOver(alarm, picture));
+  const now = picture?.t_s ?? 0;
+  const dangers = news.filter(({ grade }) => grade === "danger");
+  return [...dangers.reverse(), ...news.filter(({ grade, t_s }) => grade === "warning" && now - t_s < WARNED_S).reverse()];
+}
+
+/** What can be done about an alarm, as a link. */
+function action({ what, train }) {
+  if (train != null && OF_PLACE.has(what)) return make("a", { class: "button", href: `#/layout/${train}` }, say("act-place", train));
+  if (train != null) return make("a", { class: "button", href: `#/train/${train}` }, say("act-train", train));
+  return make("a", { class: "button", href: "#/health" }, say(what.startsWith("line-") ? "act-line" : "act-health"));
+}
+
+/** The alarms in the frame of all pages. It says `alarms` to whoever listens, with how many dangers there are. */
+export class Alarmed extends EventTarget {
+  /** How many dangers nothing and nobody has ended. */
+  dangers = 0;
+  #place; #live; #ended = new Set(); #drawn = "";
 
   constructor(place, live) {
+    super();
     this.#place = place;
     this.#live = live;
     live.addEventListener("alarm", () => this.#show());
+    for (const [target, what] of [[window, "hashchange"], [phone, "change"]]) {
+      target.addEventListener(what, () => { this.#drawn = ""; this.#show(); });
+    }
     live.addEventListener("picture", () => { if (!place.hidden) this.#show(); });
-    live.addEventListener("anew", () => { this.#seen = 0; this.#show(); });
+    live.addEventListener("anew", () => { this.#ended.clear(); this.#show(); });
   }
 
-  /** Another page is open. */
-  turn(page) {
-    this.#page = page;
-    this.#show();
-  }
+  #key = ({ t_s, what, train }) => `${t_s} ${what} ${train}`;
 
   #show() {
-    if (this.#page === "health") this.#seen = this.#live.alarms.length;
-    const now = this.#live.picture?.t_s ?? 0;
-    const news = standing(this.#live.alarms.slice(this.#seen)).filter(({ grade, t_s }) => grade === "danger" || now - t_s < WARNED_S);
-    const newest = news.findLast(({ grade }) => grade === "danger") ?? news.at(-1);
-    this.#place.hidden = !newest;
-    if (newest) {
-      put(this.#place.firstElementChild, told(newest));
-      this.#place.className = `state ${newest.grade === "danger" ? "red" : "amber"}`;
-    }
+    const open = standing(this.#live.alarms, this.#live.picture).filter((alarm) => !this.#ended.has(this.#key(alarm)));
+    // What stays as it is is not said again to those who listen to the page.
+    const drawn = open.map(this.#key).join();
+    if (drawn === this.#drawn) return;
+    this.#drawn = drawn;
+    this.dangers = open.filter(({ grade }) => grade === "danger").length;
+    this.#place.hidden = open.length === 0;
+    const shown = phone.matches ? 1 : SHOWN;
+    const more = open.length - shown;
+    this.#place.replaceChildren(...open.slice(0, shown).map((alarm) => this.#row(alarm)),
+      ...(more > 0 ? [make("a", { href: "#/health" }, say("more-alarms", more))] : []));
+    this.dispatchEvent(new Event("alarms"));
+  }
+
+  #row(alarm) {
+    const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", told(alarm)) }, say("end-alarm"));
+    end.addEventListener("click", () => {
+      this.#ended.add(this.#key(alarm));
+      this.#show();
+    });
+    const acts = action(alarm);
+    const row = make("p", { class: `alarm ${alarm.grade}` }, make("span"), ...(acts.hash === location.hash ? [] : [acts]), end);
+    put(row.firstElementChild, told(alarm));
+    return row;
   }
 }

@@ -4,6 +4,7 @@ import "./halt.js";
 import { Alarmed } from "./alarms.js";
 import { make } from "./dom.js";
 import { calibrationPage } from "./calibration_page.js";
+import { editorPage } from "./editor_page.js";
 import { healthPage } from "./health_page.js";
 import { layoutPage } from "./layout_page.js";
 import { Live } from "./live.js";
@@ -16,6 +17,7 @@ import { say, translate } from "./words.js";
 const AGAIN_MS = 3000;
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
+  editor: editorPage,
 };
 const COLOURS = { connecting: "amber", connected: "green", lost: "red" };
 
@@ -38,7 +40,6 @@ function turn() {
   page.dataset.page = name;
   translate(page);
   open = PAGES[name](page, live, what);
-  alarmed.turn(name);
   if (live.picture) open.picture?.(live.picture);
   const here = `#/${name === "train" ? `train/${what}` : name}`;
   for (const link of $("pages").querySelectorAll("a")) {
@@ -61,10 +62,12 @@ function links({ trains }) {
   }
 }
 
+/** How the connection stands; a railway with an alarm is not shown as one where all is well. */
 function state() {
   const shown = $("connection");
-  shown.className = `state ${COLOURS[live.state]}`;
-  shown.textContent = say(live.state);
+  const isAlarmed = live.state === "connected" && alarmed.dangers > 0;
+  shown.className = `state ${isAlarmed ? "red" : COLOURS[live.state]}`;
+  shown.textContent = isAlarmed ? say("connected-alarmed", alarmed.dangers) : say(live.state);
 }
 
 async function begin() {
@@ -78,6 +81,7 @@ async function begin() {
   });
   live.addEventListener("picture", ({ detail }) => links(detail));
   live.addEventListener("state", state);
+  alarmed.addEventListener("alarms", state);
   for (const kind of ["picture", "line", "passed", "ended", "alarm", "gap", "anew"]) {
     live.addEventListener(kind, ({ detail }) => open[kind]?.(detail));
   }

@@ -10,16 +10,26 @@ export const ENGLISH = {
   "halt-heard": "power-off sent, and the station has answered since; a 6051 does not report track power: NOT CONFIRMED, check that all trains have stopped",
   "halt-failed": "emergency stop NOT accepted: {0}",
   "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
+  "connected-alarmed": "live, alarms: {0}", "act-place": "Click where train {0} stands", "act-train": "Show train {0}", "act-line": "Check the link",
+  "act-health": "Show the alarms", "end-alarm": "Done", "end-alarm-of": "Done: {0}", "more-alarms": "{0} more alarms",
+  "place-hint": "Click the track where train {0} stands, then confirm in which direction it faces.",
 
   // layout
   "layout": "Layout", "zoom": "Zoom", "zoom-in": "Zoom in", "zoom-out": "Zoom out", "zoom-all": "All",
   "track": "The layout with its trains; click the track to select a place",
   "zone": "zone {0}: at most {1} mm/s", "zones": "Amber track has a speed restriction. {0}",
-  "pick-hint": "Click the track to select a place.", "picked": "{0}: choose a train below", "trains": "Trains",
+  "pick-hint": "Click the track to select a place.", "picked": "Selected: {0}", "trains": "Trains",
   "said": "Log", "order": "Command", "send": "Send", "speed": "speed", "at": "at", "busy": "current order", "rests": "predicted",
   "nowhere": "position unknown", "stop": "Stop", "stop-here": "Stop at {0}", "step": "Speed step", "set": "Set",
   "none": "No train is being driven.", "gap": "{0} log lines were missed", "unread": "cannot be sent: {0}",
   "step-of": "Speed step of train {0}", "at-step": "step {0}", "train": "Train {0}",
+  "here": "What was selected", "taken": "Train {0} is selected. Click where it shall stop, go, or stands.", "take": "Select",
+  "stop-train-here": "Stop train {0} here", "go-train-here": "Send train {0} here", "put-train-here": "Train {0} stands here",
+  "other-direction": "Other direction", "turnouts": "Turnouts", "turnout-is": "Turnout {0} is set to {1}.", "turnout-unknown": "The position of turnout {0} is unknown: which way shall it be set?", "turnout-short": "{0}: {1}",
+  "leg-straight": "straight", "leg-curved": "curved", "leg-unknown": "unknown", "throw-straight": "Set straight", "throw-curved": "Set curved",
+  "legend": "Legend", "legend-train": "train with its 95 % interval", "legend-held": "reserved for it", "legend-rests": "target and predicted stop",
+  "legend-turnout": "turnout: the leg that is set", "legend-unknown": "turnout in an unknown position", "legend-contact": "sensor just passed; failed",
+  "done": "Done.", "scale": "Scale for km/h",
 
   // a train
   "no-such-train": "Train {0} is not part of this session.", "sent": "sent: {0}", "refused": "refused: {0}",
@@ -46,6 +56,10 @@ export const ENGLISH = {
   "stops-made": "Completed orders", "order-given": "order", "rests-at": "stopped at", "error-mm": "error (mm)", "promised": "predicted (mm)",
   "truth-mm": "true error (mm)", "did-stop": "stop", "did-move": "move", "did-arrive": "arrive", "did-speed": "speed",
   "did-go": "go", "did-reverse": "reverse", "did-hold": "hold", "did-follow": "follow",
+  "now-seeks": "Position unknown: it runs at step {0} until a sensor reports it.", "now-lost": "Position unknown: run it past a sensor, or say where it stands.",
+  "now-rests": "Stands at {0}.", "now-waits": "Stands at {0}; current order: {1}.", "now-runs": "Runs at {0}, step {1}.",
+  "now-slows": "Slows down from {0}: stops at {1} ± {2} mm.", "now-does": "Runs at {0}; current order: {1}.", "now-stops": "Runs at {0}; {1}: predicted {2} … {3} mm from the target.", "achieved": "done: {0}",
+  "lock": "Lock to this train", "unlock": "Unlock", "lock-hint": "Locked: only the throttle is shown, and the train stops when this page is hidden or the phone is put away.",
 
   // calibration
   "calibration": "Calibration", "of-train": "Train", "driven-with": "Current model",
@@ -193,4 +207,17 @@ export const ENGLISH = {
   "score-speed": "Speed error: {0} m/s rms, {1} m/s at most.",
   "score-distance": "Distance error at the end: {0} m, with a 99.99 % interval {1} m wide.",
   "score-noticed": "The slip or slide was detected after {0} s.",
+
+  // the editor
+  "editor": "Draw a layout", "draft": "The layout that is being drawn; click a joint to select it", "draft-undo": "Undo", "draft-redo": "Redo", "draft-clear": "Clear",
+  "draft-next": "The next piece goes where the arrow is. Click another open end to go on there.",
+  "draft-joint": "A joint is selected. Put a sensor there, or click an open end to lay the next piece.",
+  "draft-sensor": "Sensor here", "draft-no-sensor-here": "Remove this sensor", "draft-remove": "Remove this piece", "draft-pieces": "Pieces",
+  "library": "Track system", "joined-at": "Turnouts join at", "draft-toe": "the toe", "draft-straight-leg": "the straight leg", "draft-curved-leg": "the curved leg",
+  "hand": "Hand of curves and turnouts", "hand-left": "Left", "hand-right": "Right", "draft-straights": "Straights", "draft-curves": "Curves", "draft-turnouts": "Turnouts",
+  "draft-arc": "{0} mm along the curve", "draft-file": "Layout file", "draft-name": "Name", "draft-unnamed": "my layout", "draft-save": "Save",
+  "draft-saved": "Saved as {0}. Set the sensor and turnout numbers to those of your wiring, then run `footplate layout check {0}`.", "draft-written": "The file",
+  "draft-empty": "Choose a piece to begin.", "draft-no-sensor": "No sensor yet: click a joint between two pieces, then `Sensor here`.",
+  "draft-too-many": "More than {0} sensors: five modules of 16 contacts have no more.", "draft-gap": "Two open ends are {0} mm apart and do not join.",
+  "draft-ends": "Track ends: {0}. Turnouts: {1}. Sensors: {2}.",
 };

@@ -10,16 +10,26 @@ export const GERMAN = {
   "halt-heard": "Abschaltbefehl gesendet, die Zentrale hat seither geantwortet; eine 6051 meldet den Fahrstrom nicht: NICHT BESTÄTIGT, prüfen, ob alle Züge stehen",
   "halt-failed": "Nothalt NICHT angenommen: {0}",
   "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",
+  "connected-alarmed": "live, Alarme: {0}", "act-place": "Anklicken, wo Zug {0} steht", "act-train": "Zug {0} zeigen", "act-line": "Verbindung prüfen",
+  "act-health": "Alarme zeigen", "end-alarm": "Erledigt", "end-alarm-of": "Erledigt: {0}", "more-alarms": "{0} weitere Alarme",
+  "place-hint": "Auf dem Gleis anklicken, wo Zug {0} steht; dann bestätigen, in welche Richtung er zeigt.",
 
   // layout
   "layout": "Anlage", "zoom": "Vergrößerung", "zoom-in": "Größer", "zoom-out": "Kleiner", "zoom-all": "Alles",
   "track": "Die Anlage mit ihren Zügen; auf das Gleis klicken, um eine Stelle zu wählen",
   "zone": "Zone {0}: höchstens {1} mm/s", "zones": "Gelbe Gleise sind Langsamfahrstellen. {0}",
-  "pick-hint": "Auf das Gleis klicken, um eine Stelle zu wählen.", "picked": "{0}: unten einen Zug wählen", "trains": "Züge",
+  "pick-hint": "Auf das Gleis klicken, um eine Stelle zu wählen.", "picked": "Gewählt: {0}", "trains": "Züge",
   "said": "Protokoll", "order": "Befehl", "send": "Senden", "speed": "Tempo", "at": "bei", "busy": "Auftrag", "rests": "vorhergesagt",
   "nowhere": "Position unbekannt", "stop": "Halt", "stop-here": "Halt bei {0}", "step": "Fahrstufe", "set": "Fahren",
   "none": "Es wird kein Zug gefahren.", "gap": "{0} Protokollzeilen fehlen", "unread": "kann nicht gesendet werden: {0}",
   "step-of": "Fahrstufe von Zug {0}", "at-step": "Stufe {0}", "train": "Zug {0}",
+  "here": "Was gewählt ist", "taken": "Zug {0} ist gewählt. Anklicken, wo er halten oder hinfahren soll oder wo er steht.", "take": "Wählen",
+  "stop-train-here": "Zug {0} hält hier", "go-train-here": "Zug {0} hierher fahren", "put-train-here": "Zug {0} steht hier",
+  "other-direction": "Andere Richtung", "turnouts": "Weichen", "turnout-is": "Weiche {0} steht auf {1}.", "turnout-unknown": "Die Stellung von Weiche {0} ist unbekannt: Wie soll sie gestellt werden?", "turnout-short": "{0}: {1}",
+  "leg-straight": "gerade", "leg-curved": "Abzweig", "leg-unknown": "unbekannt", "throw-straight": "Gerade stellen", "throw-curved": "Auf Abzweig stellen",
+  "legend": "Zeichenerklärung", "legend-train": "Zug mit 95-%-Intervall", "legend-held": "für ihn reserviert", "legend-rests": "Ziel und vorhergesagter Halt",
+  "legend-turnout": "Weiche: der gestellte Strang", "legend-unknown": "Weiche in unbekannter Stellung", "legend-contact": "Rückmelder eben überfahren; gestört",
+  "done": "Ausgeführt.", "scale": "Maßstab für km/h",
 
   // a train
   "no-such-train": "Zug {0} gehört nicht zu dieser Sitzung.", "sent": "gesendet: {0}", "refused": "abgelehnt: {0}",
@@ -46,6 +56,10 @@ export const GERMAN = {
   "stops-made": "Ausgeführte Aufträge", "order-given": "Auftrag", "rests-at": "Halt bei", "error-mm": "Fehler (mm)", "promised": "vorhergesagt (mm)",
   "truth-mm": "wahrer Fehler (mm)", "did-stop": "Halt", "did-move": "Vorrücken", "did-arrive": "Ankunft", "did-speed": "Tempo",
   "did-go": "Fahrt nach", "did-reverse": "Wenden", "did-hold": "Halten", "did-follow": "Folgen",
+  "now-seeks": "Position unbekannt: Er fährt mit Stufe {0}, bis ein Rückmelder ihn meldet.", "now-lost": "Position unbekannt: über einen Rückmelder fahren oder angeben, wo er steht.",
+  "now-rests": "Steht bei {0}.", "now-waits": "Steht bei {0}; Auftrag: {1}.", "now-runs": "Fährt {0}, Stufe {1}.",
+  "now-slows": "Wird langsamer, noch {0}: hält bei {1} ± {2} mm.", "now-does": "Fährt {0}; Auftrag: {1}.", "now-stops": "Fährt {0}; {1}: vorhergesagt {2} … {3} mm vom Ziel.", "achieved": "ausgeführt: {0}",
+  "lock": "Auf diesen Zug sperren", "unlock": "Entsperren", "lock-hint": "Gesperrt: Nur der Regler ist zu sehen, und der Zug hält, wenn diese Seite verdeckt oder das Telefon weggelegt wird.",
 
   // calibration
   "calibration": "Kalibrierung", "of-train": "Zug", "driven-with": "Aktuelles Modell",
@@ -193,4 +207,17 @@ export const GERMAN = {
   "score-speed": "Fehler des Tempos: {0} m/s rms, höchstens {1} m/s.",
   "score-distance": "Fehler der Strecke am Ende: {0} m, bei einem 99,99-%-Intervall von {1} m Breite.",
   "score-noticed": "Gleiten oder Schleudern wurde nach {0} s erkannt.",
+
+  // the editor
+  "editor": "Anlage zeichnen", "draft": "Die Anlage, die gezeichnet wird; auf einen Stoß klicken, um ihn zu wählen", "draft-undo": "Rückgängig", "draft-redo": "Wiederholen", "draft-clear": "Leeren",
+  "draft-next": "Das nächste Stück kommt an den Pfeil. Auf ein anderes offenes Ende klicken, um dort weiterzumachen.",
+  "draft-joint": "Ein Stoß ist gewählt. Dort einen Rückmelder setzen oder auf ein offenes Ende klicken, um weiterzubauen.",
+  "draft-sensor": "Rückmelder hier", "draft-no-sensor-here": "Rückmelder entfernen", "draft-remove": "Stück entfernen", "draft-pieces": "Gleisstücke",
+  "library": "Gleissystem", "joined-at": "Weichen anlegen mit", "draft-toe": "der Spitze", "draft-straight-leg": "dem geraden Strang", "draft-curved-leg": "dem Abzweig",
+  "hand": "Richtung von Bögen und Weichen", "hand-left": "Links", "hand-right": "Rechts", "draft-straights": "Geraden", "draft-curves": "Bögen", "draft-turnouts": "Weichen",
+  "draft-arc": "{0} mm entlang des Bogens", "draft-file": "Anlagendatei", "draft-name": "Name", "draft-unnamed": "meine Anlage", "draft-save": "Speichern",
+  "draft-saved": "Gespeichert als {0}. Nummern der Rückmelder und Weichen an die Verdrahtung anpassen, dann `footplate layout check {0}` aufrufen.", "draft-written": "Die Datei",
+  "draft-empty": "Ein Gleisstück wählen, um zu beginnen.", "draft-no-sensor": "Noch kein Rückmelder: auf einen Stoß zwischen zwei Stücken klicken, dann `Rückmelder hier`.",
+  "draft-too-many": "Mehr als {0} Rückmelder: Fünf Module mit 16 Kontakten haben nicht mehr.", "draft-gap": "Zwei offene Enden sind {0} mm voneinander entfernt und schließen nicht.",
+  "draft-ends": "Gleisenden: {0}. Weichen: {1}. Rückmelder: {2}.",
 };

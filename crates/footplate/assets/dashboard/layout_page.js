@@ -3,33 +3,121 @@
 import { make, put, signed } from "./dom.js";
 import { order } from "./server.js";
 import { PickTrack } from "./pick_track.js";
+import { SCALES, chooseScale, kmPerHour, scale } from "./scale.js";
 import { colourOf } from "./track.js";
 import { say } from "./words.js";
 
 /** Lines that are shown. */
 const LINES_SHOWN = 400;
 
-export function layoutPage(root, live) {
+/** `about`: the train that somebody is asked to find. */
+export function layoutPage(root, live, about) {
   const $ = (selector) => root.querySelector(selector);
   const cards = new Map();
   const picked = $("#picked");
-  const track = new PickTrack($("#track"), live.layout, (place) => {
+  const here = $("#here");
+  /** The train that presses on the track are about. */
+  let taken;
+  const sought = about === undefined ? undefined : Number(about);
+  /** The turnout that is asked about, or was thrown last. */
+  let thrown;
+  const track = new PickTrack($("#track"), live.layout, showPlace, ({ train, turnout }) => (train === undefined ? pressed(turnout) : take(train)));
+
+  const button = (word, does, more) => {
+    const made = make("button", { type: "button", ...more }, say(word));
+    made.addEventListener("click", does);
+    return made;
+  };
+  const orderButton = (text, line, answer = $("#here-answer")) => {
+    const made = make("button", { type: "button" }, text);
+    made.addEventListener("click", () => give(line(), answer));
+    return made;
+  };
+
+  function take(train) {
+    taken = train;
+    for (const [number, { made, takes }] of cards) {
+      made.classList.toggle("taken", number === taken);
+      takes.setAttribute("aria-pressed", String(number === taken));
+    }
+    if (track.place) return showPlace(track.place);
+    put(picked, say(taken === sought ? "place-hint" : "taken", train));
+  }
+
+  /** What can be done at a place. */
+  function showPlace(place) {
+    thrown = undefined;
+    put($("#here-answer"), "");
     picked.textContent = place ? say("picked", place) : say("pick-hint");
-  });
+    here.hidden = !place || taken === undefined;
+    if (here.hidden) return;
+    const at = () => track.place;
+    $("#here-does").replaceChildren(
+      orderButton(say("stop-train-here", taken), () => `stop ${taken} at ${at()}`),
+      orderButton(say("go-train-here", taken), () => `go ${taken} to ${at()}`),
+      orderButton(say("put-train-here", taken), () => `place ${taken} at ${at()}`));
+    if (taken === sought) $("#here-does").prepend($("#here-does").lastElementChild);
+    if (!track.other) return;
+    $("#here-does").append(button("other-direction", () => { track.turn(); showPlace(track.place); }, { title: track.other }));
+  }
+
+  const leg = (lies) => say(lies ? `leg-${lies}` : "leg-unknown");
+  const stands = (turnout, lies) => (lies ? say("turnout-is", turnout, leg(lies)) : say("turnout-unknown", turnout));
+  const other = (lies) => (lies === "straight" ? "curved" : "straight");
+
+  /** A turnout that is known to be set one way is thrown; of any other it is asked which way. */
+  function pressed(turnout) {
+    thrown = turnout;
+    const lies = live.picture?.turnouts[turnout];
+    here.hidden = false;
+    put($("#here-answer"), "");
+    const throws = (to) => orderButton(say(`throw-${to}`), () => `turnout ${turnout} ${to}`);
+    $("#here-does").replaceChildren(...(lies ? [throws(other(lies))] : [throws("straight"), throws("curved")]));
+    put(picked, stands(turnout, lies));
+    if (lies) give(`turnout ${turnout} ${other(lies)}`, $("#here-answer"));
+  }
+
+  /** The turnouts by name, for those who do not press on the drawing. */
+  const turnouts = new Map();
+  function listTurnouts(picture) {
+    for (const [number, lies] of Object.entries(picture.turnouts)) {
+      if (!turnouts.has(number)) {
+        turnouts.set(number, { button: button("", () => pressed(Number(number))) });
+        $("#turnout-list").append(turnouts.get(number).button);
+        $("#turnouts").hidden = false;
+      }
+      const one = turnouts.get(number);
+      if (one.lies === lies) continue;
+      one.lies = lies;
+      put(one.button, say("turnout-short", number, leg(lies)));
+      if (Number(number) !== thrown) continue;
+      put(picked, stands(number, lies));
+      const throws = orderButton(say(`throw-${other(lies)}`), () => `turnout ${number} ${other(lies)}`);
+      if (lies) $("#here-does").replaceChildren(throws);
+    }
+  }
+
+  const scales = $("#scale");
+  scales.append(...Object.keys(SCALES).map((name) => new Option(`${name} (1:${SCALES[name]})`, name)));
+  scales.value = scale();
+  scales.addEventListener("change", () => chooseScale(scales.value));
   const zones = new Map(live.layout.edges.filter((edge) => edge.zone).map(({ zone }) => [zone.name, say("zone", zone.name, zone.max_mm_s)]));
   $("#zones").hidden = zones.size === 0;
-  $("#zones").textContent = say("zones", [...zones.values()].join("; "));
+  $("#zones span").textContent = say("zones", [...zones.values()].join("; "));
   $("#zoom-in").addEventListener("click", () => track.view.zoom(0.7));
   $("#zoom-out").addEventListener("click", () => track.view.zoom(1.4));
   $("#zoom-all").addEventListener("click", () => track.view.all());
 
-  async function give(line) {
-    $("#answer").textContent = "";
+  /** Gives an order; what comes of it is said beside what was pressed. */
+  async function give(line, answer) {
+    answer.className = "answer";
+    put(answer, say("sent", line));
     try {
       await order(line);
       return true;
     } catch (error) {
-      $("#answer").textContent = say("unread", error.message);
+      answer.className = "answer bad";
+      put(answer, say("unread", error.message));
       return false;
     }
   }
@@ -37,40 +125,40 @@ export function layoutPage(root, live) {
   $("#order").addEventListener("submit", async (event) => {
     event.preventDefault();
     const field = $("#line");
-    if (field.value.trim() && (await give(field.value))) field.value = "";
+    if (field.value.trim() && (await give(field.value, $("#answer")))) field.value = "";
   });
 
   function card(train, nth) {
     const id = `step-${train.train}`;
     const [at, speed, busy] = [make("dd"), make("dd"), make("dd")];
-    const button = (word, does, more) => {
-      const made = make("button", { type: "button", ...more }, say(word));
-      made.addEventListener("click", does);
-      return made;
-    };
+    const answer = make("output", { class: "answer", role: "status" });
     const step = make("input", { id, type: "number", min: 0, max: 126, inputMode: "numeric", value: String(train.step), "aria-label": say("step-of", train.train) });
-    const stopHere = button("stop-here", () => track.place && give(`stop ${train.train} at ${track.place}`));
+    const stopHere = button("stop-here", () => track.place && give(`stop ${train.train} at ${track.place}`, answer));
+    const takes = button("take", () => take(train.train), { "aria-pressed": "false" });
     const made = make("article", { class: "train" },
       make("h3", {}, make("a", { href: `#/train/${train.train}` }, say("train", train.train))),
       make("dl", {}, make("dt", {}, say("at")), at, make("dt", {}, say("speed")), speed, make("dt", {}, say("busy")), busy),
       make("div", { class: "does" },
-        button("stop", () => give(`stop ${train.train}`)), stopHere,
+        button("stop", () => give(`stop ${train.train}`, answer)), stopHere,
         make("label", { htmlFor: id }, say("step")), step,
-        button("set", () => give(`speed ${train.train} ${step.value}`))));
+        button("set", () => give(`speed ${train.train} ${step.value}`, answer)), takes),
+      answer);
     made.style.borderLeftColor = colourOf(nth);
     if (cards.size === 0) $("#trains").replaceChildren();
     $("#trains").append(made);
-    const parts = { made, at, speed, busy, stopHere };
+    const parts = { made, at, speed, busy, stopHere, takes, answer };
     cards.set(train.train, parts);
+    if (train.train === (sought ?? taken ?? train.train)) take(train.train);
     return parts;
   }
 
   function show(picture) {
     track.show(picture);
+    listTurnouts(picture);
     picture.trains.forEach((train, nth) => {
       const parts = cards.get(train.train) ?? card(train, nth);
       put(parts.at, train.at ? `${train.at} ± ${train.half_mm.toFixed(0)} mm` : say("nowhere"));
-      const speed = train.at ? `${train.speed_mm_per_s.toFixed(0)} ± ${train.speed_half_mm_per_s.toFixed(0)} mm/s, ` : "";
+      const speed = train.at ? `${train.speed_mm_per_s.toFixed(0)} ± ${train.speed_half_mm_per_s.toFixed(0)} mm/s (${kmPerHour(train.speed_mm_per_s)}), ` : "";
       put(parts.speed, speed + say("at-step", train.step));
       const rests = train.promise_mm;
       const ends = rests ? ` (${say("rests")} ${signed(rests[1])} … ${signed(rests[2])} mm)` : "";
@@ -82,6 +170,7 @@ export function layoutPage(root, live) {
       if (picture.trains.some((one) => one.train === train)) continue;
       made.remove();
       cards.delete(train);
+      if (taken === train) taken = undefined;
     }
     if (picture.trains.length === 0) put($("#trains"), say("none"));
   }
@@ -94,10 +183,26 @@ export function layoutPage(root, live) {
     if (atEnd) list.scrollTop = list.scrollHeight;
   }
 
+  /** Contacts that are said to fail are crossed out until they are passed again. */
+  function fails({ what, blanks }) {
+    if (what === "contact-stuck") track.fails(blanks[0]);
+  }
+
+  live.alarms.forEach(fails);
   for (const { text } of live.lines.slice(-LINES_SHOWN)) write(text);
   return {
     picture: show,
     line: ({ text }) => write(text),
+    alarm: fails,
+    ended({ train, command, refused }) {
+      const answer = cards.get(train)?.answer ?? $("#here-answer");
+      if (refused) {
+        answer.className = "answer bad";
+        put(answer, say("refused", refused));
+      } else if (command === "turnout" && answer.textContent) {
+        put(answer, say("done"));
+      }
+    },
     gap: (count) => write(say("gap", count)),
     anew: () => $("#said").replaceChildren(),
   };

@@ -32,3 +32,10 @@ export async function send(path, file) {
 
 /** Gives an order as the prompt understands it. */
 export const order = (line) => ask("/api/orders", { line });
+
+/** The same when the page may be gone before there is an answer. */
+export function orderAtOnce(line) {
+  fetch("/api/orders", {
+    method: "POST", keepalive: true, headers: { "Content-Type": "application/json", ...headers }, body: JSON.stringify({ line }),
+  }).catch(() => {});
+}

@@ -1,10 +1,19 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
+import { cut, between, nearest, written } from "./plan_curve.js";
+import { placeOf, planOf } from "./plan.js";
 import { say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** How wide a letter of a name is, in units of the drawing. */
-const LETTER = 0.95;
+const LETTER = 1.12;
+/** How near a press is to what it means (units of the drawing), and how long the drawn blade of a turnout is. */
+const REACH = 8;
+const TOUCH = 2.6;
+const BLADE = 5;
+/** The longer side of a drawing has so many units, as it is small or large on the screen. */
+const LEAST_WIDE = 105;
+const MOST_WIDE = 160;
 /** Trains have so many colours. */
 export const COLOURS = 6;
 
@@ -19,56 +28,73 @@ function element(name, attributes, parent) {
 export const colourOf = (place) => `var(--t${place % COLOURS})`;
 
 export class Track {
-  #nodes = new Map(); #edges = new Map(); #legs = []; #contacts = new Map(); #layer; #numbers; #trains = new Map(); #unit; #picked;
+  #nodes; #edges; #plan; #blades = []; #contacts = new Map(); #layer; #numbers; #trains = new Map(); #unit; #picked; #turnouts = new Map();
 
   constructor(svg, layout) {
-    const drawn = layout.nodes.filter((node) => node.point);
-    for (const node of layout.nodes) this.#nodes.set(node.id, node);
-    const xs = drawn.map((node) => node.point[0]);
-    const ys = drawn.map((node) => node.point[1]);
-    const [left, top] = [Math.min(...xs), Math.min(...ys)];
-    const [width, height] = [Math.max(...xs) - left || 1, Math.max(...ys) - top || 1];
-    const side = Math.max(width, height);
-    this.#unit = side / 160;
-    const margin = side * 0.04;
-    this.whole = [left - margin, top - margin, width + 2 * margin, height + 2 * margin];
+    this.#nodes = new Map(layout.nodes.map((node) => [node.id, node]));
+    this.#edges = new Map(layout.edges.map((edge) => [edge.id, edge]));
+    this.#plan = planOf(layout);
+    const all = [...this.#plan.points.values(), ...[...this.#plan.rails.values()].flat()];
+    const [left, right, top, foot] = [0, 0, 1, 1].map((axis, nth) => Math[nth % 2 ? "max" : "min"](...all.map((point) => point[axis])));
+    const side = Math.max(right - left, foot - top) || 1;
+    // On a phone names are larger in the drawing, so that they can be read.
+    this.#unit = side / Math.min(Math.max((svg.clientWidth || MOST_WIDE) / 4, LEAST_WIDE), MOST_WIDE);
+    const margin = side * 0.05;
+    this.whole = [left - margin, top - margin, right - left + 2 * margin, foot - top + 2 * margin];
     svg.style.aspectRatio = `${this.whole[2]} / ${this.whole[3]}`;
-    const rails = element("g", { "stroke-width": this.#unit * 0.5 }, svg);
+    const rails = element("g", {}, svg);
     for (const edge of layout.edges) {
-      const ends = [this.#nodes.get(edge.from)?.point, this.#nodes.get(edge.to)?.point];
-      if (!ends[0] || !ends[1]) continue;
-      this.#edges.set(edge.id, { ...edge, ends });
       if (edge.id % 2) continue;
-      const line = element("line", { x1: ends[0][0], y1: ends[0][1], x2: ends[1][0], y2: ends[1][1], class: edge.zone ? "rail restricted" : "rail" }, rails);
-      if (edge.zone) element("title", {}, line).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
-      for (const id of [edge.id, edge.id + 1]) {
-        const one = layout.edges[id];
-        const from = one && this.#nodes.get(one.from);
-        if (one?.leg && from?.kind === "branch") this.#legs.push({ line, turnout: from.number, leg: one.leg });
-      }
+      const rail = element("path", { d: written(this.#curve(edge.id)), class: "rail", "stroke-width": this.#unit * 0.7 }, rails);
+      if (!edge.zone) continue;
+      rail.classList.add("restricted");
+      element("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
     }
+    this.#bladesOf(layout, element("g", {}, svg));
     this.#layer = element("g", {}, svg);
-    const marks = element("g", {}, svg);
-    this.#mark(drawn, marks);
+    this.#mark(layout.nodes, element("g", {}, svg));
     // Which train it is has to be read whatever lies there.
     this.#numbers = element("g", {}, svg);
     this.#picked = element("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, svg);
     this.#picked.style.display = "none";
   }
 
-  #mark(drawn, marks) {
+  /** The curve of an edge, in its own direction. */
+  #curve(id) {
+    const rail = this.#plan.rails.get(id >> 1) ?? [];
+    return id % 2 ? rail.toReversed() : rail;
+  }
+
+  /** Each turnout shows which of its legs is set. */
+  #bladesOf(layout, layer) {
+    for (const edge of layout.edges) {
+      const from = this.#nodes.get(edge.from);
+      if (!edge.leg || from.kind !== "branch") continue;
+      const curve = this.#curve(edge.id);
+      const long = curve.slice(1).reduce((sum, [x, y], nth) => sum + Math.hypot(x - curve[nth][0], y - curve[nth][1]), 0);
+      const blade = cut(curve, 0, Math.min(0.5, BLADE * this.#unit / (long || 1)));
+      const path = element("path", { d: written(blade), class: "blade", "stroke-width": this.#unit * 1.1 }, layer);
+      this.#blades.push({ path, turnout: from.number, leg: edge.leg });
+      this.#turnouts.set(from.number, this.#plan.points.get(placeOf(edge.from)));
+    }
+  }
+
+  #mark(nodes, marks) {
     const named = new Map();
-    for (const node of drawn) {
+    for (const node of nodes) {
       if (node.kind !== "contact" && node.kind !== "branch") continue;
-      const key = node.point.join();
-      const [x, y] = node.point;
+      const point = this.#plan.points.get(placeOf(node.id));
+      const key = point.join();
+      const [x, y] = point;
       if (node.kind === "contact") {
         let spot = this.#contacts.get(`at ${key}`);
         if (!spot) {
-          spot = element("circle", { cx: x, cy: y, r: this.#unit * 0.7, class: "contact" }, marks);
+          spot = element("circle", { cx: x, cy: y, r: this.#unit * 0.9, class: "contact", "stroke-width": this.#unit * 0.4 }, marks);
+          element("title", {}, spot);
           this.#contacts.set(`at ${key}`, spot);
         }
         this.#contacts.set(node.number, spot);
+        this.#contacts.set(`named ${node.name}`, spot);
       }
       const text = node.kind === "contact" ? node.name : `⟨${node.number}⟩`;
       named.set(key, { x, y, kind: node.kind, texts: [...(named.get(key)?.texts ?? []), text] });
@@ -76,83 +102,97 @@ export class Track {
     // Contacts first: they are what people name places by.
     const [contacts, others] = [[], []];
     for (const name of named.values()) (name.kind === "contact" ? contacts : others).push(name);
-    const written = [];
+    const taken = [];
     for (const { x, y, texts } of [...contacts, ...others]) {
       const text = texts.join(" ");
       const half = text.length * this.#unit * LETTER / 2;
-      const [dx, dy] = this.#room(x, y, half, written);
-      written.push([x + dx - half, x + dx + half, y + dy]);
-      const name = element("text", { x: x + dx, y: y + dy, "font-size": this.#unit * 1.7, "stroke-width": this.#unit * 0.5, class: "name" }, marks);
+      const [dx, dy] = this.#room(x, y, half, taken);
+      taken.push([x + dx - half, x + dx + half, y + dy]);
+      const name = element("text", { x: x + dx, y: y + dy, "font-size": this.#unit * 2, "stroke-width": this.#unit * 0.5, class: "name" }, marks);
       name.textContent = text;
     }
   }
 
   /** Where a name so wide goes beside its point: above it, or where no other name is in the way. */
-  #room(x, y, half, written) {
+  #room(x, y, half, taken) {
     const aside = half + this.#unit * 1.2;
-    const places = [[0, -1.1], [0, 2.4], [aside, 0.6], [-aside, 0.6], [0, -2.9], [0, 4.2]]
+    const places = [[0, -1.4], [0, 2.7], [aside, 0.6], [-aside, 0.6], [0, -3.2], [0, 4.5]]
       .map(([dx, dy]) => [dx, dy * this.#unit]);
-    const isFree = ([dx, dy]) => written.every(([left, right, foot]) =>
-      x + dx + half < left || x + dx - half > right || Math.abs(y + dy - foot) > this.#unit * 1.7);
+    const isFree = ([dx, dy]) => taken.every(([left, right, foot]) =>
+      x + dx + half < left || x + dx - half > right || Math.abs(y + dy - foot) > this.#unit * 2);
     return places.find(isFree) ?? places[0];
+  }
+
+  #part(edge, mm) {
+    return edge.length_mm > 0 ? Math.min(Math.max(mm / edge.length_mm, 0), 1) : 0;
   }
 
   /** The point of an edge at an offset. */
   point(id, mm) {
     const edge = this.#edges.get(id);
-    if (!edge) return undefined;
-    const part = edge.length_mm > 0 ? Math.min(Math.max(mm / edge.length_mm, 0), 1) : 0;
-    const [[x1, y1], [x2, y2]] = edge.ends;
-    return [x1 + (x2 - x1) * part, y1 + (y2 - y1) * part];
+    return edge && between(this.#curve(id), this.#part(edge, mm));
   }
 
   #path(spans) {
-    let path = "";
-    for (const { edge, from_mm, to_mm } of spans) {
-      const [one, other] = [this.point(edge, from_mm), this.point(edge, to_mm)];
-      if (one && other) path += `M${one[0].toFixed(2)} ${one[1].toFixed(2)}L${other[0].toFixed(2)} ${other[1].toFixed(2)}`;
-    }
+    const path = spans.map(({ edge: id, from_mm, to_mm }) => {
+      const edge = this.#edges.get(id);
+      return edge ? written(cut(this.#curve(id), this.#part(edge, from_mm), this.#part(edge, to_mm))) : "";
+    }).join("");
     return path || "M0 0";
   }
 
   /** Shows one moment. */
   show(picture) {
-    for (const { line, turnout, leg } of this.#legs) {
+    for (const { path, turnout, leg } of this.#blades) {
       const lies = picture.turnouts[turnout];
-      line.classList.toggle("away", Boolean(lies) && lies !== leg);
+      path.setAttribute("class", `blade ${lies ? lies === leg ? "set" : "away" : "unknown"}`);
     }
     for (const [key, spot] of this.#contacts) {
       if (typeof key === "string") spot.classList.remove("passed");
     }
-    for (const number of Object.keys(picture.passed)) this.#contacts.get(Number(number))?.classList.add("passed");
+    for (const number of Object.keys(picture.passed)) {
+      this.#contacts.get(Number(number))?.classList.add("passed");
+      this.#contacts.get(Number(number))?.classList.remove("failed");
+    }
     picture.trains.forEach((train, place) => this.#train(train, place));
-    for (const [number, parts] of this.#trains) {
+    for (const [number, { parts }] of this.#trains) {
       if (picture.trains.some(({ train }) => train === number)) continue;
       Object.values(parts).forEach((part) => part.remove());
       this.#trains.delete(number);
     }
   }
 
+  /** A contact that was said to fail: shown so until it is passed again. */
+  fails(name) {
+    this.#contacts.get(`named ${name}`)?.classList.add("failed");
+  }
+
+  #partsOf(train, place) {
+    const stroke = colourOf(place);
+    const wide = this.#unit;
+    const parts = {
+      held: element("path", { class: "held", stroke, "stroke-width": wide * 2.6 }, this.#layer),
+      haze: element("path", { class: "haze", stroke, "stroke-width": wide * 3 }, this.#layer),
+      rests: element("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
+      body: element("path", { class: "body", stroke, "stroke-width": wide * 1.6 }, this.#layer),
+      target: element("circle", { class: "target", stroke, "stroke-width": wide * 0.4, r: wide * 1.2 }, this.#layer),
+      number: element("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#numbers),
+    };
+    parts.number.textContent = String(train.train);
+    const made = { parts, drawn: {} };
+    this.#trains.set(train.train, made);
+    return made;
+  }
+
   #train(train, place) {
-    let parts = this.#trains.get(train.train);
-    if (!parts) {
-      const stroke = colourOf(place);
-      const wide = this.#unit;
-      parts = {
-        held: element("path", { class: "held", stroke, "stroke-width": wide * 1.2 }, this.#layer),
-        haze: element("path", { class: "haze", stroke, "stroke-width": wide * 3 }, this.#layer),
-        rests: element("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
-        body: element("path", { class: "body", stroke, "stroke-width": wide * 1.4 }, this.#layer),
-        target: element("circle", { class: "target", stroke, "stroke-width": wide * 0.4, r: wide * 1.2 }, this.#layer),
-        number: element("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#numbers),
-      };
-      parts.number.textContent = String(train.train);
-      this.#trains.set(train.train, parts);
+    const { parts, drawn } = this.#trains.get(train.train) ?? this.#partsOf(train, place);
+    // Most of it stays as it is from one picture to the next.
+    for (const name of ["held", "haze", "body", "rests"]) {
+      const spans = JSON.stringify(train[name]);
+      if (drawn[name] === spans) continue;
+      drawn[name] = spans;
+      parts[name].setAttribute("d", this.#path(train[name]));
     }
-    parts.held.setAttribute("d", this.#path(train.held));
-    parts.haze.setAttribute("d", this.#path(train.haze));
-    parts.body.setAttribute("d", this.#path(train.body));
-    parts.rests.setAttribute("d", this.#path(train.rests));
     const target = train.target && this.point(train.target.edge, train.target.offset_mm);
     parts.target.style.display = target ? "" : "none";
     if (target) {
@@ -161,10 +201,11 @@ export class Track {
     }
     const last = train.body.at(-1);
     const front = last && this.point(last.edge, last.to_mm);
+    drawn.body_spans = train.body;
     parts.number.style.display = front ? "" : "none";
     if (front) {
       parts.number.setAttribute("x", front[0]);
-      parts.number.setAttribute("y", front[1] + this.#unit * 3.2);
+      parts.number.setAttribute("y", front[1] + this.#unit * 3.4);
     }
   }
 
@@ -177,18 +218,38 @@ export class Track {
     if (at) this.#picked.setAttribute("d", `M${at[0] - this.#unit * 1.6} ${at[1]}h${this.#unit * 3.2}M${at[0]} ${at[1] - this.#unit * 1.6}v${this.#unit * 3.2}`);
   }
 
-  /** The place nearest to a point of the drawing, as the prompt names it: from the last contact before it. */
-  nearest([x, y]) {
-    let best;
-    for (const edge of this.#edges.values()) {
-      const [[x1, y1], [x2, y2]] = edge.ends;
-      const square = (x2 - x1) ** 2 + (y2 - y1) ** 2;
-      const part = square > 0 ? Math.min(Math.max(((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / square, 0), 1) : 0;
-      const away = Math.hypot(x - x1 - part * (x2 - x1), y - y1 - part * (y2 - y1));
-      if (this.#nodes.get(edge.from)?.kind !== "contact") continue;
-      if (!best || away < best.away - 1e-9) best = { away, name: this.#nodes.get(edge.from).name, mm: Math.round(part * edge.length_mm) };
+  /** What a point of the drawing means: a train that is there, a turnout, or else a place in both directions. */
+  meant(point) {
+    const touches = (other) => other && Math.hypot(point[0] - other[0], point[1] - other[1]) < this.#unit * TOUCH;
+    for (const [train, { drawn }] of this.#trains) {
+      const under = (drawn.body_spans ?? []).some(({ edge, from_mm, to_mm }) => touches(this.point(edge, (from_mm + to_mm) / 2)) || touches(this.point(edge, to_mm)));
+      if (under) return { train };
     }
-    if (!best || best.away > this.#unit * 8) return undefined;
-    return best.mm > 0 ? `${best.name}+${best.mm}mm` : best.name;
+    let turnout;
+    for (const [number, at] of this.#turnouts) {
+      const away = Math.hypot(point[0] - at[0], point[1] - at[1]);
+      if (away < this.#unit * TOUCH && (!turnout || away < turnout.away)) turnout = { number, away };
+    }
+    const places = this.nearest(point);
+    // A contact right beside a turnout is pressed as well as the turnout is.
+    if (turnout && !(places && places.away < this.#unit && places.mm[0] === 0)) return { turnout: turnout.number };
+    return places ? { places: places.names } : {};
+  }
+
+  /** The place nearest to a point of the drawing, as the prompt names it in either direction: from the last contact before it. */
+  nearest(point) {
+    const found = [];
+    for (const edge of this.#edges.values()) {
+      const from = this.#nodes.get(edge.from);
+      if (from?.kind !== "contact") continue;
+      const { away, part } = nearest(this.#curve(edge.id), point);
+      found.push({ away, rail: edge.id >> 1, name: from.name, mm: Math.round(part * edge.length_mm) });
+    }
+    found.sort((one, other) => one.away - other.away || one.mm - other.mm);
+    const [best] = found;
+    if (!best || best.away > this.#unit * REACH) return undefined;
+    const same = found.filter(({ away, name }) => away - best.away < this.#unit * 0.01 && name !== undefined).slice(0, 2);
+    const names = same.map(({ name, mm }) => (mm > 0 ? `${name}+${mm}mm` : name));
+    return { away: best.away, mm: same.map(({ mm }) => mm), names };
   }
 }

@@ -2,8 +2,11 @@
 
 import { TrainCharts } from "./train_charts.js";
 import { make, put, shown, signed } from "./dom.js";
+import { doingNow } from "./doing_now.js";
 import { PickTrack } from "./pick_track.js";
+import { kmPerHour } from "./scale.js";
 import { order } from "./server.js";
+import { Throttle } from "./throttle.js";
 import { say } from "./words.js";
 
 /** Contacts in the list; the charts show more. */
@@ -14,9 +17,12 @@ export function trainPage(root, live, number) {
   const $ = (selector) => root.querySelector(selector);
   $("h2").textContent = say("train", train);
   const charts = new TrainCharts(root, live, train);
-  const answer = $("#answer");
+  /** Where it is said what comes of the last order: beside what was pressed. */
+  let answer = $("#answer");
 
-  async function give(line) {
+  async function give(line, beside = $("#answer")) {
+    if (answer !== beside) put(answer, "");
+    answer = beside;
     answer.className = "answer";
     put(answer, say("sent", line));
     try {
@@ -39,24 +45,11 @@ export function trainPage(root, live, number) {
   });
 
   put($("#stop-at"), say("stop-here", "…"));
-  const slider = $("#step");
-  const told = $("#step-told");
-  let held = false;
-  slider.addEventListener("input", () => { held = true; put(told, slider.value); });
-  slider.addEventListener("change", () => { held = false; give(`speed ${train} ${slider.value}`); });
-  const by = (change) => () => {
-    const step = Math.min(Math.max(Number(slider.value) + change, 0), Number(slider.max));
-    slider.value = String(step);
-    give(`speed ${train} ${step}`);
-  };
-  $("#slower").addEventListener("click", by(-1));
-  $("#faster").addEventListener("click", by(1));
-  $("#stop").addEventListener("click", () => give(`stop ${train}`));
-  $("#reverse").addEventListener("click", () => give(`reverse ${train}`));
-  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}`));
+  const throttle = new Throttle(root, train, give);
+  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}`, $("#stop-answer")));
   const asks = (form, line) => $(form).addEventListener("submit", (event) => {
     event.preventDefault();
-    give(line(new FormData(event.target)));
+    give(line(new FormData(event.target)), event.target.querySelector(".answer"));
   });
   asks("#hold", (said) => `hold ${train} ${said.get("speed")}mm/s`);
   asks("#follow", (said) => `follow ${train} behind ${said.get("leader")} by ${said.get("gap")}s`);
@@ -109,15 +102,15 @@ export function trainPage(root, live, number) {
       $("#unknown").hidden = Boolean(own);
       if (!own) return put($("#unknown"), say("no-such-train", train));
       charts.goesOn(picture.t_s, own);
+      put($("#now"), doingNow(own));
       put($("#at"), own.at ? `${own.at} ± ${shown(own.half_mm)} mm` : say("nowhere"));
       put($("#speed"), own.at ? `${shown(own.speed_mm_per_s)} ± ${shown(own.speed_half_mm_per_s)} mm/s` : "–");
+      put($("#km-per-hour"), own.at ? kmPerHour(own.speed_mm_per_s) : "–");
       put($("#busy"), own.doing ?? "–");
       const rest = own.if_stopped;
       put($("#if-stopped"), rest ? say("rest-way", shown(rest.way_mm), shown(rest.half_mm), rest.at ?? "?", shown(rest.in_s, 1)) : own.at_rest ? say("at-rest") : "–");
       put($("#due"), due && !own.at_rest ? say("due-in", due.contact, shown(Math.max(due.t_s - picture.t_s, 0), 1), shown(due.half_ms)) : "–");
-      if (charts.highest) slider.max = String(charts.highest);
-      if (!held && document.activeElement !== slider) slider.value = String(own.step);
-      if (!held) put(told, String(own.step));
+      throttle.show(own, charts.highest);
     },
     passed(passed) {
       if (passed.train === train) { list(); charts.passed(passed); }
@@ -125,9 +118,10 @@ export function trainPage(root, live, number) {
     ended(ended) {
       if (ended.train !== train) return;
       if (ended.refused) refused(say("refused", ended.refused));
+      else if (ended.achieved) put(answer, say("achieved", ended.achieved));
       ends();
     },
     anew() { charts.anew(); list(); ends(); },
-    close: () => charts.close(),
+    close() { throttle.close(); charts.close(); },
   };
 }

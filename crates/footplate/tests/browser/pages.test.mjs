@@ -12,7 +12,7 @@ import { findings } from "./axe.mjs";
 import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
-const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry"];
+const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry", "editor"];
 
 let browser;
 let running;

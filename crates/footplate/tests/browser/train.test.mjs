@@ -5,6 +5,7 @@ import assert from "node:assert/strict";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
+import { findings } from "./axe.mjs";
 import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
@@ -67,8 +68,8 @@ test("it is stopped at a place on the track, and what cannot be done says why", 
   let said = "";
   for (let times = 0; times < 5 && !(await page.locator("#ends tr").count()); times++) {
     await page.click("#stop-at");
-    await until(page, () => document.querySelector("#ends tr") || /refused/.test(document.querySelector("#answer").textContent));
-    said += `${await text(page, "#answer")}\n`;
+    await until(page, () => document.querySelector("#ends tr") || /refused/.test(document.querySelector("#stop-answer").textContent));
+    said += `${await text(page, "#stop-answer")}\n`;
   }
   assert.ok(await page.locator("#ends tr").count(), `never stopped: ${said}`);
   const row = await page.locator("#ends tr").first().locator("td").allTextContents();
@@ -77,12 +78,39 @@ test("it is stopped at a place on the track, and what cannot be done says why", 
 
   await page.fill("#hold input", "4900");
   await page.click("#hold button");
-  await until(page, () => /refused/.test(document.querySelector("#answer").textContent));
+  await until(page, () => /refused/.test(document.querySelector("#hold .answer").textContent));
   await page.fill("#arrive-at", "Z99");
   await page.click("#arrive button");
-  await until(page, () => /Z99/.test(document.querySelector("#answer").textContent));
+  await until(page, () => /Z99/.test(document.querySelector("#arrive .answer").textContent));
+  assert.equal(await text(page, "#hold .answer"), "", "what comes of an order is said beside it, and nowhere else");
+  assert.deepEqual(await page.$$eval(".orders label span", (all) => all.map((one) => one.textContent)),
+    ["Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Train to follow", "Time gap (s)"]);
   // The server said no to the last one, which a browser writes down as an error of the page.
   assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
+  await page.close();
+});
+
+test("a throttle is locked to its train on a phone, and the train stops when the page is put away", async () => {
+  const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`, { viewport: { width: 390, height: 800 }, hasTouch: true });
+  await until(page, () => document.querySelector("#step").max === "14");
+  await page.click("#lock");
+  assert.ok(await page.locator("#stop").isVisible());
+  for (const gone of ["nav", ".charts", ".orders", "#track"]) assert.ok(await page.locator(gone).isHidden(), gone);
+  for (const button of ["#slower", "#faster", "#stop", "#reverse"]) assert.ok((await page.locator(button).boundingBox()).height >= 64, button);
+  for (let step = 0; step < 6; step++) await page.click("#faster");
+  await until(page, () => /^Runs at \d+ mm\/s \(\d+ km\/h\), step 6\.$/.test(document.querySelector("#now").textContent));
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "throttle-locked.png") });
+  // A phone that is put away says that the page is hidden.
+  await page.evaluate(() => {
+    Object.defineProperty(document, "hidden", { value: true, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  });
+  await until(page, () => /^(Slows down from|Stands at)/.test(document.querySelector("#now").textContent));
+  await page.evaluate(() => delete document.hidden);
+  await page.click("#lock");
+  assert.ok(await page.locator("nav").isVisible());
+  assert.deepEqual(complaints, []);
   await page.close();
 });
 

@@ -1,0 +1,159 @@
+// Drawing a layout from the pieces of a track system, end to end, and saving it as a layout file.
+
+import { make, put } from "./dom.js";
+import { Draft } from "./draft.js";
+import { arcOf, LIBRARIES } from "./pieces.js";
+import { written } from "./plan_curve.js";
+import { View } from "./view.js";
+import { say } from "./words.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const KEPT_AS = "draft";
+/** What is shown at least (mm), and how near a press is to what it means. */
+const LEAST_SHOWN = 1200;
+const TOUCH = 40;
+const START = { x: 0, y: 0, heading: 0, ends: [] };
+
+function kept() {
+  try {
+    return JSON.parse(localStorage.getItem(KEPT_AS)) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+export function editorPage(root) {
+  const $ = (selector) => root.querySelector(selector);
+  const before = kept();
+  const draft = Draft.of(before.draft);
+  let side = -1;
+  /** Where the next piece goes, or the joint that was pressed last. */
+  let chosen = draft.joints().find(({ ends }) => ends.length === 1) ?? START;
+  const svg = $("#draft");
+  const whole = [0, 0, 0, 0];
+  measure();
+  const view = new View(svg, whole, press);
+
+  function measure() {
+    const points = [...draft.pieces.flatMap((piece) => draft.curves(piece).flat()), [0, 0]];
+    const [xs, ys] = [0, 1].map((axis) => points.map((point) => point[axis]));
+    const [wide, high] = [xs, ys].map((all) => Math.max(Math.max(...all) - Math.min(...all), LEAST_SHOWN / (all === ys ? 2 : 1)));
+    const [x, y] = [xs, ys].map((all) => (Math.max(...all) + Math.min(...all)) / 2);
+    whole.splice(0, 4, x - wide / 2 - 100, y - high / 2 - 100, wide + 200, high + 200);
+  }
+
+  function element(name, attributes) {
+    const made = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    svg.append(made);
+    return made;
+  }
+
+  const isOpen = () => chosen === START ? draft.pieces.length === 0 : chosen.ends.length === 1;
+  const isSame = (one, other) => Math.hypot(one.x - other.x, one.y - other.y) < 1;
+
+  function draw() {
+    svg.replaceChildren();
+    for (const piece of draft.pieces) {
+      for (const curve of draft.curves(piece)) element("path", { d: written(curve), class: "rail", "stroke-width": 12 });
+    }
+    for (const joint of draft.joints()) {
+      const isSensor = draft.sensorAt(joint) >= 0;
+      const word = isSensor ? "sensor" : joint.ends.length === 1 ? "open" : "joined";
+      element("circle", { cx: joint.x, cy: joint.y, r: word === "joined" ? 9 : 16, class: `joint ${word}`, "stroke-width": 5 });
+    }
+    const [x, y] = [chosen.x, chosen.y];
+    if (isOpen()) {
+      const [dx, dy] = [Math.cos(chosen.heading), Math.sin(chosen.heading)];
+      element("path", { d: `M${x - dy * 26} ${y + dx * 26}L${x + dx * 52} ${y + dy * 52}L${x + dy * 26} ${y - dx * 26}Z`, class: "next" });
+    } else {
+      element("circle", { cx: x, cy: y, r: 28, class: "picked", "stroke-width": 6 });
+    }
+    const problems = draft.problems();
+    const toml = draft.toml($("#draft-name").value);
+    $("#draft-says").replaceChildren(...problems.map(({ word, blanks, isError }) => make("li", { class: isError ? "danger" : word === "draft-gap" ? "warning" : "over" }, say(word, ...blanks))));
+    $("#draft-save").disabled = !toml;
+    put($("#draft-toml"), toml ?? "");
+    $("#draft-written").hidden = !toml;
+    $("#draft-undo").disabled = !draft.canUndo;
+    $("#draft-redo").disabled = !draft.canRedo;
+    $("#draft-remove").disabled = chosen.ends.length === 0;
+    $("#draft-sensor").disabled = chosen.ends.length !== 2;
+    put($("#draft-sensor"), say(chosen.ends.length === 2 && draft.sensorAt(chosen) >= 0 ? "draft-no-sensor-here" : "draft-sensor"));
+    for (const button of $("#pieces").querySelectorAll("button")) button.disabled = !isOpen();
+    put($("#draft-next"), say(isOpen() ? "draft-next" : "draft-joint"));
+    try {
+      localStorage.setItem(KEPT_AS, JSON.stringify({ draft: draft.kept, name: $("#draft-name").value, library: $("#library").value }));
+    } catch {
+      // A browser that keeps nothing begins anew next time.
+    }
+  }
+
+  function goesOn(next) {
+    const joints = draft.joints();
+    chosen = next ?? joints.find((joint) => isSame(joint, chosen)) ?? joints.findLast(({ ends }) => ends.length === 1) ?? joints.at(-1) ?? START;
+    measure();
+    view.all();
+    draw();
+  }
+
+  function press([x, y]) {
+    const away = (joint) => Math.hypot(joint.x - x, joint.y - y);
+    const [nearest] = draft.joints().sort((one, other) => away(one) - away(other));
+    if (!nearest || away(nearest) > TOUCH) return;
+    chosen = nearest;
+    draw();
+  }
+
+  function lay(piece) {
+    const port = piece.kind === "turnout" ? Number($("#joined-at").value) : 0;
+    goesOn(draft.lay(piece, side, port, chosen));
+  }
+
+  function list() {
+    const size = (piece) => (piece.kind === "straight" ? `${piece.mm} mm` : `${piece.radius} mm, ${piece.angle}°${piece.kind === "turnout" ? `, ${piece.mm} mm` : ""}`);
+    const button = (piece) => {
+      const made = make("button", { type: "button", title: piece.kind === "straight" ? "" : say("draft-arc", arcOf(piece).toFixed(1)) }, make("b", {}, piece.name), make("small", {}, size(piece)));
+      made.addEventListener("click", () => lay(piece));
+      return made;
+    };
+    const groups = ["straight", "curve", "turnout"].map((kind) => make("div", { role: "group", "aria-label": say(`draft-${kind}s`) },
+      make("h3", {}, say(`draft-${kind}s`)), make("div", { class: "does" }, ...LIBRARIES[$("#library").value].filter((piece) => piece.kind === kind).map(button))));
+    $("#pieces").replaceChildren(...groups);
+  }
+
+  function hand(to) {
+    side = to;
+    for (const [id, own] of [["#hand-left", -1], ["#hand-right", 1]]) $(id).setAttribute("aria-pressed", String(own === side));
+  }
+
+  function save() {
+    const address = URL.createObjectURL(new Blob([$("#draft-toml").textContent], { type: "application/toml" }));
+    const name = $("#draft-name").value.trim().toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "") || "layout";
+    make("a", { href: address, download: `${name}.toml` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 1000);
+    put($("#draft-saved"), say("draft-saved", `${name}.toml`));
+  }
+
+  $("#library").append(...Object.keys(LIBRARIES).map((name) => new Option(name, name)));
+  if (Object.hasOwn(LIBRARIES, before.library)) $("#library").value = before.library;
+  $("#joined-at").append(...["draft-toe", "draft-straight-leg", "draft-curved-leg"].map((word, port) => new Option(say(word), String(port))));
+  $("#draft-name").value = before.name ?? say("draft-unnamed");
+  $("#library").addEventListener("change", () => { list(); draw(); });
+  $("#draft-name").addEventListener("input", draw);
+  $("#hand-left").addEventListener("click", () => hand(-1));
+  $("#hand-right").addEventListener("click", () => hand(1));
+  $("#draft-undo").addEventListener("click", () => { draft.undo(); goesOn(); });
+  $("#draft-redo").addEventListener("click", () => { draft.redo(); goesOn(); });
+  $("#draft-clear").addEventListener("click", () => { draft.clear(); goesOn(START); });
+  $("#draft-sensor").addEventListener("click", () => { draft.toggleSensor(chosen); draw(); });
+  $("#draft-remove").addEventListener("click", () => {
+    draft.remove(Math.max(...chosen.ends.map(({ piece }) => piece)));
+    goesOn();
+  });
+  $("#draft-save").addEventListener("click", save);
+  hand(side);
+  list();
+  draw();
+  return {};
+}

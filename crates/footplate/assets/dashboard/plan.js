@@ -1,0 +1,125 @@
+// Where the rails of a layout are drawn: curves through the points of its file, or a drawing made without them.
+
+import { planWithoutPoints } from "./plan_without_points.js";
+import { bezier, between, lengthOf } from "./plan_curve.js";
+
+/** A rail that would bend more than this at an end is drawn with a kink there, as the plan has one (rad). */
+const MOST_BEND = 1.75;
+/** And one that would turn back at an end does not follow the points that it is drawn through (rad). */
+const TURNS_BACK = 2.7;
+/** A plan is to scale if this share of its rails is as long as their points are apart, within 2 %. */
+const STRAIGHT_SHARE = 0.3;
+const TO_SCALE = 1.02;
+/** Two points do not say how a rail runs that bends more than half round between them. */
+const LEAST_STRAIGHT = 0.62;
+/** A rail that bends says so much less of the direction at its ends. */
+const BENDS_LESS = 8;
+/** Rails nearer to each other than this part of the drawing are one line to the eye. */
+const ONE_LINE = 0.004;
+
+/** A place is two nodes, one for each direction of travel: the even one, and the odd one. */
+export const placeOf = (node) => node >> 1;
+/** +1 if a node is passed in the direction of its place's first name, −1 otherwise. */
+export const senseOf = (node) => (node % 2 ? -1 : 1);
+
+/**
+ * A layout as it is drawn: `points` by place, and by the number of each edge's rail the points of its curve, in the direction of
+ * the even edge.
+ */
+export function planOf(layout) {
+  return planOfPoints(layout) ?? planWithoutPoints(layout);
+}
+
+/** The drawing by the points of the file; none if they leave out a place, put two rails onto one line, or do not say how a rail runs. */
+function planOfPoints(layout) {
+  const points = new Map(layout.nodes.filter(({ point }) => point).map(({ id, point }) => [placeOf(id), point]));
+  const places = new Set(layout.nodes.map(({ id }) => placeOf(id)));
+  const ends = new Set(layout.nodes.filter(({ kind }) => kind === "end").map(({ id }) => placeOf(id)));
+  if ([...places].some((place) => !points.has(place) && !ends.has(place))) return undefined;
+  const straight = straightness(layout, points);
+  const headings = headingsAt(layout, points, straight);
+  setEnds(layout, points, headings);
+  const rails = new Map();
+  for (const edge of layout.edges) {
+    if (edge.id % 2) continue;
+    const [from, to] = [points.get(placeOf(edge.from)), points.get(placeOf(edge.to))];
+    if (!from || !to) return undefined;
+    const chord = Math.atan2(to[1] - from[1], to[0] - from[0]);
+    const leaves = along(headings, edge.from) ?? chord;
+    const arrives = along(headings, edge.to) ?? chord;
+    const apart = Math.hypot(to[0] - from[0], to[1] - from[1]);
+    if (apart > 0 && straight(edge.length_mm, apart) < LEAST_STRAIGHT) return undefined;
+    const bends = [leaves, arrives].map((heading) => turn(heading, chord));
+    if (apart > 0 && Math.max(...bends) > TURNS_BACK) return undefined;
+    const [first, last] = [leaves, arrives].map((heading, nth) => (bends[nth] > MOST_BEND ? chord : heading));
+    rails.set(edge.id >> 1, bezier(from, first, to, last));
+  }
+  return haveOneLine([...rails.values()]) ? undefined : { points, rails };
+}
+
+const turn = (one, other) => Math.abs(Math.atan2(Math.sin(one - other), Math.cos(one - other)));
+
+/** The direction of the rails at a node, as a train passes it. */
+function along(headings, node) {
+  const heading = headings.get(placeOf(node));
+  return heading === undefined ? undefined : heading + (senseOf(node) < 0 ? Math.PI : 0);
+}
+
+/**
+ * How straight each edge is, if the points are to scale: 1 if it is as long as its points are apart, less if it bends. Where the
+ * plan is none to scale nothing is known of that.
+ */
+function straightness(layout, points) {
+  const ratios = layout.edges.flatMap(({ from, to, length_mm: mm }) => {
+    const [one, other] = [points.get(placeOf(from)), points.get(placeOf(to))];
+    const apart = one && other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0;
+    return apart > 0 && mm > 0 ? [mm / apart] : [];
+  });
+  const scale = Math.min(...ratios);
+  const isToScale = ratios.filter((ratio) => ratio < scale * TO_SCALE).length > ratios.length * STRAIGHT_SHARE;
+  return (mm, apart) => (isToScale && mm > 0 ? Math.min(scale * apart / mm, 1) : 1);
+}
+
+/** Through each place the rails run straight: where its neighbours lie says in which direction, the nearer and straighter the more. */
+function headingsAt(layout, points, straight) {
+  const sums = new Map();
+  for (const edge of layout.edges) {
+    const [from, to] = [points.get(placeOf(edge.from)), points.get(placeOf(edge.to))];
+    if (!from || !to) continue;
+    const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    const square = dx * dx + dy * dy;
+    if (square === 0) continue;
+    // The straight leg is the one that goes on.
+    const weight = senseOf(edge.from) * (edge.leg === "curved" ? 0.3 : 1) * straight(edge.length_mm, Math.sqrt(square)) ** BENDS_LESS / square;
+    const sum = sums.get(placeOf(edge.from)) ?? [0, 0];
+    sums.set(placeOf(edge.from), [sum[0] + dx * weight, sum[1] + dy * weight]);
+  }
+  return new Map([...sums].filter(([, [x, y]]) => x || y).map(([place, [x, y]]) => [place, Math.atan2(y, x)]));
+}
+
+/** Ends without a point: a little way on from their neighbour, beside the leg that goes straight. */
+function setEnds(layout, points, headings) {
+  const ways = layout.edges.flatMap(({ from, to }) => {
+    const [one, other] = [points.get(placeOf(from)), points.get(placeOf(to))];
+    return one && other ? [Math.hypot(one[0] - other[0], one[1] - other[1])] : [];
+  }).sort((one, other) => one - other);
+  const way = ways[ways.length >> 1] ?? 1;
+  for (const { from, to, leg } of layout.edges) {
+    if (points.has(placeOf(to)) || !points.has(placeOf(from))) continue;
+    const [x, y] = points.get(placeOf(from));
+    const heading = (along(headings, from) ?? 0) + (leg === "curved" ? 0.35 : 0);
+    points.set(placeOf(to), [x + way * Math.cos(heading), y + way * Math.sin(heading)]);
+    headings.set(placeOf(to), (along(headings, from) ?? 0) + (senseOf(to) < 0 ? Math.PI : 0));
+  }
+}
+
+/** Whether any two rails run on one line. */
+function haveOneLine(rails) {
+  const all = rails.flat();
+  const side = Math.max(...[0, 1].map((axis) => Math.max(...all.map((point) => point[axis])) - Math.min(...all.map((point) => point[axis]))));
+  const near = (point, rail) => rail.some((other) => Math.hypot(point[0] - other[0], point[1] - other[1]) < side * ONE_LINE);
+  // Turnouts in one place have rails of no length between them.
+  const drawn = rails.filter((rail) => lengthOf(rail) > 2 * side * ONE_LINE);
+  const looks = drawn.map((rail) => [0.3, 0.5, 0.7].map((part) => between(rail, part)));
+  return drawn.some((_, nth) => drawn.some((other, place) => place !== nth && looks[nth].every((point) => near(point, other))));
+}

@@ -1,0 +1,62 @@
+// The throttle of a train: its step, stop and reverse, large enough for a thumb, and locked to this train if a person wants that.
+
+import { put } from "./dom.js";
+import { orderAtOnce } from "./server.js";
+import { say } from "./words.js";
+
+export class Throttle {
+  /** The slider is being pulled. */
+  held = false;
+  #slider; #told; #train; #lock; #give; #step = 0;
+
+  /** `give` carries out an order and says what comes of it beside the throttle. */
+  constructor(root, train, give) {
+    const $ = (selector) => root.querySelector(selector);
+    [this.#slider, this.#told, this.#train, this.#lock, this.#give] = [$("#step"), $("#step-told"), train, $("#lock"), give];
+    const slider = this.#slider;
+    slider.addEventListener("input", () => { this.held = true; put(this.#told, slider.value); });
+    slider.addEventListener("change", () => { this.held = false; this.#runAt(Number(slider.value)); });
+    $("#slower").addEventListener("click", () => this.#runAt(Number(slider.value) - 1));
+    $("#faster").addEventListener("click", () => this.#runAt(Number(slider.value) + 1));
+    $("#stop").addEventListener("click", () => give(`stop ${train}`));
+    $("#reverse").addEventListener("click", () => give(`reverse ${train}`));
+    this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
+    document.addEventListener("visibilitychange", this.#left);
+    put(this.#lock, say("lock"));
+  }
+
+  get isLocked() {
+    return document.body.classList.contains("locked");
+  }
+
+  #runAt(step) {
+    const within = Math.min(Math.max(step, 0), Number(this.#slider.max));
+    this.#slider.value = String(within);
+    this.#give(`speed ${this.#train} ${within}`);
+  }
+
+  /** Nothing but this throttle and the emergency stop, and the train does not run on when nobody looks. */
+  #lockTo(isLocked) {
+    document.body.classList.toggle("locked", isLocked);
+    this.#lock.setAttribute("aria-pressed", String(isLocked));
+    put(this.#lock, say(isLocked ? "unlock" : "lock"));
+  }
+
+  /** A locked throttle that is put away stops its train. */
+  #left = () => {
+    if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
+  };
+
+  show({ step }, highest) {
+    this.#step = step;
+    if (highest) this.#slider.max = String(highest);
+    if (this.held) return;
+    if (document.activeElement !== this.#slider) this.#slider.value = String(step);
+    put(this.#told, String(step));
+  }
+
+  close() {
+    document.removeEventListener("visibilitychange", this.#left);
+    this.#lockTo(false);
+  }
+}

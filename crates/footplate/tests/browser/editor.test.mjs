@@ -1,0 +1,143 @@
+// A layout is drawn from nothing in a real browser: an oval with a siding, from catalogue pieces. The program takes its file, and a
+// simulated train is calibrated on it.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { findings } from "./axe.mjs";
+import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { PATIENCE, begin, end } from "./railway.mjs";
+
+let browser;
+const running = new Set();
+const folder = mkdtempSync(join(tmpdir(), "footplate-editor-"));
+const footplate = (...commands) => execFileSync(process.env.FOOTPLATE, commands, { stdio: "pipe", encoding: "utf8" });
+
+async function started(link, store) {
+  const program = await begin(["serve", "0", "--link", link, "--train", "24", "--store", join(folder, store)]);
+  running.add(program);
+  return program;
+}
+
+before(async () => { browser = await launch(); });
+after(async () => {
+  await browser?.close();
+  await Promise.all([...running].map(end));
+});
+
+test("an oval with a siding is drawn from nothing, its file is sound, and a train is calibrated on it", async () => {
+  const program = await started("sim:track-a?seed=7", "any.db");
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`);
+  await page.waitForSelector("#pieces button");
+  const lay = async (...names) => {
+    for (const name of names) await page.locator("#pieces button", { hasText: name }).first().click();
+  };
+  const joints = (kind) => page.locator(`#draft .joint.${kind}`);
+  const says = () => page.locator("#draft-says").textContent();
+  /** Presses the joint of a kind that is nearest to a point of the drawing (mm). */
+  const press = async (kind, x, y) => {
+    const nth = await page.$$eval(`#draft .joint.${kind}`, (all, [x, y]) => {
+      const away = (joint) => Math.hypot(joint.cx.baseVal.value - x, joint.cy.baseVal.value - y);
+      return all.indexOf([...all].sort((one, other) => away(one) - away(other))[0]);
+    }, [x, y]);
+    await joints(kind).nth(nth).scrollIntoViewIfNeeded();
+    const box = await joints(kind).nth(nth).boundingBox();
+    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  };
+
+  // Nothing is no layout, and says what to do.
+  assert.ok(await page.locator("#draft-save").isDisabled());
+  assert.match(await says(), /Choose a piece to begin/);
+  await page.click("#hand-right");
+  await lay("24611/24612", "24172", "24188", "24188", "24172");
+  // The other turnout is met from its straight leg, and its curved leg is on the same side of the track.
+  await page.click("#hand-left");
+  await page.selectOption("#joined-at", { label: "the straight leg" });
+  await lay("24611/24612");
+  await page.click("#hand-right");
+  const half = ["24130", "24130", "24130", "24130", "24130", "24130"];
+  await lay(...half, "24188", "24172", "24188", "24188", "24172", "24188");
+  assert.equal(await joints("open").count(), 4);
+  // A piece too many is taken back, and laid again.
+  await lay("24094");
+  await page.click("#draft-undo");
+  await lay(...half);
+  assert.equal(await joints("open").count(), 2, "the oval has snapped shut");
+  await press("open", 180, 39);
+  await page.click("#hand-left");
+  await lay("24224");
+  await lay("24188", "24188", "24224");
+  assert.equal(await joints("open").count(), 0, "the siding has snapped to the other turnout");
+  assert.match(await says(), /No sensor yet/);
+  assert.ok(await page.locator("#draft-save").isDisabled());
+  for (const [x, y] of [[548, 0], [1097, 720], [548, 78], [188, 720]]) {
+    await press("joined", x, y);
+    await page.click("#draft-sensor");
+  }
+  assert.equal(await joints("sensor").count(), 4);
+  assert.match(await says(), /Track ends: 0\. Turnouts: 2\. Sensors: 4\./);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "editor.png") });
+
+  // What was drawn is there when the page comes back.
+  await page.reload();
+  await page.waitForSelector("#draft .joint.sensor");
+  assert.equal(await joints("sensor").count(), 4);
+  await page.fill("#draft-name", 'My "first" oval');
+  const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click("#draft-save")]);
+  assert.equal(download.suggestedFilename(), "my-first-oval.toml");
+  const file = join(folder, "oval.toml");
+  await download.saveAs(file);
+  assert.match(footplate("layout", "check", file), /a sound layout of 12 nodes and 14 edges/);
+  assert.match(readFileSync(file, "utf8"), /^name = "My \\"first\\" oval"$/m);
+  // The way round is what the catalogue says: six straights on either side, and twelve curves of 30° and 360 mm.
+  const { hops } = JSON.parse(footplate("layout", "show", file, "--json"));
+  const round = 2 * (4 * 188.3 + 2 * 171.7) + 2 * Math.PI * 360;
+  const main = hops.filter(({ from, to }) => !/^A[78]$/.test(from) && !/^A[78]$/.test(to));
+  const sum = main.reduce((all, { length_mm: mm }) => all + mm, 0) / 2;
+  assert.ok(Math.abs(sum - round) < 0.5, `${sum} beside ${round}`);
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(program);
+  running.delete(program);
+
+  const link = `sim:${file}?seed=7`;
+  footplate("calibrate", "--link", link, "--layout", file, "--train", "24", "--store", join(folder, "oval.db"));
+  const drives = await started(`${link}&speed=4`, "oval.db");
+  const seen = await openQuietly(browser, drives.url);
+  await seen.page.waitForSelector(".train");
+  assert.equal(await seen.page.locator("#track .rail").count(), 7);
+  await seen.page.fill("#line", "turnout all straight");
+  await seen.page.click("#order button");
+  await seen.page.waitForFunction(() => document.querySelectorAll("#track .blade.unknown").length === 0, null, { timeout: PATIENCE });
+  await seen.page.fill("#step-24", "8");
+  await seen.page.locator(".train button", { hasText: "Set" }).first().click();
+  await seen.page.waitForFunction(() => /±/.test(document.querySelector(".train dd").textContent), null, { timeout: PATIENCE });
+  await seen.page.screenshot({ path: join(AT, "editor-driven.png") });
+  assert.deepEqual(seen.complaints, []);
+  await seen.page.close();
+  await end(drives);
+  running.delete(drives);
+});
+
+test("the editor fits a phone, in the dark and in German", async () => {
+  const program = await started("sim:track-a?seed=7", "phone.db");
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true });
+  await page.waitForSelector("#pieces button");
+  for (const system of await page.$$eval("#library option", (all) => all.map(({ value }) => value))) {
+    await page.selectOption("#library", system);
+    await page.locator("#pieces button").last().click();
+    await page.locator("#pieces button").first().click();
+  }
+  assert.equal(await width(page), 390);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "editor-phone.png"), fullPage: true });
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(program);
+  running.delete(program);
+});

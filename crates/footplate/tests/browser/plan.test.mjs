@@ -1,0 +1,136 @@
+// The layout as it is drawn, in a real browser: tracks beside each other also without coordinates, and turnouts, trains and places
+// that a person presses.
+
+import assert from "node:assert/strict";
+import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { findings } from "./axe.mjs";
+import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { PATIENCE, begin, calibratedStore, end, say, serve } from "./railway.mjs";
+
+let browser;
+const running = new Set();
+
+const folder = mkdtempSync(join(tmpdir(), "footplate-plan-"));
+const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
+const text = (page, selector) => page.locator(selector).textContent();
+
+/** The oval of the guide, with its points or without them. */
+function oval(name, change = (toml) => toml) {
+  const guide = readFileSync(new URL("../../../../docs/formats/layout.md", import.meta.url), "utf8");
+  const path = join(folder, `${name}.toml`);
+  writeFileSync(path, change(/```toml\n([^]*?)```/.exec(guide)[1]));
+  return path;
+}
+
+async function started(layout) {
+  const program = await begin(["serve", "0", "--link", `sim:${layout}?seed=7&speed=4`, "--train", "24", "--store", join(folder, "oval.db")]);
+  running.add(program);
+  return program;
+}
+
+async function ended(program) {
+  await end(program);
+  running.delete(program);
+}
+
+/** Presses the drawing beside a name that stands there. */
+async function press(page, name, below) {
+  const place = page.locator("#track text", { hasText: name }).first();
+  await place.scrollIntoViewIfNeeded();
+  const box = await place.boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height + below);
+}
+
+/** Points along each drawn rail. */
+const rails = (page) => page.$$eval("#track .rail", (all) => all.map((rail) => Array.from({ length: 9 }, (_, nth) => {
+  const { x, y } = rail.getPointAtLength(rail.getTotalLength() * (nth + 0.5) / 9);
+  return [x, y];
+})));
+
+const apart = (one, other) => Math.hypot(one[0] - other[0], one[1] - other[1]);
+
+before(async () => { browser = await launch(); });
+after(async () => {
+  await browser?.close();
+  await Promise.all([...running].map(end));
+});
+
+test("the guide's oval is drawn as an oval with its siding beside it, also if its points are one line or there are none", async () => {
+  const without = (toml) => toml.replace(/, at = \[[^\]]*\]/g, "");
+  for (const [name, options, change] of [["oval", {}], ["oval-without", { colorScheme: "dark", locale: "de-DE" }, without]]) {
+    const program = await started(oval(name, change));
+    const { page, complaints } = await openQuietly(browser, program.url, options);
+    await page.waitForSelector(".train");
+    const drawn = await rails(page);
+    assert.equal(drawn.length, 6);
+    const [xs, ys] = [0, 1].map((axis) => drawn.flat().map((point) => point[axis]));
+    const [wide, high] = [xs, ys].map((all) => Math.max(...all) - Math.min(...all));
+    assert.ok(high > wide / 5, `${wide} × ${high}: not a line`);
+    for (const [nth, one] of drawn.entries()) {
+      for (const other of drawn.slice(nth + 1)) {
+        assert.ok(one.some((point) => other.every((beside) => apart(point, beside) > wide / 100)), "two rails are one line");
+      }
+    }
+    // Each turnout shows both of its legs, and that nobody knows which is set.
+    assert.equal(await page.locator("#track .blade.unknown").count(), 4);
+    assert.equal(await page.locator("#track .rail.restricted").count(), 1);
+    assert.deepEqual(await findings(page), []);
+    await page.screenshot({ path: join(AT, `${name}.png`) });
+    assert.deepEqual(complaints, []);
+    await page.close();
+    await ended(program);
+  }
+});
+
+test("a turnout is asked about, thrown by a press, and refused under a train", async () => {
+  const store = calibratedStore("plan");
+  const program = await serve(store, 0);
+  running.add(program);
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await page.waitForSelector(".train");
+  await press(page, "⟨12⟩", 4);
+  await until(page, () => /position of turnout 12 is unknown/.test(document.querySelector("#picked").textContent));
+  const lies = async () => (await (await fetch(`${program.url}api/picture`)).json()).turnouts;
+  assert.equal((await lies())[12], null, "nothing was thrown unasked");
+  await page.locator("#here-does button", { hasText: "Set straight" }).click();
+  await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to straight.");
+  assert.equal((await lies())[12], "straight");
+  await press(page, "⟨12⟩", 4);
+  await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to curved.");
+  await until(page, () => document.querySelector("#here-answer").textContent === "Done.");
+  // A train stands on turnout 11: where a person clicked.
+  await say(program, "turnout all straight");
+  await until(page, () => document.querySelectorAll("#track .blade.unknown").length === 0);
+  await say(program, "place 24 at C14+160mm");
+  await until(page, () => document.querySelector("#track .body").getAttribute("d") !== "M0 0");
+  await page.click("#turnouts summary");
+  await page.locator("#turnout-list button", { hasText: "11:" }).click();
+  await until(page, () => /refused: train 24 is on turnout 11/.test(document.querySelector("#here-answer").textContent));
+  assert.equal((await lies())[11], "straight");
+
+  // A place is pressed, and the train is said to stand there, in the direction that is asked for.
+  await press(page, "E7 E8", 6);
+  await until(page, () => /^Selected: E[78]/.test(document.querySelector("#picked").textContent));
+  const first = await text(page, "#picked");
+  await page.locator("#here-does button", { hasText: "Other direction" }).click();
+  assert.notEqual(await text(page, "#picked"), first);
+  const place = (await text(page, "#picked")).replace("Selected: ", "");
+  await page.locator("#here-does button", { hasText: "Train 24 stands here" }).click();
+  const name = /^[A-E]\d+/.exec(place)[0];
+  await until(page, (name) => document.querySelector(".train dd").textContent.startsWith(name), name);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "plan.png") });
+  assert.deepEqual(complaints, []);
+  await page.close();
+  const phone = await openQuietly(browser, program.url, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true });
+  await phone.page.waitForSelector(".train");
+  assert.equal(await width(phone.page), 390);
+  assert.deepEqual(await findings(phone.page), []);
+  await phone.page.screenshot({ path: join(AT, "plan-phone.png"), fullPage: true });
+  await phone.page.close();
+  await ended(program);
+});
