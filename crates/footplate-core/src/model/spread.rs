@@ -63,9 +63,9 @@ impl Spread {
     }
 
     /// What may have changed is known less well.
-    pub(super) fn widen(&mut self, by: &Variation, highest: usize) {
+    pub(super) fn widen(&mut self, by: &Variation, highest: usize, values: &[f64]) {
         let (side, covariance) = (self.side, &mut self.covariance);
-        by.each(highest, |one, other, more| {
+        by.each(highest, values, |one, other, more| {
             covariance[one * side + other] += more;
             if one != other {
                 covariance[other * side + one] += more;
