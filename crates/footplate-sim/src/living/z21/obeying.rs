@@ -132,7 +132,7 @@ impl VirtualZ21<'_> {
                 self.say(id, &Reply::Turnout { address, position: self.position(address) });
             }
             Request::SetTurnout { address, second, activate, .. } => {
-                self.set_turnout(id, address, second, activate)
+                self.set_turnout(id, address, second, activate);
             }
             Request::Feedback { group } => {
                 if self.switches.feedback == Feedback::RBus {
