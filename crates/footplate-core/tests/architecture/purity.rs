@@ -40,7 +40,8 @@ const FLOATING_POINT: [&str; 9] =
 const DEPENDENCIES: [(&str, &[&str]); 2] = [
     // Elementary functions, and derives for the crates that write files.
     ("crates/footplate-core/Cargo.toml", &["libm", "serde"]),
-    ("crates/footplate-wire/Cargo.toml", &["footplate-core"]),
+    // Inflating the list of locomotives that a Central Station sends compressed.
+    ("crates/footplate-wire/Cargo.toml", &["footplate-core", "miniz_oxide"]),
 ];
 
 fn worldly_paths(source: &Source) -> impl Iterator<Item = Fault> {
