@@ -143,9 +143,12 @@ export class Track {
 
   /** Shows one moment. */
   show(picture) {
-    for (const { path, turnout, leg } of this.#blades) {
-      const lies = picture.turnouts[turnout];
-      path.setAttribute("class", `blade ${lies ? lies === leg ? "set" : "away" : "unknown"}`);
+    for (const blade of this.#blades) {
+      const lies = picture.turnouts[blade.turnout];
+      const look = lies ? lies === blade.leg ? "set" : "away" : "unknown";
+      if (look === blade.look) continue;
+      blade.look = look;
+      blade.path.setAttribute("class", `blade ${look}`);
     }
     for (const [key, spot] of this.#contacts) {
       if (typeof key === "string") spot.classList.remove("passed");
