@@ -1,7 +1,8 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
 import { cut, between, nearest, written } from "./plan_curve.js";
-import { placeOf, planOf } from "./plan.js";
+import { planOf } from "./plan.js";
+import { placeOf } from "./places.js";
 import { say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
