@@ -47,7 +47,7 @@ function isOver({ what, train, t_s: since }, picture) {
 }
 
 /** The alarms that nothing has ended, the newest of each cause: dangers first. */
-export function standing(alarms, picture) {
+function standing(alarms, picture) {
   const open = new Map();
   for (const alarm of alarms) {
     if (alarm.grade === "over") {

@@ -2,6 +2,7 @@
 
 import { planWithoutPoints } from "./plan_without_points.js";
 import { bezier, between, lengthOf } from "./plan_curve.js";
+import { placeOf, senseOf } from "./places.js";
 
 /** A rail that would bend more than this at an end is drawn with a kink there, as the plan has one (rad). */
 const MOST_BEND = 1.75;
@@ -16,11 +17,6 @@ const LEAST_STRAIGHT = 0.62;
 const BENDS_LESS = 8;
 /** Rails nearer to each other than this part of the drawing are one line to the eye. */
 const ONE_LINE = 0.004;
-
-/** A place is two nodes, one for each direction of travel: the even one, and the odd one. */
-export const placeOf = (node) => node >> 1;
-/** +1 if a node is passed in the direction of its place's first name, −1 otherwise. */
-export const senseOf = (node) => (node % 2 ? -1 : 1);
 
 /**
  * A layout as it is drawn: `points` by place, and by the number of each edge's rail the points of its curve, in the direction of

@@ -2,7 +2,7 @@
 // track beside it.
 
 import { bezier } from "./plan_curve.js";
-import { placeOf, senseOf } from "./plan.js";
+import { placeOf, senseOf } from "./places.js";
 
 /** A rail is drawn at least so long, as a part of all rails, so that it can be seen. */
 const LEAST_PART = 0.02;
@@ -44,7 +44,7 @@ class Drawing {
       const main = this.#mainLine(start);
       if (main.way.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
       this.#lanes = new Map();
-      this.#base = new Base(main.way.map((edge) => this.#long(edge)), main.isRound, main.way.map(({ from }) => from));
+      this.#base = new Base(main.way.map((edge) => this.#long(edge)), main.isRound);
       this.#base.top = top;
       this.#placeMain(main);
       for (let track = this.#nextTrack(); track; track = this.#nextTrack()) this.#placeTrack(track);
@@ -222,16 +222,16 @@ const pointOf = (curve, part) => {
 class Base {
   top = 0; long; gap; #isRound; #straight; #radius; #shift = 0;
 
-  constructor(lengths, isRound, nodes) {
+  constructor(lengths, isRound) {
     this.long = lengths.reduce((sum, mm) => sum + mm, 0);
     this.gap = GAP_PART * this.long;
     this.#isRound = isRound;
     this.#straight = STRAIGHT_PART * this.long;
     this.#radius = (this.long - 2 * this.#straight) / (2 * Math.PI);
-    if (isRound) this.#turnTo(lengths, nodes);
+    if (isRound) this.#turnTo(lengths);
   }
 
-  /** Turns the oval so that as many of its places as can be lie on the straights, and the first on the upper one. */
+  /** Turns the oval so that as many of its places as can be lie on the straights. */
   #turnTo(lengths) {
     let at = 0;
     const places = lengths.map((mm) => { const here = at; at += mm; return here; });

@@ -1,7 +1,8 @@
 // The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
 
 import { cut, between, nearest, written } from "./plan_curve.js";
-import { placeOf, planOf } from "./plan.js";
+import { planOf } from "./plan.js";
+import { placeOf } from "./places.js";
 import { say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -143,9 +144,12 @@ export class Track {
 
   /** Shows one moment. */
   show(picture) {
-    for (const { path, turnout, leg } of this.#blades) {
-      const lies = picture.turnouts[turnout];
-      path.setAttribute("class", `blade ${lies ? lies === leg ? "set" : "away" : "unknown"}`);
+    for (const blade of this.#blades) {
+      const lies = picture.turnouts[blade.turnout];
+      const look = lies ? lies === blade.leg ? "set" : "away" : "unknown";
+      if (look === blade.look) continue;
+      blade.look = look;
+      blade.path.setAttribute("class", `blade ${look}`);
     }
     for (const [key, spot] of this.#contacts) {
       if (typeof key === "string") spot.classList.remove("passed");
