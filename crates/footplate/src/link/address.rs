@@ -11,6 +11,7 @@ use footplate_sim::{BoardSwitches, Delivery, LawFamily, PhysicsRange};
 
 use super::board_address::BoardAddress;
 use super::port::Port;
+use super::stream::Cable;
 
 const SIMULATED: &str = "sim:";
 const SERIAL: &str = "marklin-serial:";
@@ -39,6 +40,17 @@ impl Address {
         match self {
             Self::Simulated(simulated) => Some(simulated),
             Self::Serial(_) | Self::Board(_) => None,
+        }
+    }
+}
+
+impl Address {
+    /// The cable to a station outside this program.
+    pub(crate) fn cable(&self) -> Option<Cable> {
+        match self {
+            Self::Simulated(_) => None,
+            Self::Serial(serial) => Some(serial.into()),
+            Self::Board(board) => Some(board.into()),
         }
     }
 }

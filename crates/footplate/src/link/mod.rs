@@ -31,7 +31,7 @@ mod stream;
 mod tapped;
 
 pub(crate) use address::{Address, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
-pub(crate) use line::{Heard, Link, Lost};
+pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use news::news_of;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
@@ -40,5 +40,5 @@ pub(crate) use served::{Incoming, Server, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::SimulatedStation;
 pub(crate) use station_session::StationSession;
-pub(crate) use stream::StreamLink;
+pub(crate) use stream::{Arrival, Cable, StreamLink};
 pub(crate) use tapped::{Passed, TappedLink};

@@ -7,7 +7,9 @@ use footplate_wire::dcc_ex;
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
-use super::{Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+use super::{Cable, Link, Lost, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+#[cfg(unix)]
+use crate::guardian::WardLink;
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
 /// 16 ms unless told otherwise.
@@ -24,9 +26,18 @@ pub(crate) fn open<'l>(
 ) -> anyhow::Result<Box<dyn Link + 'l>> {
     Ok(match address {
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
-        Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
-        Address::Board(board) => Box::new(StreamLink::open(board)?),
+        Address::Serial(serial) => open_cable(serial.into())?,
+        Address::Board(board) => open_cable(board.into())?,
     })
+}
+
+/// Opens a line outside this process, or has this program's guardian open it.
+fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
+    #[cfg(unix)]
+    if let Some(link) = WardLink::open(&cable)? {
+        return Ok(Box::new(link));
+    }
+    Ok(Box::new(StreamLink::open(cable)?))
 }
 
 /// The station of an address on its layout, in this process.
