@@ -4,6 +4,8 @@ mod clock;
 mod commands;
 mod counted;
 mod dashboard;
+#[cfg(unix)]
+mod guardian;
 mod layout_check;
 mod link;
 mod live_lines;
@@ -40,7 +42,12 @@ struct Footplate {
 fn main() -> ExitCode {
     // Not locked: the live view of a terminal is drawn from a thread of its own.
     let mut output = std::io::stdout();
-    let result = Footplate::parse().command.unwrap_or_default().run(&mut output).and_then(|outcome| {
+    let command = Footplate::parse().command.unwrap_or_default();
+    #[cfg(unix)]
+    if let Some(ended) = guarded(&command).transpose() {
+        return ended.unwrap_or_else(|error| failed(&error));
+    }
+    let result = command.run(&mut output).and_then(|outcome| {
         output.flush()?;
         Ok(outcome)
     });
@@ -48,11 +55,25 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FallsShort) => ExitCode::FAILURE,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::from(BAD_INPUT)
-        }
+        Err(error) => failed(&error),
     }
+}
+
+fn failed(error: &anyhow::Error) -> ExitCode {
+    eprintln!("error: {error:#}");
+    ExitCode::from(BAD_INPUT)
+}
+
+/// Whoever drives over a real line is watched by a guardian: this process becomes it and starts the program again, which
+/// finds its guardian here.
+///
+/// # Errors
+/// No guardian can be had.
+#[cfg(unix)]
+fn guarded(command: &Command) -> anyhow::Result<Option<ExitCode>> {
+    guardian::become_ward()?;
+    let Some(line) = command.guarded_line().filter(|_| !guardian::is_ward()) else { return Ok(None) };
+    guardian::keep(line.cable, line.restarts).map(Some)
 }
 
 /// Whether the reader of our output has seen enough, as `head` does.

@@ -41,6 +41,20 @@ impl Store {
         Self::open_with(path, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)
     }
 
+    /// Opens the store at `path` to read it, and changes nothing in it. One that an older Footplate made is brought up to date first.
+    pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
+        if !path.try_exists().unwrap_or(true) {
+            return Err(StoreError::Missing { file: path.to_owned() });
+        }
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection =
+            Connection::open_with_flags(path, flags).map_err(|error| StoreError::of(path, error))?;
+        let store = Self { path: path.to_owned(), connection };
+        store.set_up().map_err(|error| store.error(error))?;
+        let known = MIGRATIONS.len() as i64;
+        if store.version(known)? == known { Ok(store) } else { Self::open(path) }
+    }
+
     /// Opens the store at `path`, or makes an empty one there.
     pub fn open_or_create(path: &Path) -> Result<Self, StoreError> {
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
@@ -57,6 +71,11 @@ impl Store {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What makes the tables of a store, step by step.
+    pub(super) const fn migrations() -> &'static [&'static str] {
+        MIGRATIONS
     }
 
     /// Looks at every page and every reference, and says what is wrong. Takes as long as reading the file.
@@ -225,6 +244,24 @@ mod tests {
         )
         .unwrap();
         assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));
+    }
+
+    #[test]
+    fn a_store_that_is_read_is_not_changed() {
+        let folder = folder();
+        let path = folder.path().join("railway.db");
+        assert!(matches!(Store::open_to_read(&path), Err(StoreError::Missing { .. })));
+        drop(Store::open_or_create(&path).unwrap());
+        let before = std::fs::read(&path).unwrap();
+        let mut store = Store::open_to_read(&path).unwrap();
+        store.check().unwrap();
+        assert!(store.write().is_err() || store.connection.execute("DELETE FROM replays", []).is_err());
+        drop(store);
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+        // One of an older version cannot be read as it is.
+        let old = folder.path().join("old.db");
+        drop(Store::open_with(&old, FLAGS, &MIGRATIONS[..2]).unwrap());
+        assert!(Store::open_to_read(&old).unwrap().check().is_ok());
     }
 
     #[test]

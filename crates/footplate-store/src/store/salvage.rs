@@ -1,7 +1,11 @@
 //! What can still be read of a damaged store, copied into a new one.
 //!
 //! The damaged file is not touched: a copy of it is read, row after row by number, passing over rows whose page does not
-//! make sense any more. Events whose run or recording is lost get a stand-in, so that nothing readable is dropped.
+//! make sense any more. Then every page is looked at by itself for rows that the trees do not lead to any more. Events whose run
+//! or recording is lost get a stand-in, so that nothing readable is dropped.
+
+mod leaf_pages;
+mod strays;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,6 +13,8 @@ use std::path::{Path, PathBuf};
 use rusqlite::types::Value;
 use rusqlite::{Connection, Statement, Transaction, params_from_iter};
 
+use self::leaf_pages::Pages;
+use self::strays::Strays;
 use super::error::StoreError;
 use super::file::Store;
 
@@ -17,6 +23,21 @@ use super::file::Store;
 pub struct Salvaged {
     /// Table by table, in the order in which they depend on each other.
     pub tables: Vec<SalvagedTable>,
+    /// What is wrong with the damaged file; `None` if nothing is. Then more may be lost than the tables count: rows at the end
+    /// of a table leave no gap.
+    pub damage: Option<String>,
+    /// Rows that were found in pages by themselves and could belong to more than one table; they did not come over.
+    pub ambiguous: u64,
+}
+
+impl Salvaged {
+    /// Whether all that the damaged store held came over. As far as pages and numbers tell: a value that was bent into another one
+    /// that is possible cannot be told from it.
+    #[must_use]
+    pub fn is_all(&self) -> bool {
+        let is_lost = |table: &SalvagedTable| table.lost + table.stand_ins > 0;
+        self.damage.is_none() && self.ambiguous == 0 && !self.tables.iter().any(is_lost)
+    }
 }
 
 /// What came over of one table.
@@ -87,8 +108,9 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
     let fresh = folder.path().join("new.db");
     drop(Store::open_or_create(&fresh)?);
 
+    let damage = damage_of(&copy_of(damaged, folder.path())?);
     let copy = copy_of(damaged, folder.path())?;
-    let salvaged = match copy_rows(&copy, &fresh) {
+    let mut salvaged = match copy_rows(&copy, &fresh) {
         Ok(salvaged) if !salvaged.is_empty() => salvaged,
         // Without its first pages a file has lost the list of its tables; a new one has the same list.
         _ => {
@@ -101,8 +123,18 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
             salvaged
         }
     };
+    salvaged.damage = damage;
     fs::rename(&fresh, into).map_err(system(into, "write"))?;
     Ok(salvaged)
+}
+
+/// What is wrong with a store, if anything is.
+fn damage_of(copy: &Path) -> Option<String> {
+    let checked = Store::open(copy).and_then(|store| store.check());
+    checked.err().map(|error| match error {
+        StoreError::Damaged { what, .. } => what,
+        other => other.to_string(),
+    })
 }
 
 impl Salvaged {
@@ -160,6 +192,10 @@ fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
 }
 
 fn copy_rows(copy: &Path, fresh: &Path) -> Result<Salvaged, StoreError> {
+    // What the journal holds belongs into the file, as far as that still works.
+    drop(Connection::open(copy).and_then(|copy| copy.execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")));
+    let bytes = fs::read(copy).map_err(system(copy, "read"))?;
+    let strays = Strays::new(Pages::of(&bytes)).map_err(|error| StoreError::of(fresh, error))?;
     let from = Connection::open(copy).map_err(|error| StoreError::of(copy, error))?;
     // Lets SQLite read a file that is shorter than its header says.
     from.pragma_update(None, "writable_schema", true).map_err(|error| StoreError::of(copy, error))?;
@@ -169,9 +205,16 @@ fn copy_rows(copy: &Path, fresh: &Path) -> Result<Salvaged, StoreError> {
     let most = fs::metadata(copy).map_or(0, |file| file.len() / LEAST_ROW_BYTES);
     let copied = TABLES
         .iter()
-        .map(|(name, parent)| copy_table(&from, &transaction, name, *parent, most))
+        .map(|(name, parent)| {
+            let mut table = copy_table(&from, &transaction, name, *parent, most)?;
+            strays.bring_home(&transaction, &mut table, *parent)?;
+            Ok(table)
+        })
         .collect::<rusqlite::Result<Vec<SalvagedTable>>>()
-        .and_then(|tables| transaction.commit().map(|()| Salvaged { tables }));
+        .and_then(|tables| {
+            let ambiguous = strays.ambiguous(&transaction)?;
+            transaction.commit().map(|()| Salvaged { tables, damage: None, ambiguous })
+        });
     copied.map_err(|error| StoreError::of(&path, error))
 }
 

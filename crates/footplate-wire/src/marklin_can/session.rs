@@ -343,7 +343,10 @@ impl Session for Client {
                 return Err(CommandError::Train { train, addresses: (*trains.start(), *trains.end()) });
             }
             Command::Turnout { turnout, .. } if !turnouts.contains(&turnout.0) => {
-                return Err(CommandError::Turnout { turnout, addresses: (*turnouts.start(), *turnouts.end()) });
+                return Err(CommandError::Turnout {
+                    turnout,
+                    addresses: (*turnouts.start(), *turnouts.end()),
+                });
             }
             _ => {}
         }
@@ -373,15 +376,8 @@ impl Session for Client {
         let stops = self.outstanding.due(true).map(|due| due.max(urgent));
         let others = self.outstanding.due(false).map(|due| due.max(paced));
         let release = self.solenoid.map(|powered| powered.release_at.max(urgent));
-        let times = [
-            usual,
-            stops,
-            others,
-            release,
-            self.silence.due(),
-            self.waiting_due(),
-            self.farewell.due(),
-        ];
+        let times =
+            [usual, stops, others, release, self.silence.due(), self.waiting_due(), self.farewell.due()];
         times.into_iter().flatten().filter(|at| *at > self.now).min()
     }
 

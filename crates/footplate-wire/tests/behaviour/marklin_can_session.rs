@@ -428,7 +428,8 @@ fn the_end_on_a_line_from_which_nothing_is_heard_stops_trains_at_once_and_takes_
     desk.client.handle_reopened(desk.now);
     desk.client.close(desk.now);
     desk.run_for(3_000);
-    let first = |message| desk.written.iter().find(|(_, other)| *other == message).expect("it is written").0 - began;
+    let first =
+        |message| desk.written.iter().find(|(_, other)| *other == message).expect("it is written").0 - began;
     assert!(first(drives(24, 0)) <= 20 && first(drives(58, 0)) <= 20, "{:?}", desk.written);
     assert!(first(Message::Stop(Uid::ALL)) <= 1_510, "{:?}", desk.written);
     assert!(!desk.client.closing().is_complete());

@@ -112,6 +112,10 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
+    pub(crate) const fn link(&self) -> Option<&Address> {
+        self.link.as_ref()
+    }
+
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         if let Some(series) = measured_by_hand(&self.from, "series of positions", PositionSeries::read)? {
             self.check_measured_by_hand("a series of positions", None)?;

@@ -3,9 +3,11 @@
 use std::io::Write;
 
 use super::{
-    calibrate, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
+    calibrate, clerk, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
     replay, report, serve, simulate, store,
 };
+
+use crate::link::Cable;
 
 /// Makes the list of verbs from the names of their files.
 macro_rules! verbs {
@@ -32,6 +34,7 @@ macro_rules! verbs {
 
 verbs! {
     Calibrate: calibrate,
+    Clerk: clerk,
     Compare: compare,
     Completions: completions,
     Convert: convert,
@@ -47,6 +50,27 @@ verbs! {
     Serve: serve,
     Simulate: simulate,
     Store: store,
+}
+
+/// A line outside this program over which trains are driven.
+pub(crate) struct GuardedLine {
+    pub(crate) cable: Cable,
+    /// Whether a program that dies is started again.
+    pub(crate) restarts: bool,
+}
+
+impl Command {
+    /// The line that trains are driven over, where somebody has to stop them if this program dies. A simulated railway ends
+    /// with its program, and `doctor` moves no train.
+    pub(crate) fn guarded_line(&self) -> Option<GuardedLine> {
+        let (link, restarts) = match self {
+            Self::Calibrate(arguments) => (arguments.link()?, false),
+            Self::Drive(arguments) => (arguments.link(), false),
+            Self::Serve(arguments) => (arguments.link(), arguments.restarts()),
+            _ => return None,
+        };
+        Some(GuardedLine { cable: link.cable()?, restarts })
+    }
 }
 
 impl Default for Command {

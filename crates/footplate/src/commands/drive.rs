@@ -114,7 +114,17 @@ pub(crate) struct Railway {
     turnouts: Vec<(TurnoutId, Leg)>,
 }
 
+impl Railway {
+    pub(super) const fn link(&self) -> &Address {
+        &self.link
+    }
+}
+
 impl Arguments {
+    pub(crate) const fn link(&self) -> &Address {
+        &self.railway.link
+    }
+
     /// Drives for browsers and programs alone.
     pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
         Self {
@@ -137,6 +147,8 @@ impl Arguments {
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
         let stop = |store: &Store| stop_left_running(&self.railway.link, layout, store, pace);
         let opened = store.as_ref().map(stop).transpose()?.flatten();
+        // Nothing is written to a damaged store: it would bury what can still be salvaged.
+        store.as_ref().map_or(Ok(()), Store::check)?;
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
         if let Some(simulated) = self.railway.link.simulated() {
             named.extend(&simulated.trains);

@@ -5,6 +5,7 @@
 //! `command.rs`. A verb writes its result to `output` and what it has to say about itself to standard error.
 
 mod calibrate;
+mod clerk;
 mod command;
 mod compare;
 mod completions;
@@ -29,4 +30,6 @@ mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
 #[cfg(test)]
-pub(crate) use serve::{archive_routes, odometry_routes, slide_routes};
+pub(crate) use serve::{Desk, archive_routes, odometry_routes, slide_routes};
+#[cfg(test)]
+pub(crate) use written_layout::WrittenLayout;

@@ -24,7 +24,7 @@ use super::plot::PictureFile;
 use super::web_page::Language;
 use recording::{Mapped, OpenRecording, WalkedRecording};
 use results::Results;
-pub(super) use uploaded::uploaded_page;
+pub(super) use uploaded::{PassingFolder, uploaded_page};
 use walked::Walked;
 pub(super) use watched_slide::WatchedSlide;
 

@@ -81,7 +81,7 @@ fn seconds(text: &str) -> Result<Timestamp, String> {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let store = Store::open(&self.store)?;
+        let store = Store::open_to_read(&self.store)?;
         let machines = store.machines()?;
         let recordings = store.recordings(now())?;
         let page = Page { is_json: self.json, is_diff: self.diff };

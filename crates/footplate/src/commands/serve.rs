@@ -15,8 +15,10 @@ use super::Outcome;
 use super::drive;
 use super::written_layout::WrittenLayout;
 use crate::dashboard::{Dashboard, ServedAt, Token};
+use crate::link::Address;
 
-pub(crate) use archive::archive_routes;
+pub(crate) use archive::{StoreQuery, archive_routes};
+pub(crate) use desk::{Desk, Wished};
 pub(crate) use odometry_desk::odometry_routes;
 pub(crate) use slides::slide_routes;
 
@@ -34,6 +36,10 @@ pub(crate) struct Arguments {
     /// in the environment as FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
     #[arg(value_name = "ADDRESS", default_value = "")]
     at: ServedAt,
+    /// If the program dies, start it again once its trains are stopped. It knows what the store knows, and looks for its trains
+    /// anew.
+    #[arg(long)]
+    restart: bool,
     #[command(flatten)]
     railway: drive::Railway,
 }
@@ -50,13 +56,22 @@ pub(super) fn open_dashboard(
     let chosen = std::env::var("FOOTPLATE_TOKEN").ok().filter(|text| !text.is_empty());
     let token = chosen.as_deref().map(Token::chosen).transpose()?;
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
-    let more = archive_routes(store, &written.layout).and(odometry_routes()).and(slide_routes());
+    let desk = Desk::new();
+    let more = archive_routes(store, written, &desk).and(odometry_routes(&desk)).and(slide_routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
     eprintln!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)
 }
 
 impl Arguments {
+    pub(crate) const fn link(&self) -> &Address {
+        self.railway.link()
+    }
+
+    pub(crate) const fn restarts(&self) -> bool {
+        self.restart
+    }
+
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         drive::Arguments::served(self.railway, self.at).run(output)
     }

@@ -314,16 +314,17 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{archive_routes, odometry_routes, slide_routes};
+    use crate::commands::{Desk, WrittenLayout, archive_routes, odometry_routes, slide_routes};
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
         let guard = Guard::new(([127, 0, 0, 1], 80).into(), None);
         let shared =
             Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
-        let layout = footplate_store::layout_named("track-a").expect("built in").layout;
-        let routes =
-            own_routes(shared).and(archive_routes(None, &layout)).and(odometry_routes()).and(slide_routes());
+        let layout = WrittenLayout::named("track-a").expect("built in");
+        let desk = Desk::new();
+        let of_files = archive_routes(None, &layout, &desk).and(odometry_routes(&desk));
+        let routes = own_routes(shared).and(of_files).and(slide_routes());
         let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let described: BTreeSet<&str> =

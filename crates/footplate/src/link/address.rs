@@ -11,8 +11,9 @@ use footplate_core::{Ratio, TrainId};
 use footplate_sim::{BoardSwitches, CanSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
 
 use super::board_address::BoardAddress;
-use super::can_address::{self, CanAddress};
+use super::can_address::{self, CanAddress, CanPlace};
 use super::port::Port;
+use super::stream::Cable;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
@@ -48,6 +49,22 @@ impl Address {
         match self {
             Self::Simulated(simulated) => Some(simulated),
             Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) => None,
+        }
+    }
+}
+
+impl Address {
+    /// The cable to a station outside this program; datagrams need none.
+    pub(crate) fn cable(&self) -> Option<Cable> {
+        match self {
+            Self::Simulated(_) => None,
+            Self::Serial(serial) => Some(serial.into()),
+            Self::Board(board) => Some(board.into()),
+            Self::Can(can) => match &can.place {
+                CanPlace::Line(port) => Some((port, can.speed).into()),
+                CanPlace::Datagrams { .. } => None,
+            },
+            Self::Z21(_) => None,
         }
     }
 }

@@ -4,7 +4,7 @@ use footplate_core::{TimeSpan, Timestamp};
 
 /// How often people are asked for what they want while nothing else happens (ms): twice as often as a browser is shown a
 /// picture, so that fifty a second come out.
-pub(super) const PERSON_MS: f64 = 10.0;
+pub(crate) const PERSON_MS: f64 = 10.0;
 
 /// A line to a command station and the clock beside it.
 pub(crate) trait Link {
@@ -25,6 +25,32 @@ pub(crate) trait Link {
 
     /// Tries to open a lost line again.
     fn reopen(&mut self) -> Result<(), Lost>;
+
+    /// The guardian of this line, where another process holds it and stops the trains if this one dies.
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        None
+    }
+}
+
+/// A process that holds the line, seen from the one that drives trains.
+pub(crate) trait Guardian {
+    /// What is to be said to the station if this program dies, in place of what was said of that before.
+    fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost>;
+
+    /// Whether a train has been commanded to run: then a program that falls silent is as good as dead.
+    fn note_running(&mut self, runs: bool) -> Result<(), Lost>;
+
+    /// All is said: there is nothing left to stop.
+    fn say_goodbye(&mut self) -> Result<(), Lost>;
+}
+
+/// One part of what is said to a station after the death of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Bequest {
+    /// How long to wait before, by the station's clock.
+    pub(crate) after: TimeSpan,
+    /// What is put on the line then, in one piece.
+    pub(crate) bytes: Vec<u8>,
 }
 
 /// What came first while waiting.
@@ -73,6 +99,9 @@ impl<L: Link + ?Sized> Link for Box<L> {
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
     }
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        (**self).guardian()
+    }
 }
 
 impl<L: Link + ?Sized> Link for &mut L {
@@ -93,5 +122,8 @@ impl<L: Link + ?Sized> Link for &mut L {
     }
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
+    }
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        (**self).guardian()
     }
 }

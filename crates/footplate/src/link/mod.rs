@@ -37,7 +37,7 @@ mod z21_address;
 
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use datagrams::DatagramLink;
-pub(crate) use line::{Heard, Link, Lost};
+pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;
@@ -45,5 +45,5 @@ pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::SimulatedStation;
 pub(crate) use station_session::StationSession;
-pub(crate) use stream::StreamLink;
+pub(crate) use stream::{Arrival, Cable, StreamLink};
 pub(crate) use tapped::{Passed, TappedLink};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp};
 
 use super::rhythm::{PowerCommand, Rhythm};
-use super::{Heard, Link, Lost};
+use super::{Guardian, Heard, Link, Lost};
 use crate::clock::Stopwatch;
 use crate::tally::Tally;
 
@@ -135,5 +135,9 @@ impl<L: Link> Link for ObservedLink<L> {
 
     fn reopen(&mut self) -> Result<(), Lost> {
         self.link.reopen()
+    }
+
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        self.link.guardian()
     }
 }

@@ -10,7 +10,9 @@ use footplate_wire::{dcc_ex, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
 use super::can_address::{CanAddress, CanPlace};
-use super::{DatagramLink, Link, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+use super::{Cable, DatagramLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+#[cfg(unix)]
+use crate::guardian::WardLink;
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
 /// 16 ms unless told otherwise.
@@ -27,14 +29,23 @@ pub(crate) fn open<'l>(
 ) -> anyhow::Result<Box<dyn Link + 'l>> {
     Ok(match address {
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
-        Address::Serial(serial) => Box::new(StreamLink::open(serial)?),
-        Address::Board(board) => Box::new(StreamLink::open(board)?),
+        Address::Serial(serial) => open_cable(serial.into())?,
+        Address::Board(board) => open_cable(board.into())?,
         Address::Z21(z21) => Box::new(DatagramLink::open(z21)?),
         Address::Can(can) => match &can.place {
-            CanPlace::Line(port) => Box::new(StreamLink::open((port, can.speed))?),
+            CanPlace::Line(port) => open_cable((port, can.speed).into())?,
             CanPlace::Datagrams { .. } => Box::new(DatagramLink::open(can)?),
         },
     })
+}
+
+/// Opens a line outside this process, or has this program's guardian open it.
+fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
+    #[cfg(unix)]
+    if let Some(link) = WardLink::open(&cable)? {
+        return Ok(Box::new(link));
+    }
+    Ok(Box::new(StreamLink::open(cable)?))
 }
 
 /// The station of an address on its layout, in this process.

@@ -3,9 +3,10 @@
 //! A thread of its own waits for bytes and for the hand-shake line, so that the program can wait for them and for the
 //! time at once, to a fraction of a millisecond.
 
+use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
@@ -73,15 +74,54 @@ pub(crate) struct StreamLink {
 
 /// What is new when a line is opened again.
 struct Line {
-    writer: Box<dyn Write + Send>,
-    arrivals: Receiver<Arrival>,
-    cts: Option<bool>,
+    end: CableEnd,
+    arrivals: Receiver<Heard>,
 }
 
-enum Arrival {
-    Byte(u8),
+/// This computer's end of an open cable.
+pub(crate) struct CableEnd {
+    /// Where bytes are put on the line.
+    pub(crate) writer: Box<dyn Write + Send>,
+    /// Whether the station's hand-shake line is up; `None` where there is none that could be read.
+    pub(crate) cts: Option<bool>,
+}
+
+/// What a cable's listener hears.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Arrival<'a> {
+    /// Bytes from the station.
+    Bytes(&'a [u8]),
+    /// The hand-shake line is up or down now.
     Cts(bool),
-    Lost(String),
+    /// The line is gone; why.
+    Lost(&'a str),
+}
+
+impl Cable {
+    /// How many times faster than real time the station's clock runs.
+    pub(crate) const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Opens it. What arrives is given to `deliver` on a thread of its own, until that answers `false`.
+    ///
+    /// # Errors
+    /// When the port cannot be opened.
+    pub(crate) fn open(
+        &self,
+        deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
+    ) -> Result<CableEnd, Lost> {
+        match &self.port {
+            Port::Tcp { host, port } => connect(host, *port, deliver),
+            Port::Device(path) => open_device(path, self, deliver),
+        }
+    }
+}
+
+impl Display for Cable {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        self.port.fmt(f)
+    }
 }
 
 impl StreamLink {
@@ -92,13 +132,24 @@ impl StreamLink {
 }
 
 fn open(cable: &Cable) -> Result<Line, Lost> {
-    match &cable.port {
-        Port::Tcp { host, port } => connect(host, *port),
-        Port::Device(path) => open_device(path, cable),
-    }
+    let (sender, arrivals) = channel();
+    let port = cable.port.clone();
+    let end = cable.open(move |arrival| {
+        let sent = match arrival {
+            Arrival::Bytes(bytes) => bytes.iter().try_for_each(|byte| sender.send(Heard::Byte(*byte))),
+            Arrival::Cts(up) => sender.send(Heard::Cts(up)),
+            Arrival::Lost(why) => sender.send(Heard::Lost(Lost(format!("`{port}` is gone: {why}")))),
+        };
+        sent.is_ok()
+    })?;
+    Ok(Line { end, arrivals })
 }
 
-fn connect(host: &str, port: u16) -> Result<Line, Lost> {
+fn connect(
+    host: &str,
+    port: u16,
+    mut deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
+) -> Result<CableEnd, Lost> {
     let failed = |error: &dyn std::fmt::Display| {
         Lost(format!("cannot connect to {host}:{port}: {error}; check that the station's server runs there"))
     };
@@ -109,29 +160,35 @@ fn connect(host: &str, port: u16) -> Result<Line, Lost> {
     stream.set_nodelay(true).map_err(|error| failed(&error))?;
     stream.set_write_timeout(Some(WRITE_WITHIN)).map_err(|error| failed(&error))?;
     let mut reader = stream.try_clone().map_err(|error| failed(&error))?;
-    let (sender, arrivals) = channel();
     std::thread::spawn(move || {
         let mut bytes = [0; 64];
         loop {
             match reader.read(&mut bytes) {
                 Ok(0) => {
-                    return drop(sender.send(Arrival::Lost("the connection was closed".into())));
+                    let _ = deliver(Arrival::Lost("the connection was closed"));
+                    return;
                 }
                 Ok(count) => {
-                    let all = bytes.iter().take(count).try_for_each(|b| sender.send(Arrival::Byte(*b)));
-                    if all.is_err() {
+                    if !deliver(Arrival::Bytes(bytes.get(..count).unwrap_or_default())) {
                         return;
                     }
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return drop(sender.send(Arrival::Lost(error.to_string()))),
+                Err(error) => {
+                    let _ = deliver(Arrival::Lost(&error.to_string()));
+                    return;
+                }
             }
         }
     });
-    Ok(Line { writer: Box::new(stream), arrivals, cts: None })
+    Ok(CableEnd { writer: Box::new(stream), cts: None })
 }
 
-fn open_device(path: &str, cable: &Cable) -> Result<Line, Lost> {
+fn open_device(
+    path: &str,
+    cable: &Cable,
+    deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
+) -> Result<CableEnd, Lost> {
     let failed = |error: &serialport::Error| {
         Lost(format!(
             "cannot open `{path}`: {error}; check the cable, the name of the port and that you may use it"
@@ -153,37 +210,45 @@ fn open_device(path: &str, cable: &Cable) -> Result<Line, Lost> {
         )));
     }
     let reader = port.try_clone().map_err(|error| failed(&error))?;
-    let (sender, arrivals) = channel();
-    std::thread::spawn(move || listen(reader, cts, &sender));
-    Ok(Line { writer: Box::new(port), arrivals, cts })
+    std::thread::spawn(move || listen(reader, cts, deliver));
+    Ok(CableEnd { writer: Box::new(port), cts })
 }
 
-fn listen(mut port: Box<dyn SerialPort>, mut cts: Option<bool>, sender: &Sender<Arrival>) {
+fn listen(
+    mut port: Box<dyn SerialPort>,
+    mut cts: Option<bool>,
+    mut deliver: impl FnMut(Arrival<'_>) -> bool,
+) {
     let mut bytes = [0; 64];
     loop {
-        let mut arrived = Ok(());
+        let mut goes_on = true;
         match port.read(&mut bytes) {
             // A pseudo-terminal whose other end is gone reads nothing, at once and for ever.
-            Ok(0) => arrived = sender.send(Arrival::Lost("the other end has gone".into())),
-            Ok(count) => {
-                arrived = bytes.iter().take(count).try_for_each(|byte| sender.send(Arrival::Byte(*byte)));
+            Ok(0) => {
+                let _ = deliver(Arrival::Lost("the other end has gone"));
+                return;
             }
+            Ok(count) => goes_on = deliver(Arrival::Bytes(bytes.get(..count).unwrap_or_default())),
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(error) => {
-                return drop(sender.send(Arrival::Lost(error.to_string())));
+                let _ = deliver(Arrival::Lost(&error.to_string()));
+                return;
             }
         }
         if cts.is_some() {
             match port.read_clear_to_send() {
                 Ok(up) if cts != Some(up) => {
                     cts = Some(up);
-                    arrived = arrived.and(sender.send(Arrival::Cts(up)));
+                    goes_on &= deliver(Arrival::Cts(up));
                 }
                 Ok(_) => {}
-                Err(error) => return drop(sender.send(Arrival::Lost(error.to_string()))),
+                Err(error) => {
+                    let _ = deliver(Arrival::Lost(&error.to_string()));
+                    return;
+                }
             }
         }
-        if arrived.is_err() {
+        if !goes_on {
             return;
         }
     }
@@ -195,7 +260,7 @@ impl Link for StreamLink {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        let written = self.line.writer.write_all(bytes).and_then(|()| self.line.writer.flush());
+        let written = self.line.end.writer.write_all(bytes).and_then(|()| self.line.end.writer.flush());
         written.map_err(|error| Lost(format!("cannot write to `{}`: {error}", self.cable.port)))
     }
 
@@ -207,12 +272,12 @@ impl Link for StreamLink {
             Err(_) => self.line.arrivals.recv_timeout(Duration::from_secs_f64(span_s)),
         };
         match heard {
-            Ok(Arrival::Byte(byte)) => Heard::Byte(byte),
-            Ok(Arrival::Cts(up)) => {
-                self.line.cts = Some(up);
-                Heard::Cts(up)
+            Ok(heard) => {
+                if let Heard::Cts(up) = heard {
+                    self.line.end.cts = Some(up);
+                }
+                heard
             }
-            Ok(Arrival::Lost(why)) => Heard::Lost(Lost(format!("`{}` is gone: {why}", self.cable.port))),
             Err(RecvTimeoutError::Timeout) => Heard::Nothing,
             Err(RecvTimeoutError::Disconnected) => {
                 Heard::Lost(Lost(format!("`{}` is gone", self.cable.port)))
@@ -221,7 +286,7 @@ impl Link for StreamLink {
     }
 
     fn cts(&self) -> Option<bool> {
-        self.line.cts
+        self.line.end.cts
     }
 
     fn patience(&self) -> TimeSpan {

@@ -2,7 +2,7 @@
 
 use footplate_core::{TimeSpan, Timestamp};
 
-use super::{Heard, Link, Lost};
+use super::{Guardian, Heard, Link, Lost};
 
 /// One byte that passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,5 +64,9 @@ impl<L: Link> Link for TappedLink<L> {
 
     fn reopen(&mut self) -> Result<(), Lost> {
         self.link.reopen()
+    }
+
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        self.link.guardian()
     }
 }

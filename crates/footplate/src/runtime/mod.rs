@@ -4,11 +4,13 @@
 //! run         bytes in, bytes out, entries written down before the machine sees them
 //! attendant   who watches it: notices to people, orders from them
 //! ending      trains are commanded to stop, whatever ends it; what could not be confirmed is said
+//! last_will   what a guardian says to the station if this program dies
 //! stop_flag   Ctrl-C and the signals that end a program
 //! ```
 
 mod attendant;
 mod ending;
+mod last_will;
 mod run;
 mod stop_flag;
 

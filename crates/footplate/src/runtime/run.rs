@@ -8,6 +8,7 @@ use footplate_wire::{Closing, LinkNotice, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
 use super::ending::{Ended, REOPEN_WITHIN_S, SECOND_CHANCE, WITHIN};
+use super::last_will::LastWill;
 use super::stop_flag::StopFlag;
 use crate::clock::Stopwatch;
 use crate::link::{Heard, Link, Lost, StationSession};
@@ -30,6 +31,7 @@ pub(crate) struct Runtime<'r, L: Link> {
     /// Entries that are not written down yet; kept so that no byte costs an allocation.
     fresh: Vec<Event>,
     notices: Vec<LinkNotice>,
+    will: LastWill,
     is_closed: bool,
 }
 
@@ -52,7 +54,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             session.handle_cts(link.now(), up);
         }
         let (fresh, notices) = (Vec::new(), Vec::new());
-        Self { link, session, recorder, stop, fresh, notices, is_closed: false }
+        Self { link, session, recorder, stop, fresh, notices, will: LastWill::new(), is_closed: false }
     }
 
     /// The line.
@@ -185,15 +187,19 @@ impl<'r, L: Link> Runtime<'r, L> {
 
     /// Writes the session's bytes and gathers its entries and notices.
     fn write(&mut self) -> Result<(), Lost> {
+        self.will.keep(&self.session, &mut self.link)?;
         while let Some(output) = self.session.poll_output() {
             match output {
                 Transmit::Byte(byte) => self.link.write(&[byte])?,
                 Transmit::Message(bytes) => self.link.write(&bytes)?,
-                Transmit::Event(event) => self.fresh.push(event),
+                Transmit::Event(event) => {
+                    self.will.left(&event);
+                    self.fresh.push(event);
+                }
                 Transmit::Notice(notice) => self.notices.push(notice),
             }
         }
-        Ok(())
+        self.will.keep(&self.session, &mut self.link)
     }
 
     /// Asks the machine what it wants.
@@ -201,11 +207,10 @@ impl<'r, L: Link> Runtime<'r, L> {
         let now = self.link.now();
         while let Some(output) = machine.poll_output() {
             match output {
-                Output::Command(command) => {
-                    if let Err(error) = self.session.handle_command(now, command) {
-                        attendant.hear_of_refusal(now, command, error);
-                    }
-                }
+                Output::Command(command) => match self.session.handle_command(now, command) {
+                    Ok(()) => self.will.accepted(command),
+                    Err(error) => attendant.hear_of_refusal(now, command, error),
+                },
                 Output::HoldLine(until) => self.session.hold_line(until),
                 Output::Watch(sensor) => self.session.watch(sensor),
                 Output::Notice(notice) => attendant.hear(now, notice),
@@ -238,6 +243,12 @@ impl<'r, L: Link> Runtime<'r, L> {
         if !self.is_closed {
             self.is_closed = true;
             self.say_goodbye();
+            if self.session.closing().is_complete()
+                && let Some(guardian) = self.link.guardian()
+                && let Err(lost) = guardian.say_goodbye()
+            {
+                eprintln!("{lost}");
+            }
         }
         self.session.closing()
     }

@@ -3,6 +3,9 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+#[cfg(unix)]
+use crate::guardian::is_ward;
+
 /// How often somebody wanted the program to end.
 static ASKED: AtomicU32 = AtomicU32::new(0);
 static INSTALLED: OnceLock<bool> = OnceLock::new();
@@ -17,6 +20,10 @@ pub(crate) struct StopFlag(());
 impl StopFlag {
     /// From now on a signal does not end the program but raises the flag; a third one ends it at once.
     pub(crate) fn install() -> Self {
+        #[cfg(unix)]
+        if is_ward() {
+            return Self::install_saying("\nstopping all trains; a third signal leaves that to the guardian");
+        }
         Self::install_saying("\nstopping all trains; a third signal leaves them running")
     }
 
@@ -31,6 +38,11 @@ impl StopFlag {
             ctrlc::set_handler(handler).is_ok()
         });
         Self(())
+    }
+
+    /// The program itself wants to end, as if somebody had asked.
+    pub(crate) fn raise() {
+        ASKED.fetch_add(1, Ordering::Relaxed);
     }
 
     pub(crate) fn is_up(self) -> bool {

@@ -65,7 +65,12 @@ fn it_stops_there_over_every_line_whatever_that_does_to_frames() {
         assert!(station.address.starts_with(begins), "{}", station.address);
         let (run, stops) = driven(&folder, &station.address, &script);
         assert_eq!(stops.len(), 2, "{place}: {}", run.output);
-        assert!(stops.iter().all(|stop| stop["achieved"].is_string()), "{place}: {}{}", run.output, run.errors);
+        assert!(
+            stops.iter().all(|stop| stop["achieved"].is_string()),
+            "{place}: {}{}",
+            run.output,
+            run.errors
+        );
         let wrong = ["another throttle", "lost its power", "NOT commanded", "could not be read"];
         assert!(wrong.iter().all(|wrong| !run.errors.contains(wrong)), "{place}: {}", run.errors);
     }
@@ -73,10 +78,15 @@ fn it_stops_there_over_every_line_whatever_that_does_to_frames() {
 
 #[test]
 fn the_doctor_names_the_station_and_its_locomotives() {
-    let doctor = footplate(&["doctor", "--link", "sim:track-a?station=marklin-can", "--seconds", "20", "--json"]);
+    let doctor =
+        footplate(&["doctor", "--link", "sim:track-a?station=marklin-can", "--seconds", "20", "--json"]);
     assert_eq!(doctor.status, 0, "{}{}", doctor.output, doctor.errors);
     let figures: Value = serde_json::from_str(&doctor.output).expect("JSON");
-    assert_eq!((figures["contacts"].as_u64(), figures["lost_answers"].as_u64()), (Some(80), Some(0)), "{figures}");
+    assert_eq!(
+        (figures["contacts"].as_u64(), figures["lost_answers"].as_u64()),
+        (Some(80), Some(0)),
+        "{figures}"
+    );
     assert_eq!(figures["participants"].as_array().map(Vec::len), Some(2), "{figures}");
     assert_eq!(figures["locomotives"][0]["name"], "Train 24", "{figures}");
     assert_eq!(figures["locomotives"][0]["number"], 0x4018, "{figures}");

@@ -14,6 +14,7 @@ use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 use crate::board::calibrated;
+use crate::guardian::{child_of, signal};
 use crate::station::Standing;
 
 /// The command that takes the power from the track, which the stop sends.
@@ -115,6 +116,18 @@ impl Served {
     pub(crate) fn post(&self, path: &str, body: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).expect("a connection");
         send(&mut stream, &self.address, path, body).expect("an answer")
+    }
+}
+
+impl Served {
+    /// Ends the program and its guardian at once, as a power cut does.
+    pub(crate) fn cut_power(self) {
+        let driving = child_of(self.child.id());
+        // Neither notices the end of the other.
+        signal("STOP", self.child.id());
+        if let Some(driving) = driving {
+            signal("KILL", driving);
+        }
     }
 }
 

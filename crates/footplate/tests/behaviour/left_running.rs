@@ -1,4 +1,4 @@
-//! Trains that a killed session left running are stopped before the next session does anything else.
+//! Trains that a session left running, whose guardian died with it, are stopped before the next session does anything else.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -21,7 +21,7 @@ fn the_next_session_stops_what_a_killed_one_left_running() {
     let served = Served::with(&store, &link(&tap));
     assert!(served.post("/api/orders", "{\"line\": \"speed 24 8\"}").contains("202"));
     sleep(Duration::from_millis(500));
-    drop(served);
+    served.cut_power();
     let running = tap.said();
     let steps =
         |said: &str| said.split("<t 24 ").skip(1).map(|rest| rest.starts_with('0')).collect::<Vec<_>>();

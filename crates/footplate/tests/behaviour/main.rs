@@ -2,9 +2,9 @@
 //! promise, checked against trains whose truth is known.
 
 mod board;
-mod central_station;
 mod calibrate;
 mod calibrations_are_true;
+mod central_station;
 mod compare;
 mod demo;
 #[path = "../../../footplate-store/tests/behaviour/drawn_moments.rs"]
@@ -12,6 +12,7 @@ mod drawn_moments;
 mod drive;
 mod emergency_stop;
 mod forecasts_hold;
+mod guardian;
 mod inertial_slides;
 mod killed;
 mod layout;
@@ -39,6 +40,7 @@ mod simulated;
 mod station;
 mod store;
 mod two_sensor;
+mod uploads;
 mod usage;
 mod wheel_scales;
 mod z21;

@@ -67,7 +67,8 @@ impl Client {
                 continue;
             }
             // A list that was damaged on its way comes whole another time.
-            let most = if awaited == Awaited::Roster && self.roster.has_begun() { LIST_TRIES } else { MOST_TRIES };
+            let most =
+                if awaited == Awaited::Roster && self.roster.has_begun() { LIST_TRIES } else { MOST_TRIES };
             if tries >= most && due.may_be_given_up() {
                 if let Some(given_up) = self.given_up(awaited, command) {
                     return Some(given_up);
@@ -78,7 +79,12 @@ impl Client {
             if let Some(command) = command.filter(|_| tries > 1) {
                 self.notify(LinkNotice::Repeated { command });
             }
-            return Some(Outgoing { message, awaited: Some(awaited), command, tries: tries.saturating_add(1) });
+            return Some(Outgoing {
+                message,
+                awaited: Some(awaited),
+                command,
+                tries: tries.saturating_add(1),
+            });
         }
         None
     }

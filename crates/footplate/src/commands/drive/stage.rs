@@ -1,8 +1,8 @@
 //! Between the one who drives and the people in front of it: what they write goes in, what is said comes out.
 
-use std::io::{IsTerminal, Write};
+use std::io::{BufRead, IsTerminal, Read, Write};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
@@ -20,15 +20,34 @@ use crate::witness::{Input, Witnessed};
 /// No screen shows more often than this that a train has moved: fifty pictures a second.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(20);
 
-/// Lines that a person writes, as they come.
+/// The longest line that a person writes ...
+const LONGEST_LINE: u64 = 4_096;
+/// ... and how many wait to be carried out before no more are read.
+const LINES_WAITING: usize = 1_000;
+
+/// Lines that a person writes, as they come. Whatever is written, the memory of the program does not grow.
 pub(super) fn lines_of_stdin() -> Receiver<String> {
-    let (said, lines) = channel();
+    let (said, lines) = sync_channel(LINES_WAITING);
     // It ends with the input or with the program, whichever is first.
     thread::spawn(move || {
-        for line in std::io::stdin().lines() {
-            let Ok(line) = line else { return };
-            if said.send(line).is_err() {
-                return;
+        let mut input = std::io::stdin().lock();
+        let mut line = Vec::new();
+        let mut is_rest = false;
+        loop {
+            line.clear();
+            match (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut line) {
+                Ok(1..) => {}
+                _ => return,
+            }
+            let is_whole = line.ends_with(b"\n") || (line.len() as u64) < LONGEST_LINE;
+            let was_rest = std::mem::replace(&mut is_rest, !is_whole);
+            if is_whole && !was_rest {
+                let text = String::from_utf8_lossy(&line).trim_end().to_owned();
+                if said.send(text).is_err() {
+                    return;
+                }
+            } else if !was_rest {
+                eprintln!("a line is longer than {LONGEST_LINE} bytes: it is not read");
             }
         }
     });

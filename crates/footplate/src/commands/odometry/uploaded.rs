@@ -1,7 +1,7 @@
 //! A recording that somebody sent: walked as files are, and its page.
 
 use std::fs;
-use std::io::Write;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -21,9 +21,24 @@ static SENT: AtomicU32 = AtomicU32::new(0);
 const MOST_RUNS: usize = report::MOST_RUNS;
 
 /// A folder that is gone when nobody holds it any more.
-struct Passing(PathBuf);
+pub(crate) struct PassingFolder(PathBuf);
 
-impl Drop for Passing {
+impl PassingFolder {
+    /// # Errors
+    /// There is no room for it.
+    pub(crate) fn make() -> std::io::Result<Self> {
+        let number = SENT.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("footplate-{}-{number}", std::process::id()));
+        fs::create_dir(&folder)?;
+        Ok(Self(folder))
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for PassingFolder {
     fn drop(&mut self) {
         // Whoever cleans the folder of passing files will find what is left.
         let _ = fs::remove_dir_all(&self.0);
@@ -36,7 +51,7 @@ impl Drop for Passing {
 /// What is wrong with the recording or the vehicle, with its place.
 pub(crate) fn uploaded_page(
     name: &str,
-    bytes: &[u8],
+    bytes: &mut impl Read,
     vehicle: Option<&str>,
     language: Language,
 ) -> anyhow::Result<String> {
@@ -50,12 +65,9 @@ pub(crate) fn uploaded_page(
         bail!("`{name}` should be a recording whose name ends with .csv or .parquet");
     }
     // In a folder of its own, so that the file is called in messages as it was called where it came from.
-    let number = SENT.fetch_add(1, Ordering::Relaxed);
-    let folder = std::env::temp_dir().join(format!("footplate-{}-{number}", std::process::id()));
-    fs::create_dir(&folder).with_context(|| format!("making room for `{name}`"))?;
-    let folder = Passing(folder);
-    let file = folder.0.join(name);
-    fs::File::create_new(&file)?.write_all(bytes)?;
+    let folder = PassingFolder::make().with_context(|| format!("making room for `{name}`"))?;
+    let file = folder.path().join(name);
+    std::io::copy(bytes, &mut fs::File::create_new(&file)?)?;
     walked_page(&file, vehicle, has_vehicle, language).map_err(|error| {
         // Where it passed through is nobody's concern.
         let said = format!("{error:#}").replace(&file.display().to_string(), name);

@@ -22,15 +22,17 @@ use axum::routing::get;
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
 use footplate_store::{Batch, EventKey, MarkKind, RecordingKey, Store};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::desk::{Desk, Wished};
 use crate::clock::{now, rfc3339};
-use crate::commands::calibrate::Question;
+use crate::commands::calibrate;
+use crate::commands::clerk::Question;
 use crate::commands::replay::pictures;
 use crate::commands::report::store_report;
 use crate::commands::store::words;
+use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
 
 /// The most events that are marked at once: more than one hop, fewer than a session.
@@ -39,13 +41,14 @@ const MOST_MARKED: usize = 1_000;
 #[derive(Clone)]
 struct Archive {
     store: Option<Arc<PathBuf>>,
-    layout: Arc<Layout>,
+    layout: Arc<WrittenLayout>,
     desk: Desk,
 }
 
 /// The routes, over a store if the session has one.
-pub(crate) fn archive_routes(store: Option<PathBuf>, layout: &Layout) -> Routes {
-    let archive = Archive { store: store.map(Arc::new), layout: Arc::new(layout.clone()), desk: Desk::new() };
+pub(crate) fn archive_routes(store: Option<PathBuf>, layout: &WrittenLayout, desk: &Desk) -> Routes {
+    let archive =
+        Archive { store: store.map(Arc::new), layout: Arc::new(layout.clone()), desk: desk.clone() };
     Routes::new(
         archive,
         [
@@ -59,16 +62,52 @@ pub(crate) fn archive_routes(store: Option<PathBuf>, layout: &Layout) -> Routes 
 }
 
 impl Archive {
-    async fn answer(
-        &self,
-        work: impl FnOnce(&Layout, Store) -> anyhow::Result<String> + Send + 'static,
-    ) -> Response {
-        let (store, layout) = (self.store.clone(), Arc::clone(&self.layout));
-        let Some(path) = store else {
+    async fn answer(&self, query: StoreQuery) -> Response {
+        let Some(path) = &self.store else {
             let says = "this session keeps nothing: begin it with `--store railway.db`";
             return (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response();
         };
-        self.desk.answer(move || work(&layout, Store::open(&path)?)).await
+        let question = Question::Store { path: path.to_path_buf(), layout: self.layout.text.clone(), query };
+        self.desk.answer(question).await
+    }
+}
+
+/// What is asked of the store.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) enum StoreQuery {
+    Recordings,
+    Pictures { recording: String },
+    Calibration { train: String, language: String },
+    Why { train: String, number: String },
+    Marks,
+    Mark(NewMark),
+}
+
+impl StoreQuery {
+    /// The answer, as text of JSON.
+    ///
+    /// # Errors
+    /// What is wrong with the question or the store.
+    pub(crate) fn answer(self, layout: &Layout, mut store: Store) -> anyhow::Result<String> {
+        match self {
+            Self::Recordings => listed(&store),
+            Self::Pictures { recording } => {
+                let wrong = || format!("`{recording}` is not the number of a recording");
+                pictures(&store, RecordingKey(recording.parse().with_context(wrong)?))
+            }
+            Self::Calibration { train, language } => {
+                store_report(layout, &store, train_of(&train)?, Wished::named(language).language())
+            }
+            Self::Why { train, number } => {
+                let question: calibrate::Question = number.parse().map_err(anyhow::Error::msg)?;
+                let batch = Batch::of_store(layout, &store, now(), Some(train_of(&train)?))?;
+                let mut text = Vec::new();
+                question.answer(layout, &batch, true, &mut text)?;
+                Ok(String::from_utf8(text)?)
+            }
+            Self::Marks => marked(layout, &store),
+            Self::Mark(new) => new.make(&mut store),
+        }
     }
 }
 
@@ -77,43 +116,33 @@ fn train_of(text: &str) -> anyhow::Result<TrainId> {
 }
 
 async fn recordings(State(archive): State<Archive>) -> Response {
-    archive
-        .answer(|_, store| {
-            let machines = store.machines()?;
-            let list: Vec<Value> = store
-                .recordings(now())?
-                .into_iter()
-                .map(|recording| {
-                    let own = || machines.iter().filter(|machine| machine.recording == recording.key);
-                    json!({
-                        "recording": recording.key.0,
-                        "name": recording.name,
-                        "layout": recording.layout,
-                        "stored_at": rfc3339(recording.stored_at),
-                        "events": recording.events,
-                        "excluded": recording.excluded,
-                        "machines": own().map(|machine| machine.kind.as_str()).collect::<Vec<_>>(),
-                        "inputs": own().map(|machine| machine.inputs).sum::<u64>(),
-                    })
-                })
-                .collect();
-            Ok(serde_json::to_string(&list)?)
+    archive.answer(StoreQuery::Recordings).await
+}
+
+fn listed(store: &Store) -> anyhow::Result<String> {
+    let machines = store.machines()?;
+    let list: Vec<Value> = store
+        .recordings(now())?
+        .into_iter()
+        .map(|recording| {
+            let own = || machines.iter().filter(|machine| machine.recording == recording.key);
+            json!({
+                "recording": recording.key.0,
+                "name": recording.name,
+                "layout": recording.layout,
+                "stored_at": rfc3339(recording.stored_at),
+                "events": recording.events,
+                "excluded": recording.excluded,
+                "machines": own().map(|machine| machine.kind.as_str()).collect::<Vec<_>>(),
+                "inputs": own().map(|machine| machine.inputs).sum::<u64>(),
+            })
         })
-        .await
+        .collect();
+    Ok(serde_json::to_string(&list)?)
 }
 
 async fn recorded_pictures(State(archive): State<Archive>, Path(recording): Path<String>) -> Response {
-    archive
-        .answer(move |_, store| {
-            let number = recording.parse().with_context(|| {
-                format!(
-                    "`{recording}` is not the number of a \
-                                                           recording"
-                )
-            })?;
-            pictures(&store, RecordingKey(number))
-        })
-        .await
+    archive.answer(StoreQuery::Pictures { recording }).await
 }
 
 async fn calibration(
@@ -121,56 +150,46 @@ async fn calibration(
     Path(train): Path<String>,
     Query(wished): Query<Wished>,
 ) -> Response {
-    archive
-        .answer(move |layout, store| store_report(layout, &store, train_of(&train)?, wished.language()))
-        .await
+    archive.answer(StoreQuery::Calibration { train, language: wished.into_name() }).await
 }
 
 async fn why(State(archive): State<Archive>, Path((train, number)): Path<(String, String)>) -> Response {
-    archive
-        .answer(move |layout, store| {
-            let question: Question = number.parse().map_err(anyhow::Error::msg)?;
-            let batch = Batch::of_store(layout, &store, now(), Some(train_of(&train)?))?;
-            let mut text = Vec::new();
-            question.answer(layout, &batch, true, &mut text)?;
-            Ok(String::from_utf8(text)?)
-        })
-        .await
+    archive.answer(StoreQuery::Why { train, number }).await
 }
 
 async fn marks(State(archive): State<Archive>) -> Response {
-    archive
-        .answer(|layout, store| {
-            let at = now();
-            let mut list = Vec::new();
-            for recording in store.recordings(at)?.into_iter().filter(|recording| recording.excluded > 0) {
-                let runs = store.runs(recording.key, at)?;
-                for event in runs.iter().flat_map(|run| &run.events).filter(|event| event.is_excluded()) {
-                    let mark = event.mark.as_ref();
-                    list.push(json!({
-                        "event": event.key.0,
-                        "recording": recording.name,
-                        "what": words(event.raw.event.kind, Some(layout)),
-                        "reason": mark.map(|mark| mark.reason.as_str()),
-                        "made_at": mark.map(|mark| rfc3339(mark.made_at)),
-                    }));
-                }
-            }
-            Ok(serde_json::to_string(&list)?)
-        })
-        .await
+    archive.answer(StoreQuery::Marks).await
+}
+
+fn marked(layout: &Layout, store: &Store) -> anyhow::Result<String> {
+    let at = now();
+    let mut list = Vec::new();
+    for recording in store.recordings(at)?.into_iter().filter(|recording| recording.excluded > 0) {
+        let runs = store.runs(recording.key, at)?;
+        for event in runs.iter().flat_map(|run| &run.events).filter(|event| event.is_excluded()) {
+            let mark = event.mark.as_ref();
+            list.push(json!({
+                "event": event.key.0,
+                "recording": recording.name,
+                "what": words(event.raw.event.kind, Some(layout)),
+                "reason": mark.map(|mark| mark.reason.as_str()),
+                "made_at": mark.map(|mark| rfc3339(mark.made_at)),
+            }));
+        }
+    }
+    Ok(serde_json::to_string(&list)?)
 }
 
 /// What somebody thinks of events.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct NewMark {
+pub(crate) struct NewMark {
     events: Vec<i64>,
     mark: Wanted,
     reason: String,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Wanted {
     Excluded,
@@ -186,21 +205,23 @@ async fn mark(State(archive): State<Archive>, body: Result<Json<NewMark>, JsonRe
             return (wrong.status(), Json(json!({ "error": says }))).into_response();
         }
     };
-    archive
-        .answer(move |_, mut store| {
-            if new.events.is_empty() || new.events.len() > MOST_MARKED {
-                bail!("{} events cannot be marked at once: 1 to {MOST_MARKED} can", new.events.len());
-            }
-            let events: Vec<EventKey> = new.events.into_iter().map(EventKey).collect();
-            let kind = match new.mark {
-                Wanted::Excluded => MarkKind::Excluded,
-                Wanted::Restored => MarkKind::Restored,
-            };
-            match kind {
-                MarkKind::Excluded => store.exclude(&events, &new.reason, now())?,
-                MarkKind::Restored => store.restore(&events, &new.reason, now())?,
-            }
-            Ok(json!({ "marked": events.len() }).to_string())
-        })
-        .await
+    archive.answer(StoreQuery::Mark(new)).await
+}
+
+impl NewMark {
+    fn make(self, store: &mut Store) -> anyhow::Result<String> {
+        if self.events.is_empty() || self.events.len() > MOST_MARKED {
+            bail!("{} events cannot be marked at once: 1 to {MOST_MARKED} can", self.events.len());
+        }
+        let events: Vec<EventKey> = self.events.into_iter().map(EventKey).collect();
+        let kind = match self.mark {
+            Wanted::Excluded => MarkKind::Excluded,
+            Wanted::Restored => MarkKind::Restored,
+        };
+        match kind {
+            MarkKind::Excluded => store.exclude(&events, &self.reason, now())?,
+            MarkKind::Restored => store.restore(&events, &self.reason, now())?,
+        }
+        Ok(json!({ "marked": events.len() }).to_string())
+    }
 }

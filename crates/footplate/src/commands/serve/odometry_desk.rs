@@ -9,9 +9,8 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::rejection::BytesRejection;
-use axum::extract::{DefaultBodyLimit, Path, Query, State};
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
@@ -19,7 +18,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::desk::{Desk, Wished};
-use crate::commands::odometry::uploaded_page;
+use crate::commands::clerk::Question;
 use crate::dashboard::Routes;
 
 /// The largest recording that is taken: an hour of two tachometers at 20 Hz is four megabytes as text.
@@ -44,15 +43,9 @@ struct OdometryDesk {
 }
 
 /// The routes.
-pub(crate) fn odometry_routes() -> Routes {
-    let desk = OdometryDesk { pages: Arc::default(), desk: Desk::new() };
-    Routes::new(
-        desk,
-        [
-            ("/api/odometry/{name}", post(walk).layer(DefaultBodyLimit::max(LARGEST))),
-            ("/api/odometry/pages/{number}", get(page)),
-        ],
-    )
+pub(crate) fn odometry_routes(desk: &Desk) -> Routes {
+    let desk = OdometryDesk { pages: Arc::default(), desk: desk.clone() };
+    Routes::new(desk, [("/api/odometry/{name}", post(walk)), ("/api/odometry/pages/{number}", get(page))])
 }
 
 /// The train that a recording is of.
@@ -68,29 +61,21 @@ async fn walk(
     Path(name): Path<String>,
     Query(wished): Query<Wished>,
     Query(of_train): Query<OfTrain>,
-    bytes: Result<Bytes, BytesRejection>,
+    body: Body,
 ) -> Response {
-    let bytes = match bytes {
-        Ok(bytes) => bytes,
-        Err(rejection) => {
-            let says = format!("{}; at most {} MB are taken", rejection.body_text(), LARGEST >> 20);
-            return (rejection.status(), Json(json!({ "error": says }))).into_response();
-        }
+    let question = Question::Recording { name, vehicle: of_train.vehicle, language: wished.into_name() };
+    let page = match desk.desk.ask(question, body, LARGEST).await {
+        Ok(page) => page,
+        Err(refusal) => return refusal.into_response(),
     };
-    let pages = Arc::clone(&desk.pages);
-    desk.desk
-        .answer(move || {
-            let page = uploaded_page(&name, &bytes, of_train.vehicle.as_deref(), wished.language())?;
-            let mut pages = pages.lock().unwrap_or_else(PoisonError::into_inner);
-            let number = pages.next;
-            pages.next += 1;
-            pages.kept.push_back((number, page.into()));
-            if pages.kept.len() > PAGES_KEPT {
-                pages.kept.pop_front();
-            }
-            Ok(json!({ "page": format!("/api/odometry/pages/{number}") }).to_string())
-        })
-        .await
+    let mut pages = desk.pages.lock().unwrap_or_else(PoisonError::into_inner);
+    let number = pages.next;
+    pages.next += 1;
+    pages.kept.push_back((number, page.into()));
+    if pages.kept.len() > PAGES_KEPT {
+        pages.kept.pop_front();
+    }
+    Json(json!({ "page": format!("/api/odometry/pages/{number}") })).into_response()
 }
 
 async fn page(State(desk): State<OdometryDesk>, Path(number): Path<String>) -> Response {

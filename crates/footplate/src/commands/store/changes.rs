@@ -31,7 +31,7 @@ impl Arguments {
     pub(super) fn run(self, store: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let after = self.after.map_or(Timestamp::from_ns(i64::MIN), |moment| moment.0);
         let until = self.until.map_or_else(now, |moment| moment.0);
-        for change in Store::open(store)?.changes(after, until)? {
+        for change in Store::open_to_read(store)?.changes(after, until)? {
             if self.json {
                 writeln!(output, "{}", value(&change))?;
             } else {

@@ -12,7 +12,7 @@ use crate::commands::Outcome;
 /// Copy what can be read of a damaged store into a new one. The damaged file is left as it is.
 #[derive(Args)]
 #[command(after_help = "Example: footplate store salvage --store railway.db --out salvaged.db\n\n\
-                  Exit status: 0 nothing is known to be lost, 1 something is, 2 nothing can be read.")]
+                  Exit status: 0 all is there, 1 something is lost or may be, 2 nothing can be read.")]
 pub(super) struct Arguments {
     /// The store to make.
     #[arg(long, value_name = "FILE")]
@@ -31,7 +31,13 @@ impl Arguments {
                 (table.name.to_owned(), counts)
             });
             let tables: Value = tables.collect::<serde_json::Map<_, _>>().into();
-            writeln!(output, "{}", json!({ "file": self.out, "tables": tables }))?;
+            writeln!(
+                output,
+                "{}",
+                json!({
+                    "file": self.out, "tables": tables, "damage": salvaged.damage, "ambiguous": salvaged.ambiguous,
+                })
+            )?;
         } else {
             writeln!(output, "{}", self.out.display())?;
             for table in &salvaged.tables {
@@ -44,8 +50,21 @@ impl Arguments {
                 }
                 writeln!(output)?;
             }
+            if salvaged.ambiguous > 0 {
+                writeln!(
+                    output,
+                    "  {} rows could belong to more than one table and did not come over",
+                    salvaged.ambiguous
+                )?;
+            }
+            if let Some(damage) = &salvaged.damage {
+                writeln!(
+                    output,
+                    "  the file is damaged ({damage}): rows at the end of a table may be lost without being counted, and \
+                     values may have changed"
+                )?;
+            }
         }
-        let lost = salvaged.tables.iter().any(|table| table.lost + table.stand_ins > 0);
-        Ok(if lost { Outcome::FallsShort } else { Outcome::Done })
+        Ok(if salvaged.is_all() { Outcome::Done } else { Outcome::FallsShort })
     }
 }

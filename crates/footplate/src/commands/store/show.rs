@@ -51,7 +51,7 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn run(self, path: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let store = Store::open(path)?;
+        let store = Store::open_to_read(path)?;
         store.check()?;
         let as_of = self.as_of.map_or_else(now, |moment| moment.0);
         let recordings = store.recordings(as_of)?;

@@ -1,0 +1,299 @@
+//! The guardian itself: starts its child, passes bytes, watches, and does the last will.
+
+use std::ffi::OsString;
+use std::io::{IoSlice, Write};
+use std::mem::MaybeUninit;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, ExitCode, ExitStatus};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::Context;
+use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags, sendmsg};
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
+
+use super::frame::{FrameReader, FrameWriter, Kind, MOST_BYTES, cts_byte};
+use super::held_line::{Ear, HeldLine};
+use super::signals::Signals;
+use super::voice::say;
+use super::ward::WARD;
+use crate::clock::Stopwatch;
+use crate::link::Cable;
+
+/// A child that drives trains and says nothing for so long is taken for dead (issue of trust: stops within 1 s).
+const LATE: Duration = Duration::from_millis(500);
+/// Before a child is started again.
+const RESTART_AFTER: Duration = Duration::from_secs(1);
+/// A child that dies sooner than this is not started again: it would die again.
+const LONG_ENOUGH: Duration = Duration::from_secs(10);
+/// Exit status of a program that a signal ended, as shells have it, without the number of the signal.
+const ENDED_BY_SIGNAL: u8 = 128;
+
+/// How a child left.
+enum Left {
+    /// It closed its side of the connection.
+    Gone,
+    /// It said nothing for too long.
+    Late,
+}
+
+/// What is known of a child.
+struct Watched {
+    /// What stops its trains.
+    will: Vec<u8>,
+    has_will: bool,
+    runs: bool,
+}
+
+/// Runs the program again as a child and holds its line. Returns when the child has ended and no train is left to be stopped.
+///
+/// # Errors
+/// When no child can be started.
+pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
+    let signals = Signals::listen().context("cannot listen to signals")?;
+    let modes = tcgetattr(std::io::stdin()).ok();
+    let ear: Ear = Arc::new(Mutex::new(None));
+    let mut line = HeldLine::new(cable, Arc::clone(&ear));
+    let mut watched = Watched { will: Vec::with_capacity(MOST_BYTES), has_will: false, runs: false };
+    loop {
+        let since = Stopwatch::start();
+        (watched.has_will, watched.runs) = (false, false);
+        let (mut child, stream) = start().context("cannot start the program that drives")?;
+        signals.pass_on_to(Some(child.id()));
+        let mut frames = FrameReader::new(stream.try_clone()?);
+        *ear.lock().unwrap_or_else(PoisonError::into_inner) = Some(FrameWriter::new(stream));
+        let left = watch(&mut frames, &mut line, &ear, &mut watched);
+        let was_late = matches!(left, Left::Late);
+        if was_late {
+            say(&format!(
+                "the program has said nothing for {} ms while trains run; it is ended",
+                LATE.as_millis()
+            ));
+            // It must not write any more, and cannot: only this process holds the line.
+            let _ = child.kill();
+        }
+        // The will comes before everything else, also before it is known how the child ended.
+        let died = watched.has_will;
+        let mut said = false;
+        if died {
+            signals.pass_on_to(None);
+            say("the program has left its trains; stopping all of them now");
+            said = line.carry_out(&watched.will, &signals);
+        }
+        signals.pass_on_to(Some(child.id()));
+        let ended = wait_for(&mut child)?;
+        signals.pass_on_to(None);
+        drop(ear.lock().unwrap_or_else(PoisonError::into_inner).take());
+        if died {
+            say(&what_happened(ended, was_late, said));
+            restore(modes.as_ref());
+        }
+        if !(restarts && died && said && !ended.success()) || signals.gives_up() {
+            return Ok(exit_code(ended));
+        }
+        if since.elapsed() < LONG_ENOUGH {
+            say(&format!("it ran for less than {} s and is not started again", LONG_ENOUGH.as_secs()));
+            return Ok(exit_code(ended));
+        }
+        say("the program is started again");
+        std::thread::sleep(RESTART_AFTER);
+    }
+}
+
+/// Starts the child. Its standard input is the connection until it has taken the real one from there.
+fn start() -> anyhow::Result<(Child, UnixStream)> {
+    let (here, there) = UnixStream::pair()?;
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let child = Command::new(std::env::current_exe()?)
+        .args(arguments)
+        .env(WARD, "1")
+        .stdin(OwnedFd::from(there))
+        .spawn()?;
+    let input = std::io::stdin();
+    let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
+    let mut passed = SendAncillaryBuffer::new(&mut space);
+    let input = [input.as_fd()];
+    passed.push(SendAncillaryMessage::ScmRights(&input));
+    sendmsg(&here, &[IoSlice::new(b"!")], &mut passed, SendFlags::empty())?;
+    Ok((child, here))
+}
+
+/// Serves a child until it is gone or late.
+fn watch(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, watched: &mut Watched) -> Left {
+    let tell = |kind, bytes: &[u8]| {
+        let mut ear = ear.lock().unwrap_or_else(PoisonError::into_inner);
+        // If it is gone, reading will say so.
+        let _ = ear.as_mut().map(|child| child.send(kind, bytes));
+    };
+    let mut heard = Stopwatch::start();
+    loop {
+        let left = watched.runs.then(|| LATE.saturating_sub(heard.elapsed()));
+        let (kind, payload) = match frames.next(left) {
+            Ok(Some(frame)) => frame,
+            Ok(None) if watched.runs && heard.elapsed() >= LATE => return Left::Late,
+            Ok(None) => continue,
+            Err(_) => return Left::Gone,
+        };
+        match kind {
+            Kind::Open => match line.open() {
+                Ok(cts) => tell(Kind::Opened, &[cts_byte(cts)]),
+                Err(lost) => tell(Kind::Lost, lost.0.as_bytes()),
+            },
+            Kind::Write => {
+                if let Err(lost) = line.write(payload) {
+                    tell(Kind::Lost, lost.0.as_bytes());
+                }
+            }
+            Kind::Will => {
+                watched.will.clear();
+                watched.will.extend_from_slice(payload);
+                watched.has_will = true;
+            }
+            Kind::Alive => watched.runs = payload == [1],
+            Kind::Goodbye => (watched.has_will, watched.runs) = (false, false),
+            // Only a guardian says these.
+            Kind::Opened | Kind::Heard | Kind::Cts | Kind::Lost => return Left::Gone,
+        }
+        heard = Stopwatch::start();
+    }
+}
+
+/// A child that closed the connection and does not end is ended: it has nothing left to drive with.
+fn wait_for(child: &mut Child) -> anyhow::Result<ExitStatus> {
+    const WITHIN: Duration = Duration::from_secs(10);
+    const EVERY: Duration = Duration::from_millis(20);
+    let watch = Stopwatch::start();
+    while watch.elapsed() < WITHIN {
+        if let Some(ended) = child.try_wait()? {
+            return Ok(ended);
+        }
+        std::thread::sleep(EVERY);
+    }
+    let _ = child.kill();
+    Ok(child.wait()?)
+}
+
+fn what_happened(ended: ExitStatus, was_late: bool, said: bool) -> String {
+    let trains = if said {
+        "all trains are commanded to stop and the track power is switched off; this gives no confirmation: check that \
+         the trains are at rest"
+    } else {
+        "NO train could be commanded to stop: switch the track power off by hand"
+    };
+    match ended.signal() {
+        Some(_) if was_late => trains.to_owned(),
+        Some(signal) => format!("the program was ended by signal {signal}; {trains}"),
+        None => format!("the program has ended with status {}; {trains}", ended.code().unwrap_or_default()),
+    }
+}
+
+fn exit_code(ended: ExitStatus) -> ExitCode {
+    let code = ended.code().and_then(|code| u8::try_from(code).ok());
+    ExitCode::from(code.unwrap_or_else(|| {
+        ENDED_BY_SIGNAL.saturating_add(ended.signal().and_then(|signal| signal.try_into().ok()).unwrap_or(0))
+    }))
+}
+
+/// Gives a terminal back as it was, which a child that drew on it and died did not.
+fn restore(modes: Option<&Termios>) {
+    /// Leaves the other screen of a terminal and shows its cursor.
+    const PLAIN: &[u8] = b"\x1b[?1049l\x1b[?25h";
+    if let Some(modes) = modes {
+        let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, modes);
+        let _ = std::io::stdout().write_all(PLAIN).and_then(|()| std::io::stdout().flush());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+    use std::net::TcpListener;
+    use std::thread;
+
+    use footplate_core::TimeSpan;
+
+    use super::*;
+    use crate::guardian::ward_link::WardLink;
+    use crate::link::{Address, Heard, Link, StreamLink};
+
+    /// Bytes that are answered.
+    const TURNS: usize = 20_000;
+
+    /// A station that answers each byte with itself.
+    fn echo() -> Cable {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let place = listener.local_addr().expect("an address");
+        thread::spawn(move || {
+            for mut program in listener.incoming().flatten() {
+                program.set_nodelay(true).expect("an option of sockets");
+                thread::spawn(move || {
+                    let mut bytes = [0; 64];
+                    while let Ok(count @ 1..) = program.read(&mut bytes) {
+                        program.write_all(&bytes[..count]).expect("it listens");
+                    }
+                });
+            }
+        });
+        let address: Address = format!("marklin-serial:tcp://{place}").parse().expect("a link");
+        address.cable().expect("a cable")
+    }
+
+    /// Bytes that go to the station and come back, in µs, shortest first.
+    fn turns(link: &mut dyn Link) -> Vec<f64> {
+        let turn = |byte: usize| {
+            let watch = Stopwatch::start();
+            link.write(&[byte as u8]).expect("an open line");
+            let until = link.now() + TimeSpan::from_s(1.0);
+            assert!(matches!(link.wait(until), Heard::Byte(heard) if heard == byte as u8));
+            1e6 * watch.elapsed().as_secs_f64()
+        };
+        let mut turns: Vec<f64> = (0..TURNS).map(turn).collect();
+        turns.sort_by(f64::total_cmp);
+        turns
+    }
+
+    fn guarded(cable: &Cable) -> WardLink {
+        let (here, there) = UnixStream::pair().expect("a pair of sockets");
+        let cable_held = cable.clone();
+        thread::spawn(move || {
+            let ear: Ear = Arc::new(Mutex::new(Some(FrameWriter::new(here.try_clone().expect("a handle")))));
+            let mut line = HeldLine::new(cable_held, Arc::clone(&ear));
+            let mut watched = Watched { will: Vec::new(), has_will: false, runs: false };
+            watch(&mut FrameReader::new(here), &mut line, &ear, &mut watched);
+        });
+        WardLink::over(there.try_clone().expect("a handle"), there, cable.clone()).expect("a guardian")
+    }
+
+    #[test]
+    fn a_guardian_passes_bytes_in_both_directions_and_tells_of_a_line_that_goes() {
+        let cable = echo();
+        let mut link = guarded(&cable);
+        for byte in 0..=255 {
+            link.write(&[byte]).expect("an open line");
+            let until = link.now() + TimeSpan::from_s(10.0);
+            assert!(matches!(link.wait(until), Heard::Byte(heard) if heard == byte));
+        }
+        link.reopen().expect("it is there");
+        link.write(b"again").expect("an open line");
+        let until = link.now() + TimeSpan::from_s(10.0);
+        assert!(matches!(link.wait(until), Heard::Byte(b'a')));
+    }
+
+    #[test]
+    #[ignore = "measures: cargo nextest run -p footplate -E 'test(what_a_guardian_costs)' --run-ignored all --no-capture"]
+    fn what_a_guardian_costs() {
+        let cable = echo();
+        let direct = turns(&mut StreamLink::open(cable.clone()).expect("a line"));
+        let held = turns(&mut guarded(&cable));
+        for (name, share) in [("median", 0.5), ("p99", 0.99), ("p99.9", 0.999)] {
+            let of = |turns: &[f64]| turns[(share * (TURNS - 1) as f64) as usize];
+            println!(
+                "{name}: {:.0} µs there and back without a guardian, {:.0} µs with one",
+                of(&direct),
+                of(&held)
+            );
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What people say to a guardian by signals: it passes them on, and does not end before its trains are at rest.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+
+use rustix::process::{Pid, Signal, kill_process};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
+
+/// No child.
+const NONE: i32 = 0;
+
+/// Signals from now on.
+#[derive(Debug, Clone)]
+pub(super) struct Signals {
+    child: Arc<AtomicI32>,
+    gives_up: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// From now on no signal that a person or a system sends ends this process, except SIGKILL. A terminal sends its keys to the
+    /// child, too; what comes from elsewhere is passed on.
+    ///
+    /// # Errors
+    /// The system does not let this process listen.
+    pub(super) fn listen() -> std::io::Result<Self> {
+        let signals = Self { child: Arc::new(AtomicI32::new(NONE)), gives_up: Arc::default() };
+        let mut incoming = signal_hook::iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP])?;
+        let heard = signals.clone();
+        std::thread::spawn(move || incoming.forever().for_each(|signal| heard.hear(signal)));
+        Ok(signals)
+    }
+
+    fn hear(&self, signal: i32) {
+        let wanted = match signal {
+            SIGINT if has_terminal() => None,
+            SIGINT => Some(Signal::INT),
+            SIGTERM => Some(Signal::TERM),
+            SIGHUP => Some(Signal::HUP),
+            // Keys of a terminal, which the child has heard itself.
+            _ => None,
+        };
+        match Pid::from_raw(self.child.load(Ordering::Acquire)) {
+            Some(child) => {
+                // A child that has ended this moment hears nothing.
+                let _ = wanted.map(|signal| kill_process(child, signal));
+            }
+            None if matches!(signal, SIGINT | SIGTERM) => self.gives_up.store(true, Ordering::Release),
+            None => {}
+        }
+    }
+
+    /// Whose child is told; `None`: a signal that asks for the end means now that it is not waited for a lost line.
+    pub(super) fn pass_on_to(&self, child: Option<u32>) {
+        let child = child.and_then(|child| child.try_into().ok()).unwrap_or(NONE);
+        self.child.store(child, Ordering::Release);
+    }
+
+    /// Whether somebody does not want to wait any longer.
+    pub(super) fn gives_up(&self) -> bool {
+        self.gives_up.load(Ordering::Acquire)
+    }
+}
+
+/// Whether this process is in the foreground of a terminal, whose keys then reach its child as well.
+fn has_terminal() -> bool {
+    rustix::termios::tcgetpgrp(std::io::stdin()).is_ok_and(|group| group == rustix::process::getpgrp())
+}

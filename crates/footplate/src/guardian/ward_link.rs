@@ -1,0 +1,209 @@
+//! The line as a guardian's child sees it: every byte passes through the guardian, which is told that the child lives.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Result as IoResult};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
+use super::ward::connection;
+use crate::clock::Stopwatch;
+use crate::link::{Bequest, Cable, Guardian, Heard, Link, Lost, PERSON_MS, StreamLink};
+use crate::runtime::StopFlag;
+
+/// How often a guardian is told that its child lives: five times as often as it has to.
+const ALIVE_EVERY: Duration = Duration::from_millis(100);
+
+/// A line that a guardian holds.
+pub(crate) struct WardLink {
+    cable: Cable,
+    frames: FrameReader,
+    guardian: FrameWriter,
+    /// Bytes that came in one frame.
+    bytes: VecDeque<u8>,
+    cts: Option<bool>,
+    stopwatch: Stopwatch,
+    /// Since the guardian heard of this program.
+    spoken: Stopwatch,
+    runs: bool,
+    is_orphan: bool,
+    /// The line, held by this process after the guardian's death.
+    own: Option<StreamLink>,
+}
+
+impl WardLink {
+    /// Has the guardian open the line; `None` if there is no guardian.
+    ///
+    /// # Errors
+    /// When the line cannot be opened.
+    pub(crate) fn open(cable: &Cable) -> Result<Option<Self>, Lost> {
+        let unreached = |error| Lost(format!("cannot reach the guardian: {error}"));
+        let Some(stream) = connection().map_err(unreached)? else { return Ok(None) };
+        Self::over(stream.try_clone().map_err(unreached)?, stream, cable.clone()).map(Some)
+    }
+
+    /// The same over both ends of a connection to a guardian.
+    pub(super) fn over(reads: UnixStream, writes: UnixStream, cable: Cable) -> Result<Self, Lost> {
+        let mut link = Self {
+            cable,
+            frames: FrameReader::new(reads),
+            guardian: FrameWriter::new(writes),
+            bytes: VecDeque::new(),
+            cts: None,
+            stopwatch: Stopwatch::start(),
+            spoken: Stopwatch::start(),
+            runs: false,
+            is_orphan: false,
+            own: None,
+        };
+        link.have_opened()?;
+        link.stopwatch = Stopwatch::start();
+        Ok(link)
+    }
+
+    fn tell(&mut self, kind: Kind, bytes: &[u8]) -> Result<(), Lost> {
+        if self.is_orphan {
+            return Err(self.orphaned());
+        }
+        self.spoken = Stopwatch::start();
+        self.guardian.send(kind, bytes).map_err(|error| self.bereft(&error))
+    }
+
+    fn bereft(&mut self, error: &std::io::Error) -> Lost {
+        if error.kind() == ErrorKind::InvalidInput {
+            return Lost("so much cannot be said to a guardian at once".to_owned());
+        }
+        self.is_orphan = true;
+        self.orphaned()
+    }
+
+    fn orphaned(&self) -> Lost {
+        Lost(format!("the guardian that held `{}` has died", self.cable))
+    }
+
+    /// Waits until the guardian has opened the line, or could not.
+    fn have_opened(&mut self) -> Result<(), Lost> {
+        self.tell(Kind::Open, &[])?;
+        self.bytes.clear();
+        loop {
+            let answer = match self.frames.next(None) {
+                Ok(Some((Kind::Opened, payload))) => Ok(payload.first().copied().and_then(cts_of)),
+                Ok(Some((Kind::Lost, why))) => Err(Lost(String::from_utf8_lossy(why).into_owned())),
+                // Of an earlier opening.
+                Ok(_) => continue,
+                Err(error) => return Err(self.bereft(&error)),
+            };
+            self.spoken = Stopwatch::start();
+            self.cts = answer?;
+            return Ok(());
+        }
+    }
+
+    /// What comes first within a time.
+    fn hear(&mut self, within: Duration) -> IoResult<Heard> {
+        Ok(match self.frames.next(Some(within))? {
+            Some((Kind::Heard, bytes)) => {
+                self.bytes.extend(bytes);
+                self.bytes.pop_front().map_or(Heard::Nothing, Heard::Byte)
+            }
+            Some((Kind::Cts, up)) => {
+                let up = up == [1];
+                self.cts = Some(up);
+                Heard::Cts(up)
+            }
+            Some((Kind::Lost, why)) => Heard::Lost(Lost(String::from_utf8_lossy(why).into_owned())),
+            _ => Heard::Nothing,
+        })
+    }
+}
+
+impl Link for WardLink {
+    fn now(&self) -> Timestamp {
+        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed())
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        match &mut self.own {
+            Some(own) => own.write(bytes),
+            None => self.tell(Kind::Write, bytes),
+        }
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        if let Some(own) = &mut self.own {
+            // Its clock began later.
+            let span = until - Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed());
+            let until = own.now() + span;
+            return own.wait(until);
+        }
+        if let Some(byte) = self.bytes.pop_front() {
+            return Heard::Byte(byte);
+        }
+        loop {
+            let due = ALIVE_EVERY.saturating_sub(self.spoken.elapsed());
+            if due.is_zero()
+                && let Err(lost) = self.tell(Kind::Alive, &[self.runs.into()])
+            {
+                return Heard::Lost(lost);
+            }
+            let left_s = ((until - self.now()).as_s() / self.cable.speed()).max(0.0);
+            let due = ALIVE_EVERY.saturating_sub(self.spoken.elapsed());
+            match self.hear(Duration::from_secs_f64(left_s).min(due)) {
+                Ok(Heard::Nothing) if left_s > 0.0 => {}
+                Ok(heard) => return heard,
+                Err(error) => return Heard::Lost(self.bereft(&error)),
+            }
+        }
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.own.as_ref().map_or(self.cts, Link::cts)
+    }
+
+    fn patience(&self) -> TimeSpan {
+        TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed())
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        if let Some(own) = &mut self.own {
+            return own.reopen();
+        }
+        if !self.is_orphan {
+            return self.have_opened();
+        }
+        // Without a guardian no train runs: the line is opened to stop them.
+        self.own = Some(StreamLink::open(self.cable.clone())?);
+        StopFlag::raise();
+        eprintln!("without a guardian all trains are stopped, and the program ends");
+        Ok(())
+    }
+
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        if self.is_orphan { None } else { Some(self) }
+    }
+}
+
+impl Guardian for WardLink {
+    fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
+        let mut bytes = Vec::new();
+        for Bequest { after, bytes: part } in will {
+            let pause_us = (after.as_s() * 1e6 / self.cable.speed()).clamp(0.0, f64::from(u32::MAX));
+            bytes.extend((pause_us as u32).to_le_bytes());
+            bytes.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
+            bytes.extend(part);
+        }
+        self.tell(Kind::Will, &bytes)
+    }
+
+    fn note_running(&mut self, runs: bool) -> Result<(), Lost> {
+        self.runs = runs;
+        self.tell(Kind::Alive, &[runs.into()])
+    }
+
+    fn say_goodbye(&mut self) -> Result<(), Lost> {
+        self.runs = false;
+        self.tell(Kind::Goodbye, &[])
+    }
+}
