@@ -68,6 +68,11 @@ pub(super) trait WrittenScores {
     fn rates(&self) -> Vec<Rate>;
 }
 
+/// Who chose the seeds of a page.
+pub(super) const fn seeds_sentence(are_fresh: bool) -> &'static str {
+    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
+}
+
 impl ScoreForm {
     pub(super) fn write<S: WrittenScores>(self, scores: &S, output: &mut dyn Write) -> io::Result<()> {
         if self.rates {
@@ -78,8 +83,7 @@ impl ScoreForm {
         }
         if self.markdown {
             let head = scores.head();
-            let seeds = if head.contains(FRESH) { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS };
-            writeln!(output, "{head}\n{seeds}\n")?;
+            writeln!(output, "{head}\n{}\n", seeds_sentence(head.contains(FRESH)))?;
         }
         scores.write_text(output)
     }
