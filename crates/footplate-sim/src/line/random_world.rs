@@ -16,7 +16,7 @@ use super::gradients::Gradients;
 use super::kinds::Kind;
 use super::plan::Handle::{At, Keep};
 use super::plan::{Stage, Until};
-use super::recording::LineRun;
+use super::recording::{LineRun, LineTruth, WheelTruth};
 use super::resistance::GRAVITY;
 use super::run::{LineConditions, run};
 use super::setup::{Lay, Setup};
@@ -211,11 +211,14 @@ impl LineWorld {
         self.notes.join(", ")
     }
 
-    /// Whether what every level claims is true in it: not where rows are read late, or one burst of interference meets
-    /// both sensors.
+    /// Whether what every level claims is true in a run of it: not where rows are read late, where one burst of
+    /// interference meets both sensors, or where wheels slip on a train that rolls back against its traction.
     #[must_use]
-    pub fn claims_hold(&self) -> bool {
-        !matches!(self.setup.fault, Fault::Clock | Fault::Bursts)
+    pub fn claims_hold(&self, run: &LineRun) -> bool {
+        let rolls_back = |truth: &LineTruth| {
+            truth.speed.as_m_per_s() < 0.0 && truth.wheels.iter().any(|does| *does != WheelTruth::Rolling)
+        };
+        !matches!(self.setup.fault, Fault::Clock | Fault::Bursts) && !run.truth.iter().any(rolls_back)
     }
 
     /// Runs it, with the vehicle as an operator of a level knows it. The same seed gives the same bytes on every machine.
@@ -342,7 +345,6 @@ fn plateaus(powered: [bool; 2], notes: &mut Vec<String>, draws: &mut Draws) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::line::recording::WheelTruth;
 
     #[test]
     fn a_level_changes_what_is_known_and_nothing_that_happens() {

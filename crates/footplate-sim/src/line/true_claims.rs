@@ -18,8 +18,12 @@ const MARGIN_S: f64 = 1.0;
 /// least so much (m/s).
 const TURNS_PART: f64 = 0.002;
 const TURNS_M_PER_S: f64 = 0.02;
+/// No operator claims a release of more than two minutes.
+const LONGEST_RELEASE_S: f64 = 120.0;
 /// Efforts nearer to zero are none.
 const NO_EFFORT: f64 = 0.02;
+/// How long a full effort takes to fade by the gentlest limit of jerk of all trains (s).
+const COMMAND_FADES_S: f64 = 1.7;
 /// The creepage of which protection is claimed that one wheelset keeps below it; nothing is claimed beyond the longest
 /// time (s).
 const CREEPAGE: f64 = 0.1;
@@ -31,7 +35,7 @@ const PROTECTS_M_PER_S: f64 = 3.0;
 pub(crate) fn claim(run: &mut LineRun, level: LineLevel, times: &BrakeTimes) {
     let vehicle = &run.vehicle;
     let usual = BrakeCommand::cautious(vehicle.max_brake);
-    let release = release(run);
+    let release = release(run).max(fades(times));
     let largest = |one: Acceleration, other: Acceleration| if one > other { one } else { other };
     let known = vehicle.brake_command;
     let brake_command = match level {
@@ -65,6 +69,12 @@ fn build_up(of_design: TimeSpan, times: &BrakeTimes) -> TimeSpan {
     of_design + TimeSpan::from_s(times.dead[0] + 4.0 * times.fill)
 }
 
+/// How long a brake acts after its command ended: until it answers, until the command has faded, and until its cylinders
+/// are empty but for 2 %.
+fn fades(times: &BrakeTimes) -> TimeSpan {
+    TimeSpan::from_s((times.dead[1] + COMMAND_FADES_S + 4.0 * times.empty).ceil())
+}
+
 /// How long after the end of a command a wheel turned otherwise than the train, at most, with a margin.
 fn release(run: &LineRun) -> TimeSpan {
     let (mut since, mut longest) = ([f64::INFINITY; 2], 0.0_f64);
@@ -81,15 +91,19 @@ fn release(run: &LineRun) -> TimeSpan {
             *since = if acts { 0.0 } else { *since + passed };
         }
         let train = truth.speed.as_m_per_s();
-        let tolerated = TURNS_M_PER_S.max(TURNS_PART * train.abs());
+        if train < 0.0 {
+            // A train that rolls back is no test of its brake.
+            continue;
+        }
+        let tolerated = TURNS_M_PER_S.max(TURNS_PART * train);
         for wheel in truth.wheel_speeds {
-            let creep = (wheel.as_m_per_s() - train) * if train < 0.0 { -1.0 } else { 1.0 };
+            let creep = wheel.as_m_per_s() - train;
             let of =
                 if creep < -tolerated { Some(since[0]) } else { (creep > tolerated).then_some(since[1]) };
             longest = of.filter(|of| of.is_finite()).map_or(longest, |of| longest.max(of));
         }
     }
-    TimeSpan::from_s((longest * MARGIN + MARGIN_S).ceil())
+    TimeSpan::from_s((longest * MARGIN + MARGIN_S).ceil().min(LONGEST_RELEASE_S))
 }
 
 /// For how long both wheelsets crept at once, if protection ends that.

@@ -31,8 +31,9 @@ impl ScoredWorld {
     /// Runs and scores the world of a seed, as an operator of a level knows it.
     pub(super) fn new(seed: u64, level: LineLevel) -> anyhow::Result<Self> {
         let world = LineWorld::draw(seed);
-        let scores = WorldScores::of(&world.run(level))?;
-        Ok(Self { seed, level, notes: world.notes(), claims_hold: world.claims_hold(), scores })
+        let run = world.run(level);
+        let scores = WorldScores::of(&run)?;
+        Ok(Self { seed, level, notes: world.notes(), claims_hold: world.claims_hold(&run), scores })
     }
 
     /// Whether the truth left a guaranteed interval although all claims hold.
