@@ -15,12 +15,33 @@ const LATENCY_S: (f64, f64) = (0.008, 0.012);
 /// How often a balise is passed and not read (chosen: far more often than on a railway, to show what happens).
 const MISSED: f64 = 0.02;
 
+/// How well a place is known that is marked by hand or by satellites.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MarkAccuracy {
+    /// What is said of it (m, one standard deviation).
+    pub(crate) deviation: f64,
+    /// How often it is wrong, and between which amounts then (m).
+    pub(crate) wrong: f64,
+    pub(crate) wrong_by: (f64, f64),
+}
+
+impl MarkAccuracy {
+    /// How far a mark is off.
+    fn draw(&self, draws: &mut Draws) -> f64 {
+        let (least, most) = self.wrong_by;
+        let right = draws.normal_within(0.0, self.deviation, 3.0);
+        let wrong = draws.uniform(least..most) * if draws.chance(0.5) { 1.0 } else { -1.0 };
+        if draws.chance(self.wrong) { wrong } else { right }
+    }
+}
+
 /// The line's balises and the train's reader.
 #[derive(Debug, Clone)]
 pub(crate) struct Balises {
     /// The next one: where it is (m).
     next: f64,
     antenna: f64,
+    marks: Option<MarkAccuracy>,
     draws: Draws,
 }
 
@@ -40,9 +61,10 @@ pub(crate) enum Passed {
 
 impl Balises {
     /// Balises ahead of a place (m).
-    pub(crate) fn draw(place: f64, draws: &mut Draws) -> Self {
+    pub(crate) fn draw(place: f64, marks: Option<MarkAccuracy>, draws: &mut Draws) -> Self {
         let mut draws = draws.split();
         Self {
+            marks,
             next: place + draws.uniform(FIRST_M.0..FIRST_M.1),
             antenna: draws.normal_within(0.0, ANTENNA_M, 3.0),
             draws,
@@ -57,7 +79,11 @@ impl Balises {
         }
         let place = self.next;
         self.next += self.draws.uniform(APART_M.0..APART_M.1);
-        let surveyed = place + self.draws.normal_within(0.0, PLACE_M, 3.0);
+        let off = match &self.marks {
+            Some(marks) => marks.draw(&mut self.draws),
+            None => self.draws.normal_within(0.0, PLACE_M, 3.0),
+        };
+        let surveyed = place + off;
         let part = if to > from { ((reached - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
         let at = begins + part * (ends - begins) + self.draws.uniform(LATENCY_S.0..LATENCY_S.1);
         Some(if self.draws.chance(MISSED) { Passed::Missed } else { Passed::Read { place: surveyed, at } })
@@ -71,7 +97,7 @@ mod tests {
 
     #[test]
     fn balises_come_every_one_and_a_half_kilometres_and_are_where_the_map_has_them_to_a_metre() {
-        let mut balises = Balises::draw(0.0, &mut Draws::new(3, Purpose::Line));
+        let mut balises = Balises::draw(0.0, None, &mut Draws::new(3, Purpose::Line));
         let (mut read, mut missed) = (0, 0);
         for step in 0..4_000_000_u32 {
             // 0.5 m every 10 ms.

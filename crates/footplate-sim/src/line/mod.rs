@@ -17,6 +17,7 @@
 //!
 //! ```text
 //! scenario  normal_runs  slide_runs  fault_runs     named runs, drawn from a seed
+//! random_world  true_claims                      worlds drawn from ranges, and what is true of them
 //! service  kinds                                    any train on any line; the trains of scenarios
 //! setup  run  recording  diary  vehicle             the recorder reads; what comes out, what is claimed of the train
 //! tachometer  faults  balises  inertial_sensor      what is read
@@ -44,6 +45,7 @@ mod normal_runs;
 mod plan;
 mod profile;
 mod rail;
+mod random_world;
 mod recording;
 mod resistance;
 mod rotation;
@@ -59,6 +61,7 @@ mod stepped;
 mod tachometer;
 mod tractive_effort;
 mod train;
+mod true_claims;
 mod vehicle;
 mod world;
 
@@ -67,6 +70,7 @@ pub use journey::{Call, Journey, JourneyError, Moment, Work};
 pub use profile::{
     LineError, LineParts, LineProblem, LineProfile, STEEPEST_PER_MILLE, Stop, TIGHTEST_PER_MILLE,
 };
+pub use random_world::{LineLevel, LineWorld};
 pub use recording::{
     LineEnergy, LineEvent, LineEventKind, LineRun, LineSample, LineTruth, Turned, WheelSample, WheelTruth,
 };
@@ -77,4 +81,4 @@ pub use service::LineService;
 pub use stepped::Stepped;
 pub use tractive_effort::TractiveEffort;
 pub use train::{Brake, Train, TrainError};
-pub use vehicle::{LineBrake, LineVehicle, LineWheelset};
+pub use vehicle::{LineBrake, LineSlideProtection, LineVehicle, LineWheelset};

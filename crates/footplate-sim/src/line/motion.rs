@@ -10,7 +10,7 @@
 //! speed away until none is left, and then hold.
 
 use super::bogie::Bogie;
-use super::brake_cylinder::{BrakeCylinder, Valve};
+use super::brake_cylinder::{BrakeCylinder, BrakeTimes, CommandLine, Valve};
 use super::consist::Consist;
 use super::creep_force::Film;
 use super::gradients::Gradients;
@@ -51,6 +51,9 @@ pub(crate) struct Motion {
     slip_control: SlipControl,
     cylinders: [BrakeCylinder; 2],
     others: BrakeCylinder,
+    line: CommandLine,
+    motors: CommandLine,
+    brake_times: BrakeTimes,
     /// The effort after the limit of jerk.
     effort: f64,
     jerk: [f64; 2],
@@ -74,6 +77,7 @@ impl Motion {
         [place, speed]: [f64; 2],
         jerk: [f64; 2],
         protection: SlideProtection,
+        brake_times: BrakeTimes,
     ) -> Self {
         let wheel = |at: usize| Rotation {
             inertia: consist.rotating[at],
@@ -83,8 +87,11 @@ impl Motion {
             omega: speed / radii[at],
         };
         // A train that stands is held by its brake.
-        let (held, effort) =
-            if speed == 0.0 { (BrakeCylinder::settled(0.5), -0.5) } else { Default::default() };
+        let (held, line, effort) = if speed == 0.0 {
+            (BrakeCylinder::settled(0.5), CommandLine::settled(0.5), -0.5)
+        } else {
+            Default::default()
+        };
         Self {
             wheels: [wheel(0), wheel(1)],
             consist,
@@ -97,6 +104,9 @@ impl Motion {
             slip_control: SlipControl::new(speed.abs()),
             cylinders: [held; 2],
             others: held,
+            line,
+            motors: CommandLine::default(),
+            brake_times,
             effort,
             jerk,
             energy: LineEnergy::default(),
@@ -125,18 +135,19 @@ impl Motion {
         [gradients, curves]: &mut [Gradients; 2],
     ) {
         self.follow(command.effort, dt);
+        let driven = self.motors.step(dt, self.effort.max(0.0), [self.brake_times.motors, 0.0]);
         let direction = if command.backwards { -1.0 } else { 1.0 };
-        let pull = direction * self.consist.traction(self.effort.max(0.0), self.speed);
-        let pressure = (-self.effort).max(0.0);
+        let pull = direction * self.consist.traction(driven, self.speed);
+        let pressure = self.line.step(dt, (-self.effort).max(0.0), self.brake_times.dead);
         let speeds = self.wheel_speeds();
         let shares = self.slip_control.step(dt, speeds);
-        let valves = self.protection.step(dt, speeds, pressure > 0.0);
+        let valves = self.protection.step(dt, speeds, self.speed, pressure > 0.0);
         for (film, (behind, before)) in self.films.iter_mut().zip(self.consist.places) {
             *film = rail.at(self.place - behind, before);
         }
         let middle = self.place - 0.5 * self.consist.length;
         let weight = self.consist.mass * GRAVITY;
-        let others_pressure = self.others.step(dt, pressure, Valve::Apply);
+        let others_pressure = self.others.step(dt, pressure, Valve::Apply, &self.brake_times);
         let (pull_of_groups, brake_of_groups) = self.groups(rail, pull, others_pressure);
         let outer = Outer {
             pull: pull_of_groups,
@@ -144,7 +155,7 @@ impl Motion {
             brake: brake_of_groups,
             resistance: self.consist.resistance(self.speed) + weight * curves.at(middle),
         };
-        bogie.step(dt, self.consist.deceleration(pressure), speeds);
+        bogie.step(dt, self.consist.deceleration(pressure), self.effort, self.speed, speeds);
 
         let fine = self.is_near_limit(bogie);
         let steps = if fine { FINE_STEPS } else { 1 };
@@ -153,7 +164,8 @@ impl Motion {
             let mut torques = [Torques::default(); 2];
             for (at, torque) in torques.iter_mut().enumerate() {
                 let wheel = &self.wheels[at];
-                let pressure = bogie.brake(&mut self.cylinders[at], dt, pressure, valves[at]);
+                let pressure =
+                    bogie.brake(&mut self.cylinders[at], dt, pressure, valves[at], &self.brake_times);
                 let pull = if self.consist.powered[at] { shares[at] * pull } else { 0.0 };
                 *torque = bogie.torques(wheel, pull, self.consist.braking(pressure));
             }

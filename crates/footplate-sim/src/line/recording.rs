@@ -28,12 +28,15 @@ pub struct LineSample {
     pub time: Timestamp,
     /// What the two tachometers said.
     pub wheels: [WheelSample; 2],
-    /// The driver's command: −1 full brake, 0 nothing, 1 full traction, whichever way the train goes.
-    pub effort: f64,
+    /// The driver's command: −1 full brake, 0 nothing, 1 full traction, whichever way the train goes; absent where it is
+    /// not recorded.
+    pub effort: Option<f64>,
     /// Along the track from an inertial sensor, where the train has one.
     pub acceleration: Option<Acceleration>,
     /// A known place that was passed within the period, as far as the place where distance is zero.
     pub balise: Option<Length>,
+    /// How well that place is known, if that is stated (one standard deviation).
+    pub balise_deviation: Option<Length>,
 }
 
 /// What one tachometer said in one period.

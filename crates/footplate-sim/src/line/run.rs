@@ -44,21 +44,26 @@ impl Default for LineConditions {
 /// Runs what was set up.
 pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineConditions) -> LineRun {
     let LineConditions { teeth, period, exact_diameters, inertial_sensor } = conditions;
-    let wheelset = |is_powered| LineWheelset {
-        teeth,
+    let teeth = [teeth, setup.other_teeth.unwrap_or(teeth)];
+    let wheelset = |at: usize| LineWheelset {
+        teeth: teeth[at],
         diameter: Length::from_m(DIAMETER_M),
         diameter_tolerance: setup.diameter_tolerance,
-        is_powered,
+        is_powered: setup.powered[at],
     };
-    let wheelsets = setup.powered.map(wheelset);
+    let wheelsets = [0, 1].map(wheelset);
     let vehicle = LineVehicle::claimed(name, &setup, period, wheelsets);
 
     let mut of_faults = Draws::new(seed, Purpose::Faults);
     let mut channels = Channels::draw(setup.fault, vehicle.counter_modulus, &mut of_faults);
     let clock = (setup.fault == Fault::Clock).then_some(of_faults);
     let mut clock = RecorderClock { period, faults: clock };
+    let deviation = setup.marks.map(|marks| Length::from_m(marks.deviation));
+    let delay = (setup.command_delay / period.as_s()).round() as usize;
+    let is_recorded = |now: f64| !setup.command_lost.is_some_and(|[from, to]| from <= now && now < to);
+    let mut efforts = Vec::new();
     let rows = (setup.lasts / period.as_s()).round().max(1.0) as usize + 1;
-    let mut world = World::new(setup, seed, teeth, !exact_diameters, period.as_s());
+    let mut world = World::new(setup.clone(), seed, teeth, !exact_diameters, period.as_s());
     let begins_with = world.motion.moving();
 
     let mut samples = Vec::with_capacity(rows);
@@ -95,15 +100,17 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         });
         let real = world.truth(zero);
         diary.note(reading.stamp, now, &real, world.bogie.conduct());
+        efforts.push(world.command.effort);
         if reading.is_lost {
             continue;
         }
         samples.push(LineSample {
             time: reading.stamp,
             wheels,
-            effort: world.command.effort,
+            effort: is_recorded(now).then(|| efforts[row.saturating_sub(delay)]),
             acceleration: inertial_sensor.then_some(Acceleration::from_m_per_s2(sensed)),
             balise,
+            balise_deviation: deviation.filter(|_| balise.is_some()),
         });
         truth.push(real);
         arrived = arrived.or_else(|| world.steering.has_arrived().then_some(now));

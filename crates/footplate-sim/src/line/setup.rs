@@ -1,12 +1,15 @@
 //! What a scenario sets up before the world runs by itself.
 
+use super::balises::MarkAccuracy;
 use super::bogie::Conduct;
+use super::brake_cylinder::BrakeTimes;
 use super::consist::{Design, Placement};
 use super::creep_force::Film;
 use super::faults::Fault;
 use super::gradients::Gradients;
 use super::kinds::Kind;
 use super::plan::{Plan, Stage};
+use super::slide_protection::ProtectionStyle;
 use super::steering::Steering;
 use super::vehicle::BRAKE_TOLERANCE;
 
@@ -37,6 +40,15 @@ pub(crate) struct Setup {
     pub(crate) protected: [bool; 2],
     pub(crate) fault: Fault,
     pub(crate) has_balises: bool,
+    /// How well places are known that are marked instead; none if absent.
+    pub(crate) marks: Option<MarkAccuracy>,
+    /// Teeth of the second tachometer, where it has not as many as the first.
+    pub(crate) other_teeth: Option<u32>,
+    pub(crate) brake_times: BrakeTimes,
+    pub(crate) protection: ProtectionStyle,
+    /// How much later than it is given the command is recorded (s), and from when to when it is not recorded at all.
+    pub(crate) command_delay: f64,
+    pub(crate) command_lost: Option<[f64; 2]>,
     pub(crate) brake_tolerance: f64,
     /// When it ends (s), unless the driver has arrived before.
     pub(crate) lasts: f64,
@@ -85,6 +97,12 @@ impl Setup {
             protected: [true; 2],
             fault: Fault::None,
             has_balises: false,
+            marks: None,
+            other_teeth: None,
+            brake_times: BrakeTimes::default(),
+            protection: ProtectionStyle::OnOff,
+            command_delay: 0.0,
+            command_lost: None,
             brake_tolerance: BRAKE_TOLERANCE,
             lasts,
         }

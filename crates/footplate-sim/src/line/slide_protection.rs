@@ -34,17 +34,40 @@ const SLOWEST_M_PER_S: f64 = 1.4;
 /// How long no valve has to act until the slide is over (s).
 const OVER_S: f64 = 1.0;
 
+/// How a maker's protection works.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) enum ProtectionStyle {
+    /// Valves that are open, closed or let air out, from wheel speeds alone.
+    #[default]
+    OnOff,
+    /// Proportional valves that keep a creepage, with the speed of the ground from a radar.
+    Proportional {
+        /// The creepage that it keeps while the rail does not carry the brake.
+        creepage: f64,
+    },
+}
+
+/// A proportional protection lets pass this part of a full brake more for each m/s below its creepage, at once and for
+/// each second that this lasts.
+const PROPORTIONAL_PER_M_PER_S: f64 = 0.25;
+const PROPORTIONAL_PER_M: f64 = 0.25;
+/// The least speed difference that it keeps (m/s).
+const LEAST_KEPT_M_PER_S: f64 = 0.3;
+
 /// One wheelset as the protection sees it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Guarded {
     speed: f64,
     valve: Valve,
     released_for: f64,
+    /// What a proportional valve let pass lately, without what follows the speed at once.
+    passed: f64,
 }
 
 /// The control unit of the two measured wheelsets.
 #[derive(Debug, Clone)]
 pub(crate) struct SlideProtection {
+    style: ProtectionStyle,
     wheelsets: [Guarded; 2],
     works: [bool; 2],
     reference: f64,
@@ -61,9 +84,10 @@ pub(crate) struct SlideProtection {
 
 impl SlideProtection {
     /// A protection that acts on the wheelsets for which it works.
-    pub(crate) fn draw(works: [bool; 2], speed: f64, draws: &mut Draws) -> Self {
+    pub(crate) fn draw(works: [bool; 2], style: ProtectionStyle, speed: f64, draws: &mut Draws) -> Self {
         Self {
-            wheelsets: [Guarded { speed, ..Guarded::default() }; 2],
+            style,
+            wheelsets: [Guarded { speed, passed: 1.0, ..Guarded::default() }; 2],
             works,
             reference: speed,
             falls: draws.uniform(REFERENCE_M_PER_S2.0..REFERENCE_M_PER_S2.1),
@@ -83,8 +107,11 @@ impl SlideProtection {
         self.quiet_for < OVER_S
     }
 
-    /// The valves after `dt` more seconds, from the speeds of the wheels (m/s, either way).
-    pub(crate) fn step(&mut self, dt: f64, speeds: [f64; 2], braking: bool) -> [Valve; 2] {
+    /// The valves after `dt` more seconds, from the speeds of the wheels and of the train (m/s, either way).
+    pub(crate) fn step(&mut self, dt: f64, speeds: [f64; 2], train: f64, braking: bool) -> [Valve; 2] {
+        if let ProtectionStyle::Proportional { creepage } = self.style {
+            return self.keep(creepage, dt, speeds.map(f64::abs), train.abs(), braking);
+        }
         self.since_cycle += dt;
         // Half a nanosecond for rounding.
         if self.since_cycle >= CYCLE_S - 5e-10 {
@@ -98,6 +125,26 @@ impl SlideProtection {
             Valve::Apply if between_pulses => Valve::Hold,
             valve => valve,
         })
+    }
+
+    /// Keeps a creepage with proportional valves.
+    fn keep(&mut self, creepage: f64, dt: f64, speeds: [f64; 2], train: f64, braking: bool) -> [Valve; 2] {
+        let kept = LEAST_KEPT_M_PER_S.max(creepage * train);
+        let mut acts = false;
+        let valves = [0, 1].map(|at| {
+            let wheelset = &mut self.wheelsets[at];
+            if !braking || !self.works[at] || train < SLOWEST_M_PER_S {
+                wheelset.passed = 1.0;
+                return Valve::Apply;
+            }
+            let room = kept - (train - speeds[at]);
+            wheelset.passed = (wheelset.passed + PROPORTIONAL_PER_M * room * dt).clamp(0.0, 1.0);
+            let limit = (wheelset.passed + PROPORTIONAL_PER_M_PER_S * room).clamp(0.0, 1.0);
+            acts |= limit < 1.0;
+            if limit < 1.0 { Valve::Limit(limit) } else { Valve::Apply }
+        });
+        self.quiet_for = if acts { 0.0 } else { self.quiet_for + dt };
+        valves
     }
 
     fn cycle(&mut self, dt: f64, speeds: [f64; 2], braking: bool) {
@@ -141,7 +188,7 @@ impl SlideProtection {
         match wheelset.valve {
             Valve::Release => wheelset.released_for += dt,
             Valve::Apply => wheelset.released_for = 0.0,
-            Valve::Hold => {}
+            Valve::Hold | Valve::Limit(_) => {}
         }
     }
 
@@ -175,7 +222,7 @@ mod tests {
     use crate::draws::Purpose;
 
     fn protection(speed: f64) -> SlideProtection {
-        SlideProtection::draw([true; 2], speed, &mut Draws::new(1, Purpose::Motion))
+        SlideProtection::draw([true; 2], ProtectionStyle::OnOff, speed, &mut Draws::new(1, Purpose::Motion))
     }
 
     #[test]
@@ -183,7 +230,7 @@ mod tests {
         let mut protection = protection(20.0);
         let mut falls_behind = Valve::Apply;
         for step in 0..50 {
-            let [first, second] = protection.step(CYCLE_S, [20.0 - 0.1 * f64::from(step), 20.0], true);
+            let [first, second] = protection.step(CYCLE_S, [20.0 - 0.1 * f64::from(step), 20.0], 20.0, true);
             falls_behind = first;
             assert_ne!(second, Valve::Release);
         }
@@ -195,7 +242,7 @@ mod tests {
         for (speed, braking) in [(1.2, true), (20.0, false)] {
             let mut protection = protection(speed);
             for _ in 0..50 {
-                assert_eq!(protection.step(CYCLE_S, [0.0, speed], braking), [Valve::Apply; 2]);
+                assert_eq!(protection.step(CYCLE_S, [0.0, speed], speed, braking), [Valve::Apply; 2]);
             }
         }
     }
@@ -207,7 +254,7 @@ mod tests {
         let mut released = Vec::new();
         for _ in 0..1500 {
             let speed = protection.reference - 0.08 * protection.reference;
-            protection.step(CYCLE_S, [speed; 2], true);
+            protection.step(CYCLE_S, [speed; 2], 20.0, true);
             if let Some(at) = protection.releasing {
                 released.push(at);
             }

@@ -26,6 +26,8 @@ pub struct LineVehicle {
     pub independent: bool,
     /// What the brake command does when the rail carries it.
     pub brake_command: LineBrake,
+    /// What the slide protection does, where anything is claimed of it.
+    pub slide_protection: Option<LineSlideProtection>,
     /// After how many pulses a running counter begins again; as large as the counter's register.
     pub counter_modulus: i64,
 }
@@ -56,6 +58,18 @@ pub struct LineBrake {
     pub resistance: Acceleration,
     /// How long the brake takes from nothing to its full force, and back.
     pub build_up: TimeSpan,
+    /// How long after its command ends, brake or traction may still act on a wheel, and a wheel that slipped may take to
+    /// turn with the train again; what is usual if absent.
+    pub release: Option<TimeSpan>,
+}
+
+/// What slide and slip protection are claimed to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineSlideProtection {
+    /// At least one of the two measured wheelsets has no more creepage than this ...
+    pub creepage: f64,
+    /// ... but for times no longer than this.
+    pub longest: TimeSpan,
 }
 
 /// How much more than a train's design is claimed: its strength is drawn within 7 %.
@@ -92,7 +106,9 @@ impl LineVehicle {
                 gradient: hundredths(gradient),
                 resistance: hundredths(resistance),
                 build_up: TimeSpan::from_s(design.full_brake() / design.jerk + BUILD_UP_S),
+                release: None,
             },
+            slide_protection: None,
             counter_modulus: COUNTER_MODULUS,
         }
     }

@@ -47,7 +47,7 @@ pub(crate) struct World {
 
 impl World {
     /// The world of a setup, one period (s) before its first sample. Diameters are those believed unless they are drawn.
-    pub(crate) fn new(setup: Setup, seed: u64, teeth: u32, draws_diameters: bool, period: f64) -> Self {
+    pub(crate) fn new(setup: Setup, seed: u64, teeth: [u32; 2], draws_diameters: bool, period: f64) -> Self {
         let mut of_train = Draws::new(seed, Purpose::Train);
         let mut of_line = Draws::new(seed, Purpose::Line);
         let design = &setup.design;
@@ -57,19 +57,27 @@ impl World {
             let off = setup.diameter_tolerance * (common + of_train.uniform(-OFF_EACH..OFF_EACH));
             0.5 * DIAMETER_M * (1.0 + if draws_diameters { off } else { 0.0 })
         });
-        let mut tachometers = [0, 1].map(|_| Tachometer::draw(teeth, 0.0, &mut of_line));
+        let mut tachometers = teeth.map(|teeth| Tachometer::draw(teeth, 0.0, &mut of_line));
         if setup.fault == Fault::MissingTooth {
             let [first, second] = tachometers;
             tachometers = [first.without_a_tooth(), second];
         }
         // Drawn whether the run has them or not, so that one leaves the other as it is.
-        let balises = Balises::draw(setup.place, &mut of_line);
+        let balises = Balises::draw(setup.place, setup.marks, &mut of_line);
         let mut of_motion = Draws::new(seed, Purpose::Motion);
-        let protection = SlideProtection::draw(setup.protected, setup.speed, &mut of_motion);
+        let protection =
+            SlideProtection::draw(setup.protected, setup.protection, setup.speed, &mut of_motion);
         let jerk = [design.jerk / design.start(), design.jerk / design.full_brake()];
         let mut films = setup.films.into_iter();
         Self {
-            motion: Motion::new(consist, radii, [setup.place, setup.speed], jerk, protection),
+            motion: Motion::new(
+                consist,
+                radii,
+                [setup.place, setup.speed],
+                jerk,
+                protection,
+                setup.brake_times,
+            ),
             bogie: Bogie::new(setup.bogie, -period),
             steering: setup.steering,
             rail: Rail::draw(setup.base, &mut Draws::new(seed, Purpose::Track)),
@@ -77,7 +85,7 @@ impl World {
             next_film: films.next(),
             films,
             tachometers,
-            balises: Some(balises).filter(|_| setup.has_balises),
+            balises: Some(balises).filter(|_| setup.has_balises || setup.marks.is_some()),
             inertial_sensor: InertialSensor::draw(&mut of_line),
             passed: Vec::new(),
             command: Command { effort: 0.0, backwards: false },

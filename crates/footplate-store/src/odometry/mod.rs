@@ -5,6 +5,7 @@
 
 mod counted_way;
 mod detection;
+mod oracle;
 mod placed_run;
 mod result_rows;
 mod rival;
@@ -12,6 +13,7 @@ mod run;
 mod score;
 mod simulated;
 mod summary;
+mod world_score;
 
 pub use counted_way::{CountedWay, WayCounter};
 pub use result_rows::{LiveResult, ResultWriter};
@@ -20,3 +22,4 @@ pub use run::{OdometryRun, Preset, RunContext, RunScores};
 pub use score::OdometryScore;
 pub use simulated::{simulated_columns, simulated_rows, simulated_vehicle};
 pub use summary::{FlagCounts, ModeCounts, RunSummary};
+pub use world_score::{Phase, WorldOdometer, WorldScores, WorstMoment};

@@ -249,7 +249,7 @@ impl RunScores {
     }
 }
 
-fn claim(estimate: &MotionEstimate) -> Claim {
+pub(super) fn claim(estimate: &MotionEstimate) -> Claim {
     Claim {
         speed: estimate.speed,
         distance: estimate.distance,

@@ -1,10 +1,12 @@
 //! Simulated runs as odometers and recordings know them: what is believed of the train, what was read, and the truth.
 
 use footplate_core::odometry::wheels::{
-    Axle, BrakeCommand, Count, Direction, Period, Vehicle, VehicleError, WheelReading, Wheelset,
+    Axle, BrakeCommand, Count, Direction, Period, SlideProtection, Vehicle, VehicleError, WheelReading,
+    Wheelset,
 };
 use footplate_sim::line::{
-    LineBrake, LineRun, LineSample, LineTruth, LineVehicle, LineWheelset, Turned, WheelSample,
+    LineBrake, LineRun, LineSample, LineSlideProtection, LineTruth, LineVehicle, LineWheelset, Turned,
+    WheelSample,
 };
 
 use crate::tachometer::{Truth, WrittenColumns};
@@ -24,9 +26,12 @@ pub fn simulated_vehicle(believed: &LineVehicle) -> Result<VehicleFile, VehicleE
     let limits = [believed.max_traction, believed.max_brake];
     let wheelsets = believed.wheelsets.map(wheelset);
     let mut vehicle = Vehicle::new(believed.period, believed.max_speed, limits, wheelsets)?;
-    let LineBrake { full, tolerance, gradient, resistance, build_up } = believed.brake_command;
-    vehicle.brake_command =
-        BrakeCommand { full, tolerance, gradient, resistance, build_up, ..vehicle.brake_command };
+    let LineBrake { full, tolerance, gradient, resistance, build_up, release } = believed.brake_command;
+    let release = release.unwrap_or(vehicle.brake_command.release);
+    vehicle.brake_command = BrakeCommand { full, tolerance, gradient, resistance, build_up, release };
+    vehicle.slide_protection = believed
+        .slide_protection
+        .map(|LineSlideProtection { creepage, longest }| SlideProtection { creepage, longest });
     vehicle.independent = believed.independent;
     vehicle.check()?;
     Ok(VehicleFile { name: believed.name.clone(), vehicle })
@@ -39,10 +44,10 @@ pub fn simulated_columns(run: &LineRun) -> WrittenColumns {
         counters: has_counters_only(run),
         directions: true,
         edges: true,
-        effort: true,
+        effort: run.samples.iter().any(|sample| sample.effort.is_some()),
         acceleration: run.samples.iter().any(|sample| sample.acceleration.is_some()),
         balise: run.samples.iter().any(|sample| sample.balise.is_some()),
-        balise_deviation: false,
+        balise_deviation: run.samples.iter().any(|sample| sample.balise_deviation.is_some()),
         run_id: false,
         truth: true,
         true_wheels: true,
@@ -71,10 +76,10 @@ fn period(sample: &LineSample, by_counter: [bool; 2]) -> Period {
     Period {
         time: sample.time,
         wheels: [reading(first, by_counter[0]), reading(second, by_counter[1])],
-        effort: Some(sample.effort),
+        effort: sample.effort,
         acceleration: sample.acceleration,
         balise: sample.balise,
-        balise_deviation: None,
+        balise_deviation: sample.balise_deviation,
     }
 }
 

@@ -65,7 +65,7 @@ fn score(run: &LineRun) -> Score {
             // A count at a random phase: a sixth of a squared pulse.
             let phase = pitch / t * (1.0_f64 / 6.0).sqrt();
             // A wheel that pulls or brakes creeps, for long and to one side, so that it counts for less.
-            let creeps = if sample.effort == 0.0 { 0.0 } else { CREEPAGE * counted };
+            let creeps = if sample.effort.unwrap_or(0.0) == 0.0 { 0.0 } else { CREEPAGE * counted };
             filter.align(speed(counted), speed((phase * phase + creeps * creeps).sqrt()));
             // A pulse either way, half the creepage that still counts as rolling twice, and what the train gains in half a
             // period.

@@ -53,7 +53,7 @@ fn diameters_that_are_off_are_found_while_the_train_runs() {
                     rolling[wheel] = at.wheels[wheel] == WheelTruth::Rolling;
                 }
             }
-            learner.roll(sample.time, counted, rolling, sample.effort.abs() < LITTLE_EFFORT);
+            learner.roll(sample.time, counted, rolling, sample.effort.unwrap_or(0.0).abs() < LITTLE_EFFORT);
             if let Some(place) = sample.balise {
                 match learner.pass(sample.time, place) {
                     PairVerdict::Accepted => accepted += 1,

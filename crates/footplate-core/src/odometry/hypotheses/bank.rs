@@ -1,8 +1,8 @@
 //! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
 
 use super::arrivals::{Arrivals, arrivals};
-use super::evidence::{Compared, STEADY_S, evidence};
-use super::filters::Filters;
+use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
+use super::filters::{Filters, Pool};
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
@@ -49,6 +49,17 @@ const SIDE_S: f64 = 1.0;
 /// Speed at which half of all slips can begin (m/s), and at which steady creep can be told from rolling.
 const SLIPS_ABOVE: f64 = 0.5;
 const CREEPS_ABOVE: f64 = 5.0;
+/// The hypotheses by which both slip, each in its own manner and alike.
+const SLIP: usize = 3;
+const CREEP: usize = 4;
+/// Wheels that are so far from the train have not come back to it (m/s, part of its speed).
+const AWAY: f64 = 0.5;
+const AWAY_PART: f64 = 0.03;
+/// Nor have wheels that turn towards it harder than any train accelerates (m/s²).
+const RETURNS: f64 = 2.5;
+/// A slide is lost this much less often than it ends, and wheels are so many deviations from it then.
+const LOST: f64 = 2.5e-3;
+const FAR: f64 = 4.0;
 /// A train that stops does so from below this speed (m/s).
 const STOPS_BELOW: f64 = 0.15;
 
@@ -157,6 +168,8 @@ impl Bank {
     fn next_side(&mut self, scene: &Scene, t: f64) -> f64 {
         self.trend += (self.acceleration - self.trend) * smaller(t / SIDE_S, 1.0);
         match scene.commanded {
+            // Wheels that were lost do not come back by the command of the opposite.
+            Some(commanded) if commanded != 0.0 && self.is_away(scene) => self.side,
             Some(commanded) if commanded < 0.0 => 1.0,
             Some(commanded) if commanded > 0.0 => -1.0,
             // What was last commanded may still act.
@@ -164,6 +177,18 @@ impl Bank {
             None if self.trend < 0.0 => 1.0,
             None => -1.0,
         }
+    }
+
+    /// Whether both wheels slip, the way they were let to, and have not come back to the train.
+    fn is_away(&self, scene: &Scene) -> bool {
+        let [.., slip, creep, _, _, _] = self.probability.0;
+        let may = if self.side > 0.0 { scene.slide } else { scene.slip };
+        let train = self.filters.state(if slip > creep { SLIP } else { CREEP }).v;
+        let away = |wheel: &WheelScene| {
+            self.side * (train - wheel.speed) > AWAY + AWAY_PART * train.abs()
+                || self.side * wheel.acceleration > RETURNS
+        };
+        may && slip + creep > 0.5 && scene.wheels.iter().all(away)
     }
 
     /// The wheels with the ratio of their diameters taken out.
@@ -194,11 +219,14 @@ impl Bank {
         let mut pool = self.filters.pooled(leaves, pitch * pitch);
         pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
         let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
-        let arrives = after_rolling * rolling + after_others * others;
+        let lost = self.lost(scene, wheels, &pool);
+        let found = if lost > 0.0 { BOTH_ROLL * LOST + NOT_ROLLING } else { Lanes::all(1.0) };
+        let arrives = after_rolling * rolling + after_others * others * found;
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
         self.filters.mix(&pool, share);
+        self.filters.pvv += BOTH_ROLL * share * lost;
         self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
         self.probability = next * (1.0 / next.sum());
         // A train at rest stays there.
@@ -208,6 +236,19 @@ impl Bank {
         *pva *= MOVES;
         *pvv = *pvv * MOVES + STANDS * AT_REST;
         *paa = *paa * MOVES + STANDS * AT_REST;
+    }
+
+    /// Where wheels turn alike at quite another speed than a slide was thought to have, the slide may have been lost, and
+    /// they roll. By how much the variance of the train has to grow for that (m²/s²), so that the leap is paid for once.
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> f64 {
+        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
+        let [.., slip, _, _, _, _] = self.probability.0;
+        let leap = (0.5 * (one.speed + other.speed) - pool.v).abs();
+        let [_, (most, part)] = CREEP_BY;
+        // Less can be wheels that creep alike.
+        let far = larger(FAR * libm::sqrt(pool.pvv + one.variance), most + part * pool.v.abs());
+        // Spinning wheels do turn alike.
+        if self.side > 0.0 && turn && slip > 0.9 && leap > far { leap * leap } else { 0.0 }
     }
 
     /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have

@@ -27,6 +27,8 @@ const RESTLESS: f64 = 0.0015;
 const SLIPS: (f64, f64) = (0.5, 0.1);
 /// Deviation of the acceleration of a wheel that slips (m/s²).
 const SLIP_ACCELERATION: f64 = 5.0;
+/// Beyond this square of deviations a further one of its acceleration hardly counts.
+const JERKS: f64 = 4.0;
 /// Least and largest creepage of wheels that creep alike (m/s, part of the speed), and by how much they differ.
 pub(super) const CREEP: [(f64, f64); 2] = [(0.2, 0.02), (1.0, 0.2)];
 const CREEP_APART: f64 = 0.02;
@@ -176,12 +178,14 @@ impl Shown<'_> {
         let b = wheel.acceleration - train.a;
         let (least, part) = SLIPS;
         let mean = least + larger(part * train.v, 0.0);
-        let variance = train.pvv + compared.variance;
+        // A wheel that is thrown about is followed late.
+        let late = b * FOLLOWED_S;
+        let variance = train.pvv + compared.variance + late * late;
         let steady = self.acceleration_variance(train);
         let wide = steady + SLIP_ACCELERATION * SLIP_ACCELERATION;
         let spread = larger(mean * mean / variance, 1.0) * wide / steady;
         let further = smaller(larger(u, 0.0) / mean, FARTHEST);
-        -0.5 * followed * (ahead * ahead / variance + b * b / wide)
+        -0.5 * followed * (ahead * ahead / variance + jerks(b * b / wide))
             - t * (ruled_out + (further + 0.5 * libm::log(spread)) / SLIP_S)
     }
 
@@ -222,6 +226,12 @@ fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
     let b = (wheels_a - train.a) / STEADY;
     -0.5 * one.followed * (differs + outside + one.unsteady(train) + other.unsteady(train))
         - one.t * (ruled_out + silent + 0.5 / STEADY_S * unusual(b * b))
+}
+
+/// What a wheel that slips costs whose acceleration is so unlike the usual: it seldom is, but it is thrown about when the
+/// rail takes hold of it or loses it.
+fn jerks(square: f64) -> f64 {
+    JERKS * libm::log1p(square * (1.0 / JERKS))
 }
 
 /// No hypothesis gains by explaining noise.

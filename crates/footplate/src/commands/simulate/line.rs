@@ -2,6 +2,7 @@
 
 mod family;
 mod files;
+mod random_worlds;
 mod score_page;
 mod scored_run;
 mod world;
@@ -13,14 +14,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use footplate_core::TimeSpan;
-use footplate_sim::line::{LineConditions, LineScenario};
+use footplate_sim::line::{LineConditions, LineLevel, LineScenario};
 use footplate_store::TableForm;
 
 use self::family::Family;
 use self::files::WrittenRun;
+use self::random_worlds::{ScoredWorld, WorldsPage};
 use self::score_page::ScorePage;
 use self::scored_run::{ScoredRun, score};
-use self::world::{Scenarios, World};
+use self::world::{LevelName, Scenarios, World};
 use super::super::Outcome;
 use crate::spread::each;
 use footplate_eval::seeds::Seeds;
@@ -43,6 +45,7 @@ const PERIODS_S: (f64, f64) = (0.001, 1.0);
           footplate odometry runs/S1-7.csv --vehicle runs/S1-7.toml --score
           footplate simulate line --train train.toml --line line.toml --out runs
           footplate simulate line --score --seeds 1..100 --teeth 80,100,200
+          footplate simulate line --score --worlds fresh:64 --level L1
 
 Exit status: 0 done, 1 the truth left the intervals (--score), 2 wrong usage or input."
 )]
@@ -59,6 +62,13 @@ pub(super) struct Arguments {
     /// The line's file that it runs on, from the first stop to the last (docs/formats/line.md).
     #[arg(long, value_name = "FILE", requires = "train")]
     line: Option<PathBuf>,
+    /// Random worlds instead of a scenario, by their seeds: 1..1000, or fresh:64 for seeds that the commit draws.
+    #[arg(long, value_name = "N", value_parser = Seeds::parse,
+          conflicts_with_all = ["scenario", "train", "line", "seed", "teeth", "period", "exact_diameters", "inertial"])]
+    worlds: Option<Seeds>,
+    /// What is known of a random world; left out, the scores are of every level, and files of L1.
+    #[arg(long, value_enum, requires = "worlds")]
+    level: Option<LevelName>,
     /// The seed of the run, or of many: 1..100.
     #[arg(long, visible_alias = "seeds", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
     seed: Seeds,
@@ -119,14 +129,37 @@ impl Arguments {
             }
             return Ok(Outcome::Done);
         }
-        let worlds = self.worlds()?;
+        if let (Some(seeds), None) = (&self.worlds, &self.out) {
+            return self.score_random_worlds(seeds, output);
+        }
+        let worlds = self.what_runs()?;
         match &self.out {
             Some(folder) => self.write_files(folder, &worlds, output),
             None => self.write_scores(&worlds, output),
         }
     }
 
-    fn worlds(&self) -> anyhow::Result<Vec<World>> {
+    fn score_random_worlds(&self, seeds: &Seeds, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let levels = self.level.map_or(LineLevel::ALL.to_vec(), |name| vec![name.level()]);
+        let jobs: Vec<(u64, LineLevel)> =
+            levels.iter().flat_map(|level| seeds.iter().map(|seed| (seed, *level))).collect();
+        let scored = each("worlds", &jobs, self.threads, |(seed, level)| ScoredWorld::new(*seed, *level))?;
+        let level = self.level.map_or(String::new(), |name| format!(" --level {}", name.level().name()));
+        let page = WorldsPage::new(scored, format!("--score --worlds {}{level} --markdown", seeds.written()));
+        if self.json {
+            writeln!(output, "{}", serde_json::to_string_pretty(&page.as_json())?)?;
+        } else if self.markdown {
+            page.write_markdown(output)?;
+        } else {
+            page.write_text(output)?;
+        }
+        Ok(if page.falls_short(SPEED_INSIDE_PCT) { Outcome::FallsShort } else { Outcome::Done })
+    }
+
+    fn what_runs(&self) -> anyhow::Result<Vec<World>> {
+        if self.worlds.is_some() {
+            return Ok(vec![World::Random(self.level.map_or(LineLevel::L1, LevelName::level))]);
+        }
         if let (Some(train), Some(line)) = (&self.train, &self.line) {
             return Ok(vec![World::service(train, line)?]);
         }
@@ -145,7 +178,9 @@ impl Arguments {
     fn jobs(&self, worlds: usize) -> Vec<Job> {
         let with_teeth = (0..worlds).flat_map(|world| self.teeth.iter().map(move |teeth| (world, *teeth)));
         with_teeth
-            .flat_map(|(world, teeth)| self.seed.iter().map(move |seed| Job { world, teeth, seed }))
+            .flat_map(|(world, teeth)| {
+                self.worlds.as_ref().unwrap_or(&self.seed).iter().map(move |seed| Job { world, teeth, seed })
+            })
             .collect()
     }
 

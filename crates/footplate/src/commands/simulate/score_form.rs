@@ -10,6 +10,11 @@ const OF_FRESH_SEEDS: &str =
     "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
 const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
 
+/// Who chose the seeds of a page.
+pub(super) const fn seeds_sentence(are_fresh: bool) -> &'static str {
+    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
+}
+
 /// The form that was asked for; a text for people without a word.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct ScoreForm {
@@ -34,8 +39,7 @@ impl ScoreForm {
         }
         if self.markdown {
             let head = scores.head();
-            let seeds = if head.contains(FRESH) { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS };
-            writeln!(output, "{head}\n{seeds}\n")?;
+            writeln!(output, "{head}\n{}\n", seeds_sentence(head.contains(FRESH)))?;
         }
         scores.write_text(output)
     }

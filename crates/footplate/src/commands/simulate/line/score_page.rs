@@ -167,7 +167,7 @@ fn figures(figures: &Figures) -> Value {
     })
 }
 
-fn one(value: Option<f64>, decimals: usize) -> String {
+pub(super) fn one(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
@@ -179,7 +179,7 @@ fn both(spread: Option<Spread>, decimals: usize) -> String {
 }
 
 /// To four decimals, so that 100 means all.
-fn rounded_down(pct: Option<f64>) -> String {
+pub(super) fn rounded_down(pct: Option<f64>) -> String {
     one(pct.map(|pct| (pct * 1e4).floor() / 1e4), 4)
 }
 

@@ -3,13 +3,43 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use footplate_sim::line::{LineConditions, LineRun, LineScenario, LineService};
+use clap::ValueEnum;
+use footplate_sim::line::{LineConditions, LineLevel, LineRun, LineScenario, LineService, LineWorld};
 use footplate_store::{read_line, read_train};
 
 /// Something that a seed makes a run of.
 pub(super) enum World {
     Scenario(LineScenario),
-    Service { name: String, service: Box<LineService> },
+    Service {
+        name: String,
+        service: Box<LineService>,
+    },
+    /// Drawn from ranges.
+    Random(LineLevel),
+}
+
+/// What the operator of a random world knows of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum LevelName {
+    /// Teeth, diameters, limits of speed and acceleration.
+    #[value(name = "L0")]
+    L0,
+    /// The command, too.
+    #[value(name = "L1")]
+    L1,
+    /// Brake, slide protection and gradients, too.
+    #[value(name = "L2")]
+    L2,
+}
+
+impl LevelName {
+    pub(super) const fn level(self) -> LineLevel {
+        match self {
+            Self::L0 => LineLevel::L0,
+            Self::L1 => LineLevel::L1,
+            Self::L2 => LineLevel::L2,
+        }
+    }
 }
 
 /// Scenarios as a person names them.
@@ -46,6 +76,7 @@ impl World {
         match self {
             Self::Scenario(scenario) => scenario.name(),
             Self::Service { name, .. } => name,
+            Self::Random(level) => level.name(),
         }
     }
 
@@ -60,6 +91,7 @@ impl World {
         match self {
             Self::Scenario(scenario) => scenario.run(seed, conditions),
             Self::Service { service, .. } => service.run(seed, conditions),
+            Self::Random(level) => LineWorld::draw(seed).run(*level),
         }
     }
 }

@@ -1,0 +1,121 @@
+//! What can be made of counts at best: an odometer that is told which wheelset turns with the train, and when.
+//!
+//! It knows nothing of the future, and of the train only what the counts say: a Kalman filter of speed and acceleration
+//! takes the counts of the wheelsets that roll, and goes on as it was where none does.
+
+use footplate_core::Length;
+
+use super::counted_way::CountedWay;
+use super::score::Claim;
+use footplate_core::Speed;
+
+/// How much the acceleration of a train wanders: this much in a second (m/s²).
+const WANDERS: f64 = 0.4;
+/// What is known of the speed and the acceleration before anything is (variances).
+const UNKNOWN: [f64; 2] = [1e4, 1.0];
+/// A count is not believed that differs by more deviations than this.
+const GATE: f64 = 6.0;
+/// After so long without a count that is believed, any is (s).
+const LOST_S: f64 = 1.0;
+
+/// The odometer that is told.
+#[derive(Debug, Clone)]
+pub(super) struct Oracle {
+    pitches: [f64; 2],
+    speed: f64,
+    acceleration: f64,
+    /// Variance of the speed, covariance, variance of the acceleration.
+    covariance: [f64; 3],
+    lost_for: f64,
+    distance: f64,
+}
+
+impl Oracle {
+    pub(super) fn new(pitches: [Length; 2]) -> Self {
+        let [of_speed, of_acceleration] = UNKNOWN;
+        Self {
+            pitches: pitches.map(Length::as_m),
+            speed: 0.0,
+            acceleration: 0.0,
+            covariance: [of_speed, 0.0, of_acceleration],
+            lost_for: f64::INFINITY,
+            distance: 0.0,
+        }
+    }
+
+    /// Takes in a period: what was counted, which way the train goes, and which wheelsets roll and are read.
+    pub(super) fn step(&mut self, counted: &CountedWay, rolls: [bool; 2]) -> Claim {
+        let t = counted.span.map_or(0.0, footplate_core::TimeSpan::as_s);
+        if t > 0.0 {
+            self.predict(t);
+            self.lost_for += t;
+            for ((way, rolls), pitch) in counted.ways.into_iter().zip(rolls).zip(self.pitches) {
+                if let (Some(way), true) = (way, rolls) {
+                    self.take(way.as_m(), pitch, t);
+                }
+            }
+            self.distance += self.speed * t;
+        }
+        Claim::plain(Speed::from_m_per_s(self.speed), Length::from_m(self.distance))
+    }
+
+    fn predict(&mut self, t: f64) {
+        let [vv, va, aa] = self.covariance;
+        let wanders = WANDERS * WANDERS;
+        self.speed += self.acceleration * t;
+        self.covariance = [
+            vv + 2.0 * t * va + t * t * aa + wanders * t * t * t / 3.0,
+            va + t * aa + wanders * t * t / 2.0,
+            aa + wanders * t,
+        ];
+    }
+
+    /// The mean speed of a period, half a period old.
+    fn take(&mut self, way: f64, pitch: f64, t: f64) {
+        let [vv, va, aa] = self.covariance;
+        // Two edges of a window, each anywhere within a pulse.
+        let noise = pitch * pitch / (6.0 * t * t);
+        let back = -0.5 * t;
+        let [pv, pa] = [vv + back * va, va + back * aa];
+        let variance = pv + back * pa + noise;
+        let surprise = way / t - (self.speed + back * self.acceleration);
+        if surprise * surprise > GATE * GATE * variance && self.lost_for < LOST_S {
+            return;
+        }
+        self.lost_for = 0.0;
+        let [kv, ka] = [pv / variance, pa / variance];
+        self.speed += kv * surprise;
+        self.acceleration += ka * surprise;
+        self.covariance = [vv - kv * pv, va - kv * pa, aa - ka * pa];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::TimeSpan;
+
+    use super::*;
+
+    #[test]
+    fn it_follows_the_wheel_that_rolls_and_goes_on_without_one() {
+        let pitch = Length::from_mm(27.0);
+        let mut oracle = Oracle::new([pitch; 2]);
+        let mut last = [0.0; 2];
+        for period in 0..400 {
+            let time = 0.05 * f64::from(period);
+            // From 20 m/s with -0.5 m/s²: the first wheel locks at 8 s, both from 16 s on.
+            let train = (20.0 - 0.5 * time) * 0.05;
+            let locked = if time > 8.0 { 0.0 } else { train };
+            let counted = CountedWay {
+                ways: [
+                    Some(Length::from_m(locked)),
+                    Some(Length::from_m(if time > 16.0 { 0.0 } else { train })),
+                ],
+                span: (period > 0).then(|| TimeSpan::from_ms(50)),
+            };
+            let claim = oracle.step(&counted, [time <= 8.0, time <= 16.0]);
+            last = [claim.speed.as_m_per_s(), 20.0 - 0.5 * time];
+        }
+        assert!((last[0] - last[1]).abs() < 0.3, "{last:?}");
+    }
+}

@@ -1,0 +1,354 @@
+//! How good odometers are on a world that nobody chose, phase by phase.
+
+use footplate_core::odometry::wheels::VehicleError;
+use footplate_core::odometry::{Mode, MotionEstimate, Odometer};
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_sim::line::{LineEventKind, LineRun, LineTruth, WheelTruth};
+
+use super::counted_way::WayCounter;
+use super::oracle::Oracle;
+use super::rival::{Rival, RivalOdometer};
+use super::run::{Preset, claim};
+use super::score::{OdometryScore, Scorer};
+use super::simulated::{simulated_rows, simulated_vehicle};
+use crate::tachometer::Truth;
+
+/// How long after a slip a train rolls *again* (s): as long as the stiffest odometer took to trust its wheels.
+const AGAIN_S: f64 = 20.0;
+/// An interval is of its normal width when it is no wider than this times the median of normal running.
+const NORMAL_WIDTH: f64 = 1.5;
+/// Slips of both that are shorter than this are not asked how long the interval stayed wide after them (s).
+const BOTH_FOR_S: f64 = 1.0;
+
+/// What the train and its wheels really do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Both wheelsets roll, and have for a while.
+    Rolling,
+    /// One slips, slides or is locked.
+    OneSlips,
+    /// Both do.
+    BothSlip,
+    /// Both roll, and one did not shortly before.
+    RollingAgain,
+    /// The train stands.
+    Standing,
+}
+
+impl Phase {
+    /// All of them, in the order of tables.
+    pub const ALL: [Self; 5] =
+        [Self::Rolling, Self::OneSlips, Self::BothSlip, Self::RollingAgain, Self::Standing];
+
+    /// What it is called in files.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Rolling => "rolling",
+            Self::OneSlips => "one_slips",
+            Self::BothSlip => "both_slip",
+            Self::RollingAgain => "rolling_again",
+            Self::Standing => "standing",
+        }
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Rolling => "rolling",
+            Self::OneSlips => "one slips",
+            Self::BothSlip => "both slip",
+            Self::RollingAgain => "rolling again",
+            Self::Standing => "standing",
+        }
+    }
+}
+
+/// An odometer on a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorldOdometer {
+    /// The preset that is recommended.
+    Recommended,
+    /// The published algorithm.
+    Paper,
+    /// The mean of both counts.
+    RawMean,
+    /// The larger count.
+    RawMax,
+    /// One that is told which wheelset slips, and when.
+    Oracle,
+}
+
+impl WorldOdometer {
+    /// All of them, in the order of tables.
+    pub const ALL: [Self; 5] = [Self::Recommended, Self::Paper, Self::RawMean, Self::RawMax, Self::Oracle];
+
+    /// What it is called in files.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Recommended => "recommended",
+            Self::Paper => "paper",
+            Self::RawMean => "raw_mean",
+            Self::RawMax => "raw_max",
+            Self::Oracle => "oracle",
+        }
+    }
+}
+
+/// The moment at which the recommended odometer was farthest off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorstMoment {
+    /// When.
+    pub time: Timestamp,
+    /// Its speed less the true one (m/s).
+    pub error_m_s: f64,
+    /// What the train and its wheels did.
+    pub phase: Phase,
+    /// What it took them to do.
+    pub mode: Mode,
+}
+
+/// How good every odometer was in every phase, on one world or on many together.
+#[derive(Debug, Clone, Default)]
+pub struct WorldScores {
+    phases: [[Scorer; 5]; 5],
+    whole: [Scorer; 5],
+    /// Widths of our intervals in normal running (m/s): that of the stated confidence, and the guaranteed one.
+    widths: [Vec<f32>; 2],
+    normal_after_s: Vec<f32>,
+    left_distance: u64,
+    runs: u64,
+    worst: Option<WorstMoment>,
+}
+
+impl WorldScores {
+    /// Runs every odometer on a simulated run.
+    ///
+    /// # Errors
+    /// The first value of the vehicle that no railway has.
+    pub fn of(run: &LineRun) -> Result<Self, VehicleError> {
+        let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
+        let mut counter = WayCounter::new(&vehicle);
+        let mut ours = Odometer::new(vehicle, Preset::Recommended.settings())?;
+        let mut paper = Odometer::new(vehicle, Preset::Paper.settings())?;
+        let mut rivals = [Rival::RawMean, Rival::RawMax].map(|rival| RivalOdometer::new(rival, &vehicle));
+        let mut oracle = Oracle::new(counter.pitches());
+        let mut phases = PhaseWatch::default();
+        let mut scores = Self { runs: 1, ..Self::default() };
+        let mut seen = Vec::with_capacity(run.samples.len());
+        let mut events = run.events.iter().peekable();
+        let mut is_faulty = false;
+        for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
+            while let Some(event) = events.next_if(|event| event.time <= period.time) {
+                match event.what {
+                    LineEventKind::FaultBegins => is_faulty = true,
+                    LineEventKind::FaultEnds => is_faulty = false,
+                    _ => {}
+                }
+            }
+            let phase = phases.see(period.time, truth);
+            let estimate = ours.step(&period);
+            let counted = counter.count(&period);
+            let [first, second] = truth.wheels.map(|does| does == WheelTruth::Rolling);
+            let claims = [
+                claim(&estimate),
+                claim(&paper.step(&period)),
+                rivals[0].step(&counted),
+                rivals[1].step(&counted),
+                oracle.step(&counted, [first, second && !is_faulty]),
+            ];
+            let of_speed = Truth { distance: None, ..known };
+            for ((claim, whole), in_phase) in
+                claims.iter().zip(&mut scores.whole).zip(&mut scores.phases[phase as usize])
+            {
+                whole.see(claim, &known);
+                in_phase.see(claim, &of_speed);
+            }
+            scores.find_worst(&estimate, truth, phase);
+            let width = |bounds: [f64; 2]| (bounds[1] - bounds[0]) as f32;
+            let likely = estimate.confidence;
+            let sure = estimate.guaranteed;
+            let width_of = width([likely.speed_low.as_m_per_s(), likely.speed_high.as_m_per_s()]);
+            if phase == Phase::Rolling {
+                let [of_likely, of_sure] = &mut scores.widths;
+                of_likely.push(width_of);
+                of_sure.push(width([sure.speed_low.as_m_per_s(), sure.speed_high.as_m_per_s()]));
+            }
+            seen.push(Moment { time: period.time, phase, width: width_of });
+        }
+        let inside = scores.whole[0].score().distance_inside_pct;
+        scores.left_distance = u64::from(inside.is_some_and(|pct| pct < 100.0));
+        scores.normal_after_s = back_to_normal(&seen, median(&scores.widths[0]));
+        Ok(scores)
+    }
+
+    fn find_worst(&mut self, estimate: &MotionEstimate, truth: &LineTruth, phase: Phase) {
+        let error_m_s = (estimate.speed - truth.speed).as_m_per_s();
+        if self.worst.is_none_or(|worst| error_m_s.abs() > worst.error_m_s.abs()) {
+            self.worst = Some(WorstMoment { time: estimate.time, error_m_s, phase, mode: estimate.mode });
+        }
+    }
+
+    /// Adds those of another world.
+    pub fn merge(&mut self, other: &Self) {
+        for (mine, others) in self.phases.iter_mut().zip(&other.phases) {
+            mine.iter_mut().zip(others).for_each(|(mine, other)| mine.merge(other));
+        }
+        self.whole.iter_mut().zip(&other.whole).for_each(|(mine, other)| mine.merge(other));
+        self.widths.iter_mut().zip(&other.widths).for_each(|(mine, other)| mine.extend(other));
+        self.normal_after_s.extend(&other.normal_after_s);
+        self.left_distance += other.left_distance;
+        self.runs += other.runs;
+        if other
+            .worst
+            .is_some_and(|worst| self.worst.is_none_or(|mine| worst.error_m_s.abs() > mine.error_m_s.abs()))
+        {
+            self.worst = other.worst;
+        }
+    }
+
+    /// How good one of them was in a phase; distances are not scored by phase.
+    #[must_use]
+    pub fn in_phase(&self, phase: Phase, odometer: WorldOdometer) -> OdometryScore {
+        self.phases[phase as usize][odometer as usize].score()
+    }
+
+    /// How good one of them was all the time.
+    #[must_use]
+    pub fn whole(&self, odometer: WorldOdometer) -> OdometryScore {
+        self.whole[odometer as usize].score()
+    }
+
+    /// How many worlds there are, and in how many of them the distance left its guaranteed interval.
+    #[must_use]
+    pub fn runs_and_left(&self) -> [u64; 2] {
+        [self.runs, self.left_distance]
+    }
+
+    /// The median width of our interval of the speed in normal running (m/s): that of the stated confidence, and the
+    /// guaranteed one.
+    #[must_use]
+    pub fn normal_widths(&self) -> [Option<f64>; 2] {
+        [median(&self.widths[0]), median(&self.widths[1])]
+    }
+
+    /// How long after both slipped and roll again our interval had its normal width: the median (s), and the share of
+    /// times (per cent) that took no longer than `within`. What the run does not show counts as longer.
+    #[must_use]
+    pub fn normal_again(&self, within: TimeSpan) -> Option<[f64; 2]> {
+        let soon = self.normal_after_s.iter().filter(|after| f64::from(**after) <= within.as_s()).count();
+        Some([median(&self.normal_after_s)?, 100.0 * soon as f64 / self.normal_after_s.len() as f64])
+    }
+
+    /// When the recommended odometer was farthest off.
+    #[must_use]
+    pub const fn worst(&self) -> Option<WorstMoment> {
+        self.worst
+    }
+}
+
+/// Tells phases apart.
+#[derive(Debug, Default)]
+struct PhaseWatch {
+    slipped: Option<Timestamp>,
+}
+
+impl PhaseWatch {
+    fn see(&mut self, time: Timestamp, truth: &LineTruth) -> Phase {
+        let slipping = truth.wheels.iter().filter(|does| **does != WheelTruth::Rolling).count();
+        if slipping > 0 {
+            self.slipped = Some(time);
+        }
+        let again = self.slipped.is_some_and(|slipped| (time - slipped).as_s() < AGAIN_S);
+        match slipping {
+            0 if truth.speed.as_m_per_s() == 0.0 => Phase::Standing,
+            0 if again => Phase::RollingAgain,
+            0 => Phase::Rolling,
+            1 => Phase::OneSlips,
+            _ => Phase::BothSlip,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    time: Timestamp,
+    phase: Phase,
+    width: f32,
+}
+
+/// How long after each slip of both it took until the interval was normal again; infinite where the next slip or the stop
+/// came first and it was not.
+fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
+    let Some(normal) = normal else { return Vec::new() };
+    let (mut both_since, mut waits_since) = (None, None);
+    let mut found = Vec::new();
+    for moment in seen {
+        match moment.phase {
+            Phase::BothSlip => {
+                both_since.get_or_insert(moment.time);
+                waits_since = None;
+            }
+            Phase::OneSlips => {
+                // One of them rolls: the next time both roll is what counts.
+            }
+            _ => {
+                if let Some(since) = both_since.take()
+                    && (moment.time - since).as_s() >= BOTH_FOR_S
+                {
+                    waits_since = Some(moment.time);
+                    found.push(f32::INFINITY);
+                }
+                if let (Some(since), Some(last)) = (waits_since, found.last_mut())
+                    && f64::from(moment.width) <= NORMAL_WIDTH * normal
+                {
+                    *last = (moment.time - since).as_s() as f32;
+                    waits_since = None;
+                }
+            }
+        }
+    }
+    found
+}
+
+fn median(values: &[f32]) -> Option<f64> {
+    let mut values = values.to_vec();
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).map(|middle| f64::from(*middle))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moments(phases: &[(Phase, f32, usize)]) -> Vec<Moment> {
+        let each =
+            phases.iter().flat_map(|&(phase, width, times)| std::iter::repeat_n((phase, width), times));
+        let at = |(row, (phase, width)): (usize, (Phase, f32))| Moment {
+            time: Timestamp::ZERO + TimeSpan::from_ms(100 * row as i64),
+            phase,
+            width,
+        };
+        each.enumerate().map(at).collect()
+    }
+
+    #[test]
+    fn the_time_until_the_interval_is_normal_begins_when_both_roll() {
+        use Phase::{BothSlip, OneSlips, Rolling, RollingAgain};
+        let seen = moments(&[
+            (Rolling, 0.5, 10),
+            (BothSlip, 3.0, 20),
+            (OneSlips, 3.0, 10),
+            (RollingAgain, 2.0, 15),
+            (RollingAgain, 0.7, 50),
+            // Too short to count, and one after which it stays wide.
+            (BothSlip, 3.0, 5),
+            (RollingAgain, 2.0, 10),
+            (BothSlip, 3.0, 15),
+            (RollingAgain, 2.0, 10),
+        ]);
+        assert_eq!(back_to_normal(&seen, Some(0.5)), [1.5, f32::INFINITY]);
+    }
+}
