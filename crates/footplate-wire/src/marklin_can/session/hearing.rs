@@ -104,10 +104,10 @@ impl Client {
                 }
             }
             Message::ModuleState { module, contacts, .. } => self.hear_of_module(now, module, contacts),
-            Message::Contact { device, contact, change: Some(change) } => {
-                if self.settings.device.is_none_or(|wanted| wanted == device) {
-                    self.hear_of_contact(now, contact, change);
-                }
+            Message::Contact { device, contact, change: Some(change) }
+                if self.settings.device.is_none_or(|wanted| wanted == device) =>
+            {
+                self.hear_of_contact(now, contact, change);
             }
             _ => {}
         }
