@@ -224,7 +224,7 @@ impl LineWorld {
     /// Runs it, with the vehicle as an operator of a level knows it. The same seed gives the same bytes on every machine.
     #[must_use]
     pub fn run(&self, level: LineLevel) -> LineRun {
-        let mut run = run(level.name(), self.setup.clone(), self.seed, self.conditions);
+        let mut run = run(level.name(), &self.setup, self.seed, self.conditions);
         claim(&mut run, level, &self.setup.brake_times);
         run
     }

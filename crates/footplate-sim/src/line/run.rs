@@ -42,7 +42,7 @@ impl Default for LineConditions {
 }
 
 /// Runs what was set up.
-pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineConditions) -> LineRun {
+pub(crate) fn run(name: &str, setup: &Setup, seed: u64, conditions: LineConditions) -> LineRun {
     let LineConditions { teeth, period, exact_diameters, inertial_sensor } = conditions;
     let teeth = [teeth, setup.other_teeth.unwrap_or(teeth)];
     let wheelset = |at: usize| LineWheelset {
@@ -52,7 +52,7 @@ pub(crate) fn run(name: &str, setup: Setup, seed: u64, conditions: LineCondition
         is_powered: setup.powered[at],
     };
     let wheelsets = [0, 1].map(wheelset);
-    let vehicle = LineVehicle::claimed(name, &setup, period, wheelsets);
+    let vehicle = LineVehicle::claimed(name, setup, period, wheelsets);
 
     let mut of_faults = Draws::new(seed, Purpose::Faults);
     let mut channels = Channels::draw(setup.fault, vehicle.counter_modulus, &mut of_faults);

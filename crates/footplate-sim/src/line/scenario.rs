@@ -101,6 +101,6 @@ impl LineScenario {
             Kind::Own(set_up) => set_up(&mut draws),
             Kind::Faulty(fault) => fault_runs::two_stops(fault, &mut draws),
         };
-        run(self.name, setup, seed, conditions)
+        run(self.name, &setup, seed, conditions)
     }
 }

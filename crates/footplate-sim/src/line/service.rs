@@ -72,6 +72,6 @@ impl LineService {
             has_balises: true,
             ..Setup::of(self.design.clone(), Steering::Line(Box::new(LineDriver::new(driver))), self.lasts)
         };
-        run(&self.name, setup, seed, conditions)
+        run(&self.name, &setup, seed, conditions)
     }
 }

@@ -53,7 +53,7 @@ fn a_brake_command_does_what_it_says_where_the_rail_carries_it() {
         let periods = (brake.build_up.as_s() / 0.05).ceil() as usize;
         let mut judged = 0;
         for (samples, truth) in run.samples.windows(periods + 1).zip(run.truth.iter().skip(periods)) {
-            let efforts = samples.iter().map(|sample| sample.effort);
+            let efforts = samples.iter().map(|sample| sample.effort.expect("a command that is recorded"));
             let hardest = efforts.clone().fold(f64::INFINITY, f64::min);
             let softest = efforts.fold(f64::NEG_INFINITY, f64::max);
             if softest > 0.0 || hardest == 0.0 || truth.speed.as_m_per_s() < 0.01 {

@@ -19,7 +19,7 @@ fn fingerprint(run: &LineRun) -> u64 {
             take(wheel.turned.map_or(0, |turned| if turned == Turned::Forward { 1 } else { -1 }));
             take(wheel.last_edge.map_or(-1, Timestamp::as_ns));
         }
-        take(sample.effort.to_bits() as i64);
+        take(sample.effort.unwrap_or(f64::NAN).to_bits() as i64);
         take(sample.acceleration.map_or(0, |a| a.as_m_per_s2().to_bits() as i64));
         take(sample.balise.map_or(0, |place| place.as_m().to_bits() as i64));
     }

@@ -142,7 +142,10 @@ fn wheels_spin_at_a_start_and_slip_control_ends_it() {
 fn a_released_brake_ends_a_slide() {
     for seed in 0..8 {
         let run = run("S7", seed);
-        let release = run.samples.windows(2).find(|pair| pair[0].effort < -0.5 && pair[1].effort == 0.0);
+        let release = run
+            .samples
+            .windows(2)
+            .find(|pair| pair[0].effort.is_some_and(|effort| effort < -0.5) && pair[1].effort == Some(0.0));
         let release = release.unwrap()[1].time.as_s();
         let sliding = run.truth[row(&run, release)].wheels;
         assert!(sliding.contains(&WheelTruth::Slide), "seed {seed}: {sliding:?}");
