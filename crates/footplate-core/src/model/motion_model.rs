@@ -171,7 +171,7 @@ impl MotionModel {
     #[must_use]
     pub fn for_later_session(&self) -> Self {
         let mut later = self.clone();
-        later.spread.widen(&Variation::between_sessions(), self.steps(), &self.values);
+        later.spread.widen(&Variation::between_sessions(), self.steps());
         later
     }
 

@@ -63,9 +63,9 @@ impl Spread {
     }
 
     /// What may have changed is known less well.
-    pub(super) fn widen(&mut self, by: &Variation, highest: usize, values: &[f64]) {
+    pub(super) fn widen(&mut self, by: &Variation, highest: usize) {
         let (side, covariance) = (self.side, &mut self.covariance);
-        by.each(highest, values, |one, other, more| {
+        by.each(highest, |one, other, more| {
             covariance[one * side + other] += more;
             if one != other {
                 covariance[other * side + one] += more;

@@ -26,9 +26,6 @@ pub(super) struct Variation {
     friction: f64,
     /// Of what stops and starts are longer than their law, as part of the speed (m per m/s).
     residual: f64,
-    /// Of lags and ramps, as part of them: of all alike, as by what a train pulls, and of those on the way down besides.
-    common_change: f64,
-    slowing: f64,
 }
 
 impl Variation {
@@ -43,8 +40,6 @@ impl Variation {
             kappa: 0.05,
             friction: 0.001,
             residual: 0.010,
-            common_change: 0.08,
-            slowing: 0.03,
         }
     }
 
@@ -59,8 +54,6 @@ impl Variation {
             kappa: 0.03,
             friction: 0.001,
             residual: 0.008,
-            common_change: 0.0,
-            slowing: 0.0,
         }
     }
 
@@ -76,23 +69,12 @@ impl Variation {
             kappa: by * self.kappa,
             friction: by * self.friction,
             residual: by * self.residual,
-            common_change: by * self.common_change,
-            slowing: by * self.slowing,
         }
     }
 
-    /// Calls `add` with each pair of numbers that changes and a covariance of their changes; those of a pair add up. `values` are the
-    /// numbers now.
-    pub(super) fn each(&self, highest: usize, values: &[f64], mut add: impl FnMut(usize, usize, f64)) {
+    /// Calls `add` with each pair of numbers that changes, once, and the covariance of their changes.
+    pub(super) fn each(&self, highest: usize, mut add: impl FnMut(usize, usize, f64)) {
         let squared = |deviation: f64| deviation * deviation;
-        let changes = || [UP, DOWN].into_iter().flat_map(|first| (1..4).map(move |place| first + place));
-        let value = |place: usize| values.get(place).copied().unwrap_or(0.0);
-        for one in changes() {
-            for other in changes().filter(|other| *other <= one) {
-                let slowing = if other >= DOWN { squared(self.slowing) } else { 0.0 };
-                add(one, other, (squared(self.common_change) + slowing) * value(one) * value(other));
-            }
-        }
         add(HYSTERESIS, HYSTERESIS, squared(self.hysteresis));
         for first in [UP, DOWN] {
             add(first, first, squared(self.delay));

@@ -8,7 +8,7 @@ use crate::quantity::Quantity;
 /// Names the formulas that made the numbers. Raise it when the same events come to other numbers: with every change of what
 /// `calibration::motion` of core makes of them, or of what [`MotionReplay`](crate::MotionReplay) tells it. Models and replays
 /// that stores keep are then made anew from the events; a test knows the numbers of every version.
-pub const MOTION_MODEL_VERSION: &str = "5";
+pub const MOTION_MODEL_VERSION: &str = "4";
 
 /// All that is known of how one train moves on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -26,9 +26,6 @@ const LONGEST_DOUBT: TimeSpan = TimeSpan::from_ms(4_000);
 /// A train that was pushed up should get to the next contact within this, at the slowest.
 const PUSHED_SPEED: Speed = Speed::from_mm_per_s(100.0);
 
-/// Dirt stops no train that is faster (stalls are met at the lowest steps: 50 mm/s and below).
-const STALLS_BELOW: Speed = Speed::from_mm_per_s(100.0);
-
 /// Pushed up this often without a contact, the train is not on the track any more.
 const MOST_PUSHES: u8 = 2;
 
@@ -122,10 +119,7 @@ impl Calibrator<'_> {
         let Some(step) = self.pushed_from.take() else { return };
         self.pushes = 0;
         if passed.missed == 0 {
-            // Whoever is faster did not begin, or its contact was reported late: that says nothing of the step.
-            if self.model().speed(step, Approach::Below).value < STALLS_BELOW {
-                self.fit.note_use(step, StepUse::Unreliable);
-            }
+            self.fit.note_use(step, StepUse::Unreliable);
             self.fit.interrupt();
             self.report_mishap(Mishap::Stalled { step });
         }

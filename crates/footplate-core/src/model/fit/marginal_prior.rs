@@ -99,18 +99,18 @@ impl MarginalPrior {
     }
 
     /// Time has passed on a chain that goes on: trains get warm, rails get dirty.
-    pub(super) fn age(&mut self, highest: usize, values: &[f64], until: f64) {
+    pub(super) fn age(&mut self, highest: usize, until: f64) {
         let hours = (until - self.widened).max(0.0) / 3600.0;
         self.widened = until;
-        self.widen(highest, values, &Variation::per_hour().over(hours));
+        self.widen(highest, &Variation::per_hour().over(hours));
     }
 
     /// A session is over: by the next the train, the track and the voltage are a little different.
-    pub(super) fn begin_session(&mut self, highest: usize, values: &[f64]) {
-        self.widen(highest, values, &Variation::between_sessions());
+    pub(super) fn begin_session(&mut self, highest: usize) {
+        self.widen(highest, &Variation::between_sessions());
     }
 
-    fn widen(&mut self, highest: usize, values: &[f64], by: &Variation) {
+    fn widen(&mut self, highest: usize, by: &Variation) {
         let side = self.equations.unknowns();
         // Where the first kept trip begins may not be known at all, nor a section or an offset; a covariance needs a bound.
         for free in side - 1 - self.local.len()..side {
@@ -123,7 +123,7 @@ impl MarginalPrior {
                 *slot += variance;
             }
         };
-        by.each(highest, values, &mut add);
+        by.each(highest, &mut add);
         self.equations.widen(&more);
     }
 }

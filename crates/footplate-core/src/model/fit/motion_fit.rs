@@ -153,7 +153,7 @@ impl MotionFit {
         }
         self.refit(sections);
         self.condense(self.chain.trips.len());
-        self.prior.begin_session(self.highest(), &self.model.values);
+        self.prior.begin_session(self.highest());
         self.refit(sections);
     }
 
@@ -194,7 +194,7 @@ impl MotionFit {
             super::learn::count(&mut self.prior.counts, trip);
         }
         if let Some(last) = old.last() {
-            self.prior.age(self.highest(), &self.model.values, last.begins);
+            self.prior.age(self.highest(), last.begins);
         }
     }
 
