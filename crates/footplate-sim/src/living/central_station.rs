@@ -101,7 +101,7 @@ impl<'l> VirtualCentralStation<'l> {
         let mut draws = Draws::new(seed, Purpose::Line);
         let CanSwitches { lost, duplicated, overtaken, .. } = switches;
         let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
-        let scanning = Scanning::begin(&world, now, switches.scan, &mut draws);
+        let scanning = Scanning::begin(&mut world, now, switches.scan, &mut draws);
         Self {
             world,
             switches,

@@ -26,7 +26,7 @@ pub(super) struct Scanning {
 
 impl Scanning {
     pub(super) fn begin(
-        world: &LivingLayout<'_>,
+        world: &mut LivingLayout<'_>,
         now: Timestamp,
         cycle: TimeSpan,
         draws: &mut Draws,
@@ -34,7 +34,16 @@ impl Scanning {
         let count =
             world.s88.sensors().iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or_default();
         let due = now + TimeSpan::from_s(draws.uniform(0.0..cycle.as_s()));
-        Self { cycle, due, contacts: vec![(false, now); count], reports: Vec::new() }
+        // What closed before the station was switched on is forgotten.
+        let per_module = usize::from(CONTACTS_PER_MODULE);
+        let held: Vec<u16> = (0..count.div_ceil(per_module))
+            .flat_map(|module| {
+                world.s88.read(module as u8 + 1, now, true, false).closed().collect::<Vec<_>>()
+            })
+            .map(|sensor| sensor.0)
+            .collect();
+        let contacts = (0..count).map(|place| (held.contains(&(place as u16)), now)).collect();
+        Self { cycle, due, contacts, reports: Vec::new() }
     }
 
     /// When all contacts are loaded next.
