@@ -3,7 +3,6 @@
 //! Brakes and protection are type-tested: what is claimed of them is the worst that the run shows, and a margin. Nothing
 //! else of the truth reaches the claims.
 
-use footplate_core::odometry::wheels::BrakeCommand;
 use footplate_core::{Acceleration, Speed, TimeSpan};
 
 use super::brake_cylinder::BrakeTimes;
@@ -34,7 +33,7 @@ const PROTECTS_M_PER_S: f64 = 3.0;
 /// Puts into a run what an operator of a level knows.
 pub(crate) fn claim(run: &mut LineRun, level: LineLevel, times: &BrakeTimes) {
     let vehicle = &run.vehicle;
-    let usual = BrakeCommand::cautious(vehicle.max_brake);
+    let usual = usual(vehicle.max_brake);
     let release = release(run).max(fades(times));
     let largest = |one: Acceleration, other: Acceleration| if one > other { one } else { other };
     let known = vehicle.brake_command;
@@ -46,7 +45,7 @@ pub(crate) fn claim(run: &mut LineRun, level: LineLevel, times: &BrakeTimes) {
             gradient: largest(usual.gradient, known.gradient + known.resistance),
             resistance: usual.resistance,
             build_up: usual.build_up.max(build_up(known.build_up, times)),
-            release: Some(usual.release.max(release)),
+            release: usual.release.map(|usual| usual.max(release)),
         },
         LineLevel::L2 => {
             LineBrake { build_up: build_up(known.build_up, times), release: Some(release), ..known }
@@ -61,6 +60,18 @@ pub(crate) fn claim(run: &mut LineRun, level: LineLevel, times: &BrakeTimes) {
     vehicle.independent &= level == LineLevel::L2;
     if level == LineLevel::L0 {
         run.samples.iter_mut().for_each(|sample| sample.effort = None);
+    }
+}
+
+/// What a vehicle file claims of the brake where it has no table of it (docs/formats/vehicle.md).
+fn usual(max_brake: Acceleration) -> LineBrake {
+    LineBrake {
+        full: max_brake * 0.75,
+        tolerance: 0.4,
+        gradient: Acceleration::from_m_per_s2(0.4),
+        resistance: Acceleration::ZERO,
+        build_up: TimeSpan::from_s(4.0),
+        release: Some(TimeSpan::from_s(10.0)),
     }
 }
 

@@ -34,7 +34,8 @@ fn a_train_is_calibrated_behind_a_central_station_and_stops_where_it_should() {
 #[test]
 fn a_calibration_made_over_a_6051_is_valid_over_a_central_station() {
     let (mut same, mut other) = (Vec::new(), Vec::new());
-    for seed in [7, 10, 11] {
+    // The error of a stop scatters from world to world more than from link to link.
+    for seed in [4, 7, 10, 11, 12, 14, 15, 16] {
         // One calibration; stops over the other link, and over the one that it was made over.
         let stays = calibrated_over(OTHER_LINK, &format!("can-transfer-{seed}"), seed);
         let moves = stays.join("moves");
@@ -44,10 +45,10 @@ fn a_calibration_made_over_a_6051_is_valid_over_a_central_station() {
         same.extend(errors(&driven(&stays, &format!("{OTHER_LINK}{seed}"), SCRIPT).1).0);
     }
     println!("over the 6051: {same:.1?}\nover the Central Station: {other:.1?}");
-    assert!(same.len() >= 15 && other.len() >= 15, "{same:?} {other:?}");
-    let (same, other) = (mean_and_median(same)[1], mean_and_median(other)[1]);
-    println!("median {same:.1} mm over the 6051, {other:.1} mm over the Central Station");
-    assert!(other <= 1.2 * same, "{other:.1} mm over the Central Station, {same:.1} mm over the 6051");
+    assert!(same.len() >= 40 && other.len() >= 40, "{same:?} {other:?}");
+    let (same, other) = (mean_and_median(same), mean_and_median(other));
+    println!("mean and median (mm) over the 6051 {same:.1?}, over the Central Station {other:.1?}");
+    assert!(other[0] <= 1.2 * same[0] && other[1] <= 1.2 * same[1], "{same:?} {other:?}");
 }
 
 #[test]
