@@ -2,6 +2,9 @@
 
 use footplate_core::{TimeSpan, Timestamp};
 
+use crate::locomotives::Locomotives;
+use crate::session::{Closing, Confirmation};
+
 /// How long the end waits for all stops to be confirmed before the power goes off all the same: several repeats.
 const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
 
@@ -35,6 +38,50 @@ impl Farewell {
         match self {
             Self::Stopping { until } => Some(until),
             _ => None,
+        }
+    }
+
+    /// The power that is going off has to wait: trains have to be stopped again.
+    pub(crate) fn begin_again(&mut self, now: Timestamp) {
+        if let Self::SwitchingOff { .. } = self {
+            self.begin(now);
+        }
+    }
+
+    /// Whether it is time to switch the power off; true once.
+    pub(crate) fn switch_off_is_due(&mut self, now: Timestamp, locomotives: &Locomotives) -> bool {
+        let Self::Stopping { until } = *self else { return false };
+        let is_due = now >= until || locomotives.driven(false).is_empty();
+        if is_due {
+            *self = Self::SwitchingOff { is_confirmed: false };
+        }
+        is_due
+    }
+
+    /// The station has said that the track has no power.
+    pub(crate) fn power_went_off(&mut self) {
+        if let Self::SwitchingOff { is_confirmed } = self {
+            *is_confirmed = true;
+        }
+    }
+
+    /// Ends the session when everything is confirmed; then returns how it ended, once.
+    pub(crate) fn end_if_confirmed(&mut self, locomotives: &Locomotives) -> Option<Closing> {
+        let is_off = *self == Self::SwitchingOff { is_confirmed: true };
+        (is_off && locomotives.driven(false).is_empty()).then(|| {
+            *self = Self::Over;
+            self.statement(locomotives)
+        })
+    }
+
+    /// How far the end has come. No solenoid is held by a track without power.
+    pub(crate) fn statement(self, locomotives: &Locomotives) -> Closing {
+        Closing {
+            commanded_to_stop: locomotives.driven(true),
+            not_commanded: locomotives.driven(false),
+            solenoids_released: None,
+            power_off: matches!(self, Self::Over | Self::SwitchingOff { is_confirmed: true }),
+            confirmation: Confirmation::Replies,
         }
     }
 }

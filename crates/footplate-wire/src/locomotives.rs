@@ -2,7 +2,9 @@
 
 use alloc::vec::Vec;
 
-use footplate_core::{SpeedStep, TrainId};
+use footplate_core::{Command, SpeedStep, TrainId};
+
+use crate::queue::Queue;
 
 /// One locomotive.
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +52,23 @@ impl Locomotives {
 
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Locomotive> {
         self.0.iter_mut()
+    }
+
+    /// A train is going to be stopped, whoever drove it.
+    pub(crate) fn know_driven(&mut self, train: TrainId) {
+        self.know(train);
+        if let Some(locomotive) = self.get_mut(train) {
+            locomotive.is_driven = true;
+        }
+    }
+
+    /// Stops every train that ever had a speed.
+    pub(crate) fn stop_driven(&mut self, waiting: &mut Queue) {
+        for locomotive in self.0.iter_mut().filter(|locomotive| locomotive.is_driven) {
+            locomotive.is_stopped = false;
+            // Stops are always taken.
+            let _ = waiting.push(Command::Speed { train: locomotive.train, step: SpeedStep::STAND });
+        }
     }
 
     /// Those that ever had a speed and have stopped, or not.

@@ -2,7 +2,7 @@
 
 use alloc::collections::VecDeque;
 
-use footplate_core::{Command, SpeedStep, TrainId};
+use footplate_core::{Command, EventKind, SpeedStep, TrainId};
 
 /// More than this is no plan but a mistake: at 9 ms each, as on the fastest link, it is more than two seconds of nothing but
 /// commands.
@@ -109,9 +109,33 @@ impl Queue {
         self.urgent.iter().chain(&self.usual)
     }
 
+    /// The trains whose stops wait.
+    pub(crate) fn stops(&self) -> impl Iterator<Item = TrainId> {
+        self.urgent.iter().filter_map(train_of)
+    }
+
     pub(crate) fn clear(&mut self) {
         self.urgent.clear();
         self.usual.clear();
+    }
+}
+
+/// The train that a command is for.
+pub(crate) const fn train_of(command: &Command) -> Option<TrainId> {
+    match command {
+        Command::Speed { train, .. } | Command::Reverse { train } => Some(*train),
+        _ => None,
+    }
+}
+
+/// The entry of the recording when a command leaves for the nth time; power has none, and a reversal that is repeated sets the
+/// same direction again.
+pub(crate) const fn entry_of(command: &Command, nth: u8) -> Option<EventKind> {
+    match *command {
+        Command::Speed { train, step } => Some(EventKind::Speed { train, step }),
+        Command::Reverse { train } if nth == 1 => Some(EventKind::Reverse { train }),
+        Command::Turnout { turnout, curved } => Some(EventKind::Turnout { turnout, curved }),
+        _ => None,
     }
 }
 

@@ -18,7 +18,7 @@ use super::settings::{Settings, TurnoutRequests};
 use crate::farewell::Farewell;
 use crate::locomotives::Locomotives;
 use crate::pacing::Pacing;
-use crate::queue::Queue;
+use crate::queue::{Queue, entry_of, train_of};
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 use crate::silence::{Checks, Silence};
 
@@ -155,7 +155,7 @@ impl Client {
         if let Some(train) = self.without_direction_at_end() {
             return Some(query(train));
         }
-        if self.switch_off_is_due(now) {
+        if self.farewell.switch_off_is_due(now, &self.locomotives) {
             return Some(self.outgoing(Command::PowerOff));
         }
         if now < self.pacing.usual_at() || self.farewell.has_begun() {
@@ -277,13 +277,7 @@ impl Client {
             self.outstanding.push(Outstanding { request, awaited, command, sent: now, tries });
             self.silence.asked(now);
         }
-        let kind = match command {
-            Some(Command::Speed { train, step }) => EventKind::Speed { train, step },
-            // A repetition sets the same direction again.
-            Some(Command::Reverse { train }) if tries == 1 => EventKind::Reverse { train },
-            Some(Command::Turnout { turnout, curved }) => EventKind::Turnout { turnout, curved },
-            _ => return,
-        };
+        let Some(kind) = command.and_then(|command| entry_of(&command, tries)) else { return };
         self.enter(now, kind);
     }
 
@@ -308,14 +302,6 @@ impl Client {
         let waits = self.waiting.iter().map(of_command).min();
         let verifies = (!self.unverified.is_empty()).then(|| self.pacing.usual_at());
         [waits, verifies].into_iter().flatten().min()
-    }
-}
-
-/// The train that a command is for.
-const fn train_of(command: &Command) -> Option<TrainId> {
-    match command {
-        Command::Speed { train, .. } | Command::Reverse { train } => Some(*train),
-        _ => None,
     }
 }
 
@@ -408,6 +394,6 @@ impl Session for Client {
     }
 
     fn closing(&self) -> Closing {
-        self.statement()
+        self.farewell.statement(&self.locomotives)
     }
 }

@@ -23,7 +23,7 @@ use super::uid::Uid;
 use crate::farewell::Farewell;
 use crate::locomotives::Locomotives;
 use crate::pacing::Pacing;
-use crate::queue::Queue;
+use crate::queue::{Queue, train_of};
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 use crate::silence::{Checks, Silence};
 
@@ -205,7 +205,7 @@ impl Client {
         if let Some(release) = self.next_release(now) {
             return Some(release);
         }
-        if self.switch_off_is_due(now) {
+        if self.farewell.switch_off_is_due(now, &self.locomotives) {
             return Some(self.outgoing(now, Command::PowerOff));
         }
         if now < self.pacing.usual_at() || self.farewell.has_begun() {
@@ -283,14 +283,6 @@ fn silence(transport: Transport) -> Silence {
         Transport::Network => NETWORK_CHECKS,
         Transport::Adapter => ADAPTER_CHECKS,
     })
-}
-
-/// The train that a command is for.
-const fn train_of(command: &Command) -> Option<TrainId> {
-    match command {
-        Command::Speed { train, .. } | Command::Reverse { train } => Some(*train),
-        _ => None,
-    }
 }
 
 /// The position of a turnout on the bus: 0 is round, 1 is straight.
@@ -394,6 +386,6 @@ impl Session for Client {
     }
 
     fn closing(&self) -> Closing {
-        self.statement()
+        self.farewell.statement(&self.locomotives)
     }
 }

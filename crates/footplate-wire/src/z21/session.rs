@@ -20,7 +20,7 @@ use super::turnouts::Turnouts;
 use crate::farewell::Farewell;
 use crate::locomotives::Locomotives;
 use crate::pacing::Pacing;
-use crate::queue::Queue;
+use crate::queue::{Queue, entry_of, train_of};
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 use crate::silence::{Checks, Silence};
 
@@ -184,7 +184,7 @@ impl Client {
         if let Some(train) = self.without_direction_at_end() {
             return Some(query(train));
         }
-        if self.switch_off_is_due(now) {
+        if self.farewell.switch_off_is_due(now, &self.locomotives) {
             return Some(self.outgoing(now, Command::PowerOff));
         }
         if now < self.pacing.usual_at() {
@@ -326,13 +326,7 @@ impl Client {
             self.outstanding.push(Outstanding { request, awaited, command, sent: now, tries });
             self.silence.asked(now);
         }
-        let kind = match command {
-            Some(Command::Speed { train, step }) => EventKind::Speed { train, step },
-            // A repetition sets the same direction again.
-            Some(Command::Reverse { train }) if tries == 1 => EventKind::Reverse { train },
-            Some(Command::Turnout { turnout, curved }) => EventKind::Turnout { turnout, curved },
-            _ => return,
-        };
+        let Some(kind) = command.and_then(|command| entry_of(&command, tries)) else { return };
         if tries > 1
             && let Request::SetTurnout { address, second, .. } = request
         {
@@ -371,14 +365,6 @@ const fn question_with(request: Request) -> Option<Request> {
         Request::Drive { address, .. } => Some(Request::Locomotive { address }),
         Request::SetTurnout { address, activate: true, .. } => Some(Request::Turnout { address }),
         Request::SetBroadcasts(_) => Some(Request::Broadcasts),
-        _ => None,
-    }
-}
-
-/// The train that a command is for.
-const fn train_of(command: &Command) -> Option<TrainId> {
-    match command {
-        Command::Speed { train, .. } | Command::Reverse { train } => Some(*train),
         _ => None,
     }
 }
@@ -470,6 +456,6 @@ impl Session for Client {
     }
 
     fn closing(&self) -> Closing {
-        self.statement()
+        self.farewell.statement(&self.locomotives)
     }
 }

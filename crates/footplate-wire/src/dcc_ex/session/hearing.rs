@@ -127,7 +127,7 @@ impl Client {
         }
         self.is_powered = on;
         if !on {
-            self.power_went_off();
+            self.farewell.power_went_off();
         }
     }
 

@@ -12,6 +12,7 @@ use super::super::solenoid::Solenoid;
 use super::super::speed::speed_of;
 use super::super::uid::Uid;
 use super::{Client, Outgoing, Query, position_of};
+use crate::queue::entry_of;
 use crate::session::{LinkNotice, Transmit};
 
 impl Client {
@@ -175,16 +176,10 @@ impl Client {
             self.outstanding.push(Outstanding { message, awaited, command, sent: now, tries });
             self.silence.asked(now);
         }
-        let kind = match command {
-            Some(Command::Speed { train, step }) => EventKind::Speed { train, step },
-            // A repetition sets the same direction again.
-            Some(Command::Reverse { train }) if tries == 1 => EventKind::Reverse { train },
-            Some(Command::Turnout { turnout, curved }) => {
-                self.solenoid = Some(Solenoid::powered(turnout, curved, now));
-                EventKind::Turnout { turnout, curved }
-            }
-            _ => return,
-        };
+        let Some(kind) = command.and_then(|command| entry_of(&command, tries)) else { return };
+        if let EventKind::Turnout { turnout, curved } = kind {
+            self.solenoid = Some(Solenoid::powered(turnout, curved, now));
+        }
         self.enter(now, kind);
     }
 }

@@ -2,40 +2,27 @@
 
 use alloc::vec::Vec;
 
-use footplate_core::{Command, SpeedStep, Timestamp, TrainId};
+use footplate_core::TrainId;
 
 use super::super::request::Request;
 use super::Client;
 use crate::farewell::Farewell;
-use crate::session::{Closing, Confirmation, LinkNotice, Transmit};
+use crate::session::{LinkNotice, Transmit};
 
 impl Client {
     /// Stops that wait are not dropped at the end. A train that was never driven here, as one that an earlier session left running,
     /// cannot be commanded before the station has said how it faces: it is stopped with all others first.
     pub(super) fn keep_stops(&mut self) {
-        let stop = |command: &Command| match command {
-            Command::Speed { train, step: SpeedStep::STAND } => Some(*train),
-            _ => None,
-        };
-        for train in self.waiting.iter().filter_map(stop) {
-            self.locomotives.know(train);
+        for train in self.waiting.stops() {
+            self.locomotives.know_driven(train);
             self.stops_all |= !self.locomotives.has_direction(train);
-            if let Some(locomotive) = self.locomotives.get_mut(train) {
-                locomotive.is_driven = true;
-            }
         }
     }
 
     /// Stops every train that ever had a speed.
     pub(super) fn stop_driven(&mut self) {
-        for locomotive in self.locomotives.iter_mut().filter(|locomotive| locomotive.is_driven) {
-            locomotive.is_stopped = false;
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train: locomotive.train, step: SpeedStep::STAND });
-        }
-        if let Farewell::SwitchingOff { .. } = self.farewell {
-            self.farewell.begin(self.now);
-        }
+        self.locomotives.stop_driven(&mut self.waiting);
+        self.farewell.begin_again(self.now);
     }
 
     /// At the end, a train to be stopped of which the board has not said yet how it faces, and was not asked.
@@ -47,30 +34,10 @@ impl Client {
         self.locomotives.driven(false).into_iter().filter(|_| waits).find(is_unasked)
     }
 
-    /// Whether it is time to switch the power off at the end; true once.
-    pub(super) fn switch_off_is_due(&mut self, now: Timestamp) -> bool {
-        let Farewell::Stopping { until } = self.farewell else { return false };
-        let is_due = now >= until || self.locomotives.driven(false).is_empty();
-        if is_due {
-            self.farewell = Farewell::SwitchingOff { is_confirmed: false };
-        }
-        is_due
-    }
-
-    /// The station has said that the track has no power.
-    pub(super) fn power_went_off(&mut self) {
-        if let Farewell::SwitchingOff { is_confirmed } = &mut self.farewell {
-            *is_confirmed = true;
-        }
-    }
-
     /// Ends the session when everything is confirmed.
     pub(super) fn end_if_confirmed(&mut self) {
-        let is_off = self.farewell == Farewell::SwitchingOff { is_confirmed: true };
-        if is_off && self.locomotives.driven(false).is_empty() {
-            self.farewell = Farewell::Over;
+        if let Some(closing) = self.farewell.end_if_confirmed(&self.locomotives) {
             self.log_off();
-            let closing = self.statement();
             self.notify(LinkNotice::Closed(closing));
         }
     }
@@ -80,18 +47,5 @@ impl Client {
         let mut bytes = Vec::new();
         Request::LogOff.write(&mut bytes);
         self.output.push_back(Transmit::Message(bytes));
-    }
-
-    pub(super) fn statement(&self) -> Closing {
-        Closing {
-            commanded_to_stop: self.locomotives.driven(true),
-            not_commanded: self.locomotives.driven(false),
-            solenoids_released: None,
-            power_off: matches!(
-                self.farewell,
-                Farewell::Over | Farewell::SwitchingOff { is_confirmed: true }
-            ),
-            confirmation: Confirmation::Replies,
-        }
     }
 }

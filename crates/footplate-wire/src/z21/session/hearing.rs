@@ -163,7 +163,7 @@ impl Client {
         self.power_is_suspect = false;
         self.is_powered = on;
         if !on {
-            self.power_went_off();
+            self.farewell.power_went_off();
         }
     }
 
