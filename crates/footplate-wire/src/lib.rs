@@ -7,13 +7,17 @@
 extern crate alloc;
 
 pub mod dcc_ex;
+mod dialogue;
 mod farewell;
 mod locomotives;
 pub mod marklin_can;
 pub mod marklin_serial;
 mod news;
+mod opening;
+mod outstanding;
 mod pacing;
 mod queue;
+mod sensors;
 mod session;
 mod silence;
 pub mod z21;

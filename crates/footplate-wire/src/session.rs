@@ -3,6 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
+use core::ops::RangeInclusive;
 
 use footplate_core::{Command, Event, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
@@ -239,6 +240,22 @@ pub enum CommandError {
     TooManyWaiting(usize),
     /// The session is closed or being closed.
     Closed,
+}
+
+impl CommandError {
+    /// Refuses a train whose address a link does not have.
+    pub(crate) fn check_train(train: TrainId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&train.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Train { train, addresses })
+    }
+
+    /// Refuses a turnout whose address a link does not have.
+    pub(crate) fn check_turnout(turnout: TurnoutId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&turnout.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Turnout { turnout, addresses })
+    }
 }
 
 impl Display for CommandError {
