@@ -9,6 +9,7 @@
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
 mod dcc_ex_vectors;
+mod desk;
 mod marklin_can_round_trip;
 mod marklin_can_session;
 mod marklin_can_vectors;
