@@ -10,6 +10,7 @@ pub mod dcc_ex;
 mod dialogue;
 mod farewell;
 mod locomotives;
+pub mod loconet;
 pub mod marklin_can;
 pub mod marklin_serial;
 mod news;

@@ -130,6 +130,11 @@ pub enum LinkNotice {
         /// The turnout.
         turnout: TurnoutId,
     },
+    /// The station has no slot for a train: others use all of them.
+    NoSlot {
+        /// The train.
+        train: TrainId,
+    },
     /// Another throttle drives a train of this program.
     OtherThrottle {
         /// The train.
@@ -326,6 +331,11 @@ impl Display for LinkNotice {
                 f,
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
                  `turnouts=defined`"
+            ),
+            Self::NoSlot { train } => write!(
+                f,
+                "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \
+                 restart the station"
             ),
             Self::OtherThrottle { train, reversed } => write!(
                 f,

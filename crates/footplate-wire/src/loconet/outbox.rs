@@ -1,0 +1,58 @@
+//! Messages on their way to the bus: the server takes the next when it has said what became of the one before.
+
+use alloc::collections::VecDeque;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use super::message::Message;
+
+/// The server says what became of a message within this time. On an idle bus that is a few milliseconds; programs warn after 250 ms.
+const SENT_WITHIN: TimeSpan = TimeSpan::from_ms(500);
+
+/// What waits, and what is on its way.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Outbox {
+    waiting: VecDeque<Message>,
+    on_its_way: Option<(Message, Timestamp)>,
+}
+
+impl Outbox {
+    pub(super) fn push(&mut self, messages: impl IntoIterator<Item = Message>) {
+        self.waiting.extend(messages);
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.waiting.is_empty() && self.on_its_way.is_none()
+    }
+
+    /// The message that may be written now.
+    pub(super) fn next(&mut self, now: Timestamp) -> Option<Message> {
+        self.on_its_way.take_if(|(_, written)| now >= *written + SENT_WITHIN);
+        if self.on_its_way.is_some() {
+            return None;
+        }
+        let message = self.waiting.pop_front()?;
+        self.on_its_way = Some((message, now));
+        Some(message)
+    }
+
+    /// The server has said what became of the message on its way.
+    pub(super) fn sent(&mut self) -> Option<Message> {
+        self.on_its_way.take().map(|(message, _)| message)
+    }
+
+    /// Whether a message from the bus is this client's own.
+    pub(super) fn is_own(&self, message: &Message) -> bool {
+        self.on_its_way.is_some_and(|(own, _)| own == *message)
+    }
+
+    /// When the message on its way counts as lost.
+    pub(super) fn due(&self) -> Option<Timestamp> {
+        self.on_its_way.map(|(_, written)| written + SENT_WITHIN)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.waiting.clear();
+        self.on_its_way = None;
+    }
+}
