@@ -7,7 +7,10 @@ use footplate_core::{TimeSpan, Timestamp};
 use super::message::Message;
 
 /// The server says what became of a message within this time. On an idle bus that is a few milliseconds; programs warn after 250 ms.
-const SENT_WITHIN: TimeSpan = TimeSpan::from_ms(500);
+pub(super) const SENT_WITHIN: TimeSpan = TimeSpan::from_ms(500);
+
+/// At the end of a session it is not waited for longer than this: four times what a message takes on an idle bus.
+pub(super) const SENT_WITHIN_AT_END: TimeSpan = TimeSpan::from_ms(20);
 
 /// What waits, and what is on its way.
 #[derive(Debug, Clone, Default)]
@@ -25,9 +28,9 @@ impl Outbox {
         self.waiting.is_empty() && self.on_its_way.is_none()
     }
 
-    /// The message that may be written now.
-    pub(super) fn next(&mut self, now: Timestamp) -> Option<Message> {
-        self.on_its_way.take_if(|(_, written)| now >= *written + SENT_WITHIN);
+    /// The message that may be written now; `within`: how long the server's word on the one before is waited for.
+    pub(super) fn next(&mut self, now: Timestamp, within: TimeSpan) -> Option<Message> {
+        self.on_its_way.take_if(|(_, written)| now >= *written + within);
         if self.on_its_way.is_some() {
             return None;
         }
@@ -47,8 +50,8 @@ impl Outbox {
     }
 
     /// When the message on its way counts as lost.
-    pub(super) fn due(&self) -> Option<Timestamp> {
-        self.on_its_way.map(|(_, written)| written + SENT_WITHIN)
+    pub(super) fn due(&self, within: TimeSpan) -> Option<Timestamp> {
+        self.on_its_way.map(|(_, written)| written + within)
     }
 
     pub(super) fn clear(&mut self) {

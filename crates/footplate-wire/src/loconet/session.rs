@@ -9,7 +9,7 @@ use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId
 
 use super::line::{Line, Lines};
 use super::message::Message;
-use super::outbox::Outbox;
+use super::outbox::{Outbox, SENT_WITHIN, SENT_WITHIN_AT_END};
 use super::outstanding::Awaited;
 use super::request::{HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
 use super::settings::Settings;
@@ -118,10 +118,15 @@ impl Client {
     /// Writes the message that waits, if the server may be given one.
     fn write_waiting(&mut self, now: Timestamp) {
         if !self.dialogue.farewell.is_over()
-            && let Some(message) = self.outbox.next(now)
+            && let Some(message) = self.outbox.next(now, self.sent_within())
         {
             self.dialogue.write(Line::Send(message).text().into_bytes());
         }
+    }
+
+    /// How long the server's word on a message is waited for.
+    fn sent_within(&self) -> TimeSpan {
+        if self.dialogue.farewell.has_begun() { SENT_WITHIN_AT_END } else { SENT_WITHIN }
     }
 
     /// What is to be written next, if anything may be written now.
@@ -361,7 +366,11 @@ impl Session for Client {
     fn next_timeout(&self) -> Option<Timestamp> {
         if !self.outbox.is_empty() && !self.dialogue.farewell.is_over() {
             // Nothing is written before the server has said what became of the last message.
-            let times = [self.outbox.due(), self.dialogue.silence.due(), self.dialogue.farewell.due()];
+            let times = [
+                self.outbox.due(self.sent_within()),
+                self.dialogue.silence.due(),
+                self.dialogue.farewell.due(),
+            ];
             return times.into_iter().flatten().filter(|at| *at > self.dialogue.now).min();
         }
         let paced = self.dialogue.pacing.usual_at();

@@ -151,7 +151,14 @@ impl DrivenSlots {
         match self.of_mut(train) {
             Some(slot) => (slot.number, slot.forward, slot.functions) = (number, forward, functions),
             None => {
-                self.0.push(DrivenSlot { train, number, forward, functions, commanded: None, refreshed: now })
+                self.0.push(DrivenSlot {
+                    train,
+                    number,
+                    forward,
+                    functions,
+                    commanded: None,
+                    refreshed: now,
+                });
             }
         }
     }

@@ -64,7 +64,7 @@ impl Client {
             Message::Slot(data) => self.hear_of_slot(now, &data),
             Message::Input { number, is_occupied } => self.hear_of_sensor(now, number, is_occupied),
             Message::Switch { address, closed, on: true } => {
-                self.hear_of_turnout(now, address, closed, is_own)
+                self.hear_of_turnout(now, address, closed, is_own);
             }
             Message::Speed { slot, .. } | Message::Direction { slot, .. } if !is_own => {
                 // Another throttle drives it: the slot says how.
