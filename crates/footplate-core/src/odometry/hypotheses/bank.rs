@@ -6,6 +6,7 @@ use super::filters::{Filters, Pool};
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
+use super::reach::Reach;
 use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
 use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
@@ -84,6 +85,8 @@ pub(in super::super) struct Bank {
     pub(super) side: f64,
     /// Whether each wheel has been turned up to the speed of the train.
     pub(super) touches: [Touch; 2],
+    /// How far the train may be from wheels that lost the rail together.
+    reach: Reach,
     /// What came out of the last period.
     speed: f64,
     acceleration: f64,
@@ -109,6 +112,7 @@ impl Bank {
             acted: 0.0,
             side: 1.0,
             touches: [Touch::new(); 2],
+            reach: Reach::new(),
             speed,
             acceleration: 0.0,
             variance,
@@ -138,6 +142,7 @@ impl Bank {
         self.acceleration = -self.acceleration;
         self.trend = -self.trend;
         self.wheels_a = -self.wheels_a;
+        self.reach.reverse();
     }
 
     /// Takes in a period of `t` seconds; how far the train went (m).
@@ -160,8 +165,15 @@ impl Bank {
     }
 
     /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
-    pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        interval(&self.probability, &self.filters, &self.ways, scene, risk, t)
+    pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+        let [likely, way] = interval(&self.probability, &self.filters, &self.ways, scene, risk, t);
+        let wheels = self.compared(scene);
+        let speed = self.reach.widen(likely, scene, &wheels, self.probability.0, self.wheels_a, t);
+        let way = Range {
+            low: way.low + (speed.low - likely.low) * t,
+            high: way.high + (speed.high - likely.high) * t,
+        };
+        [speed, way]
     }
 
     /// Which way wheels that lose their grip turn.

@@ -1,0 +1,141 @@
+//! Which speeds the train can have while both wheelsets may have lost the rail together.
+//!
+//! Two wheels that creep alike look like two wheels that roll: no likelihood tells them apart, so no probability can be
+//! trusted there. While brake or traction act on both wheelsets, the interval therefore reaches beyond the wheels by the
+//! creepage that goes unseen. Once both were seen to slip, it reaches as far as the train can have accelerated since.
+//! That ends where wheels must roll: some time after brake and traction were released.
+
+use super::evidence::{Compared, SILENT};
+use super::scene::{Scene, WheelScene};
+use crate::odometry::wheels::{Range, larger, smaller};
+
+/// Creepage of both wheelsets that begins unseen (part of the speed), under the brake and in traction. Steady creepage of
+/// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
+/// takes 0.05 for full traction.
+const UNSEEN: [f64; 2] = [0.12, 0.06];
+/// The same of wheelsets that are braked independently: no converter holds both.
+const UNSEEN_INDEPENDENT: f64 = 0.04;
+/// Creepage of both that lasts after they were seen to slip: part of the speed, and m/s.
+const LASTING: (f64, f64) = (0.25, 1.0);
+/// Probability at which both are seen to slip, and below which wheels that turn alike creep within limits.
+const SEEN: f64 = 0.3;
+const ALIKE: f64 = 0.05;
+/// Wheels turn alike that differ by less than this part of their speed, and this (m/s), for so long (s).
+const APART: (f64, f64) = (0.03, 0.3);
+const ALIKE_FOR_S: f64 = 1.0;
+/// Deviations within which a wheel tells its own speed.
+const OF_WHEEL: f64 = 4.0;
+/// How long after brake or traction ended both roll (s).
+const ROLLS_AFTER_S: f64 = 5.0;
+/// How far the train accelerates beyond its command while both slip (m/s²): gradients of 35 mm/m ...
+const GRADIENT: f64 = 0.35;
+/// ... and how much it decelerates at least with locked wheels (m/s²): by ice of 0.012 of which a fifth is left.
+const LOCKED: f64 = 0.025;
+/// Least effort that makes wheels creep.
+const EFFORT: f64 = 0.02;
+/// Acceleration of wheels by which a train without a recorded command is braked or driven (m/s²).
+const TREND: f64 = 0.03;
+
+/// How far the train may be from its wheels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    /// Speeds that the train can have (m/s).
+    speed: Range,
+    /// Both were seen to slip, and have not had to roll since.
+    slipped: bool,
+    alike_for: f64,
+    /// Time since brake and traction acted (s).
+    since: [f64; 2],
+}
+
+impl Reach {
+    pub(super) const fn new() -> Self {
+        let speed = Range { low: 0.0, high: 0.0 };
+        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2] }
+    }
+
+    /// The train has turned round.
+    pub(super) fn reverse(&mut self) {
+        self.speed = self.speed.reversed();
+    }
+
+    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `wheels_a` is how
+    /// the wheels accelerate (m/s²).
+    pub(super) fn widen(
+        &mut self,
+        likely: Range,
+        scene: &Scene,
+        wheels: &[Compared; 2],
+        p: [f64; 8],
+        wheels_a: f64,
+        t: f64,
+    ) -> Range {
+        let [.., slip, creep, _, first_dead, second_dead] = p;
+        let silent = wheels.iter().all(|wheel| wheel.speed.abs() < SILENT);
+        let [brakes, drives] = self.acts(scene, silent, wheels_a);
+        for (since, acts) in self.since.iter_mut().zip([brakes, drives]) {
+            *since = if acts { 0.0 } else { *since + t };
+        }
+        let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
+        let dead = first_dead + second_dead;
+        let turn_alike = self.turn_alike(scene, wheels, dead > 0.5);
+        let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
+        self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
+        let alike = self.alike_for >= ALIKE_FOR_S;
+        let free = brake <= 0.0 && traction <= 0.0;
+        self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !(alike && free);
+
+        let Range { low, high } = scene.acceleration;
+        let commanded = scene.commanded.unwrap_or(0.0);
+        let up = if silent && brakes { -LOCKED } else { GRADIENT + larger(commanded, 0.0) };
+        let (up, down) = match scene.commanded {
+            Some(_) => (smaller(high, up), larger(low, smaller(commanded, 0.0) - GRADIENT)),
+            None => (smaller(high, if silent { 0.0 } else { high }), low),
+        };
+        let reaches = Range { low: self.speed.low + down * t, high: self.speed.high + up * t };
+        let moving = larger(likely.high.abs(), likely.low.abs());
+        let creeps = |unseen: f64| {
+            let unseen = if scene.independent { UNSEEN_INDEPENDENT } else { unseen };
+            let (part, least) = if self.slipped { LASTING } else { (unseen, 0.0) };
+            part * moving + least
+        };
+        let [of_brake, of_traction] = UNSEEN.map(creeps);
+        let about = Range { low: likely.low - traction * of_traction, high: likely.high + brake * of_brake };
+        let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
+        self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
+        if dead > SEEN && !turn_alike {
+            // The sensor that is taken for dead may be the one that is right.
+            self.speed = wheels.iter().fold(self.speed, |all, wheel| {
+                let off = OF_WHEEL * libm::sqrt(wheel.variance);
+                all.or(Range { low: wheel.speed - off, high: wheel.speed + off })
+            });
+        }
+        self.speed
+    }
+
+    /// Whether what is read of the wheels is one speed.
+    fn turn_alike(&self, scene: &Scene, [one, other]: &[Compared; 2], one_is_dead: bool) -> bool {
+        let [first, second] = &scene.wheels;
+        let quiet = |wheel: &WheelScene, compared: &Compared| {
+            !wheel.read || wheel.stuck || compared.speed.abs() < SILENT && one_is_dead
+        };
+        if quiet(first, one) || quiet(second, other) {
+            return true;
+        }
+        let (part, least) = APART;
+        let noise = libm::sqrt(one.variance + other.variance);
+        (one.speed - other.speed).abs() < part * one.speed.abs() + least + 2.0 * noise
+    }
+
+    /// Whether brake and traction act on both wheelsets.
+    fn acts(&self, scene: &Scene, silent: bool, wheels_a: f64) -> [bool; 2] {
+        let [brakes, drives] = match scene.commanded {
+            Some(commanded) => [commanded < -EFFORT, commanded > EFFORT],
+            // Wheels that a brake has locked show nothing more of it.
+            None if silent => self.since.map(|since| since <= 0.0),
+            None => [wheels_a < -TREND, wheels_a > TREND],
+        };
+        let all = |of: fn(&WheelScene) -> bool| scene.wheels.iter().all(of);
+        [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
+    }
+}
