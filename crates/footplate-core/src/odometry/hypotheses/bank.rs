@@ -232,13 +232,13 @@ impl Bank {
         pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
         let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
         let lost = self.lost(scene, wheels, &pool);
-        let found = if lost > 0.0 { BOTH_ROLL * LOST + NOT_ROLLING } else { Lanes::all(1.0) };
+        let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
         let arrives = after_rolling * rolling + after_others * others * found;
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
         self.filters.mix(&pool, share);
-        self.filters.pvv += BOTH_ROLL * share * lost;
+        self.filters.pvv += share * lost;
         self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
         self.probability = next * (1.0 / next.sum());
         // A train at rest stays there.
@@ -250,17 +250,34 @@ impl Bank {
         *paa = *paa * MOVES + STANDS * AT_REST;
     }
 
-    /// Where wheels turn alike at quite another speed than a slide was thought to have, the slide may have been lost, and
-    /// they roll. By how much the variance of the train has to grow for that (m²/s²), so that the leap is paid for once.
-    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> f64 {
-        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
-        let [.., slip, _, _, _, _] = self.probability.0;
-        let leap = (0.5 * (one.speed + other.speed) - pool.v).abs();
+    /// By how much the variance of the train grows (m²/s²) for each hypothesis that begins with a leap of its speed, so that
+    /// the leap is paid for once.
+    ///
+    /// A slide may have been lost where wheels turn alike at quite another speed than it was thought to have: they roll. A
+    /// sensor that was taken for dead may be the one that is right: its wheel rolls, and the other slips or is dead.
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
+        let [.., slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
-        // Less can be wheels that creep alike.
-        let far = larger(FAR * libm::sqrt(pool.pvv + one.variance), most + part * pool.v.abs());
-        // Spinning wheels do turn alike.
-        if self.side > 0.0 && turn && slip > 0.9 && leap > far { leap * leap } else { 0.0 }
+        let leap = |speed: f64, variance: f64, least: f64| {
+            let leap = (speed - pool.v).abs();
+            let far = larger(FAR * libm::sqrt(pool.pvv + variance), least);
+            if leap > far { leap * leap } else { 0.0 }
+        };
+        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
+        // Less can be wheels that creep alike, and spinning wheels do turn alike.
+        let alike = if self.side > 0.0 && turn && slip > 0.9 {
+            leap(0.5 * (one.speed + other.speed), one.variance, most + part * pool.v.abs())
+        } else {
+            0.0
+        };
+        let of_wheel = |wheel: &WheelScene, compared: &Compared| {
+            let counts = wheel.read && !wheel.stuck && wheel.speed.abs() > SILENT;
+            if counts { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
+        };
+        let [first, second] = &scene.wheels;
+        let of_first = if first_dead > 0.9 { of_wheel(first, one) } else { 0.0 };
+        let of_second = if second_dead > 0.9 { of_wheel(second, other) } else { 0.0 };
+        Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
     }
 
     /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have

@@ -73,6 +73,9 @@ pub struct Tachometer {
     unread: f64,
     /// What was taken away from the last sample as a spike.
     withheld: f64,
+    /// The last sample surprised and was passed on: the next is no spike, whatever it says. Withheld again, it would feed
+    /// the expectation that it surprised.
+    passes: bool,
     /// The sensor is wired the wrong way round: 1 or −1.
     wiring: f64,
     contradictions: u32,
@@ -91,6 +94,7 @@ impl Tachometer {
             assumed: 0.0,
             unread: 0.0,
             withheld: 0.0,
+            passes: false,
             wiring: 1.0,
             contradictions: 0,
             last_way: 0.0,
@@ -129,6 +133,7 @@ impl Tachometer {
         let surprise = pulses - expected.pulses;
         if surprise <= expected.more && surprise >= -expected.fewer {
             self.withheld = 0.0;
+            self.passes = false;
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
             let unusual =
                 if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
@@ -136,9 +141,10 @@ impl Tachometer {
             let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
             return Turn { pulses, quality, doubt };
         }
-        if self.withheld * surprise > 0.0 {
+        if self.passes || self.withheld * surprise > 0.0 {
             let believed = pulses + self.withheld;
             self.withheld = 0.0;
+            self.passes = true;
             return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
         }
         let stand_in = libm::round(expected.pulses);
