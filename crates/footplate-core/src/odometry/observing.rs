@@ -57,6 +57,7 @@ impl Odometer {
     pub(super) fn scene(&self, [first_counted, second_counted]: [f64; 2], allowed: &Allowed) -> Scene {
         let of = |wheel: &WheelChannel, other: &WheelChannel, counted: f64| WheelScene {
             counted,
+            late: wheel.late * wheel.pitch,
             read: wheel.is_read(),
             stuck: wheel.is_stuck_beside(other),
             speed: wheel.tracker.speed(),

@@ -78,7 +78,7 @@ impl Bank {
         let reached = reached * reached;
         let scales = self.scales(scene);
         for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
-            let speed = touch.follow(wheel.counted * scale / t, train.a, t);
+            let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
             let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
             if !wheel.read || speed.abs() < SILENT {
                 continue;

@@ -34,6 +34,8 @@ pub struct Turn {
     pub quality: Quality,
     /// By how many pulses it may be wrong, beyond the one that every count may be.
     pub doubt: f64,
+    /// Those of its pulses that were not read in the period: they belong to the one before, or are only expected.
+    pub late: f64,
 }
 
 /// What the tachometer is expected to say, in signed pulses of the period.
@@ -119,13 +121,13 @@ impl Tachometer {
                 self.assumed += expected.pulses;
                 self.unread += periods;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY, late: 0.0 };
             }
             Increment::Restarted => {
                 self.assumed = 0.0;
                 self.unread = 0.0;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY, late: 0.0 };
             }
         };
         self.assumed = 0.0;
@@ -139,17 +141,21 @@ impl Tachometer {
                 if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
             let either_way = self.turned_round || heading.disputed;
             let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
-            return Turn { pulses, quality, doubt };
+            return Turn { pulses, quality, doubt, late: 0.0 };
         }
         if self.passes || self.withheld * surprise > 0.0 {
-            let believed = pulses + self.withheld;
+            let late = self.withheld;
             self.withheld = 0.0;
             self.passes = true;
-            return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
+            let doubt = surprise.abs() + 1.0;
+            return Turn { pulses: pulses + late, quality: Quality::Ok, doubt, late };
         }
         let stand_in = libm::round(expected.pulses);
         self.withheld = pulses - stand_in;
-        Turn { pulses: stand_in, quality: Quality::Substituted, doubt: expected.more.max(expected.fewer) }
+        let doubt = expected.more.max(expected.fewer);
+        // A stand-in that is larger than what was read may be an expectation that ran ahead.
+        let late = if self.withheld * heading.way < 0.0 { -self.withheld } else { 0.0 };
+        Turn { pulses: stand_in, quality: Quality::Substituted, doubt, late }
     }
 
     /// Signed pulses since the last reading, if they can be a count.
