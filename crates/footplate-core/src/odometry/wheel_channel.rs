@@ -44,6 +44,8 @@ pub(super) struct WheelChannel {
     pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
+    /// That count is no wheel's.
+    pub(super) stuck: bool,
     /// By how many pulses its last count may be wrong.
     pub(super) doubt: f64,
     doubt_before: f64,
@@ -72,6 +74,7 @@ impl WheelChannel {
             late: 0.0,
             missing_for: 0.0,
             same_for: 0.0,
+            stuck: false,
             doubt: 0.0,
             doubt_before: 0.0,
             told: ReportedDirection::default(),
@@ -178,13 +181,27 @@ impl WheelChannel {
     }
 
     /// Its count stands still, where that of a wheel that turns goes to and fro by one.
-    fn is_stuck(&self) -> bool {
+    fn stands_still(&self) -> bool {
         self.same_for > STUCK_AFTER_S
     }
 
-    /// The same, while the count of the other wheel moves.
-    pub(super) fn is_stuck_beside(&self, other: &Self) -> bool {
-        self.is_stuck() && other.is_read() && other.pulses != 0.0 && !other.is_stuck()
+    /// Its count moves.
+    fn moves(&self) -> bool {
+        self.is_read() && self.pulses != 0.0 && !self.stands_still()
+    }
+
+    /// Compares both counts of a period: one that stands still, not at zero, beside one that moves, is stuck until it
+    /// changes, whether the other goes on moving or not.
+    pub(super) fn compare(&mut self, other: &mut Self, t: f64) {
+        let (moves, other_moves) = (self.moves(), other.moves());
+        for (wheel, beside) in [(self, other_moves), (other, moves)] {
+            let was = wheel.stuck;
+            wheel.stuck = wheel.stands_still() && (was || beside);
+            if was && !wheel.stuck && wheel.doubt > 0.0 {
+                // What was followed while it was stuck says nothing.
+                wheel.tracker.restart(wheel.pulses * wheel.pitch / t);
+            }
+        }
     }
 
     /// The true pitch lies within this part of the assumed one.
