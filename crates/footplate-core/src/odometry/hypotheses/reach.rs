@@ -12,9 +12,11 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// Creepage of both wheelsets that begins unseen (part of the speed), under the brake and in traction. Steady creepage of
 /// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
 /// takes 0.05 for full traction.
-const UNSEEN: [f64; 2] = [0.12, 0.06];
+const UNSEEN: [f64; 2] = [0.2, 0.08];
 /// The same of wheelsets that are braked independently: no converter holds both.
 const UNSEEN_INDEPENDENT: f64 = 0.04;
+/// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
+const SLIDES_BY: f64 = 0.2;
 /// Creepage of both that lasts after they were seen to slip: part of the speed, and m/s.
 const LASTING: (f64, f64) = (0.25, 1.0);
 /// Probability at which both are seen to slip, and below which wheels that turn alike creep within limits.
@@ -46,12 +48,14 @@ pub(super) struct Reach {
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
+    /// The acceleration that was last commanded (m/s²).
+    by: f64,
 }
 
 impl Reach {
     pub(super) const fn new() -> Self {
         let speed = Range { low: 0.0, high: 0.0 };
-        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2] }
+        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2], by: 0.0 }
     }
 
     /// The train has turned round.
@@ -78,7 +82,7 @@ impl Reach {
         }
         let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
         let dead = first_dead + second_dead;
-        let turn_alike = self.turn_alike(scene, wheels, dead > 0.5);
+        let turn_alike = turn_alike(scene, wheels, [first_dead, second_dead]);
         let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
@@ -93,9 +97,13 @@ impl Reach {
             None => (smaller(high, if silent { 0.0 } else { high }), low),
         };
         let reaches = Range { low: self.speed.low + down * t, high: self.speed.high + up * t };
+        if brakes || drives {
+            self.by = scene.commanded.map_or(SLIDES_BY, f64::abs);
+        }
+        let effort = smaller(self.by / SLIDES_BY, 1.0);
         let moving = larger(likely.high.abs(), likely.low.abs());
         let creeps = |unseen: f64| {
-            let unseen = if scene.independent { UNSEEN_INDEPENDENT } else { unseen };
+            let unseen = if scene.independent { UNSEEN_INDEPENDENT * effort } else { unseen };
             let (part, least) = if self.slipped { LASTING } else { (unseen, 0.0) };
             part * moving + least
         };
@@ -113,20 +121,6 @@ impl Reach {
         self.speed
     }
 
-    /// Whether what is read of the wheels is one speed.
-    fn turn_alike(&self, scene: &Scene, [one, other]: &[Compared; 2], one_is_dead: bool) -> bool {
-        let [first, second] = &scene.wheels;
-        let quiet = |wheel: &WheelScene, compared: &Compared| {
-            !wheel.read || wheel.stuck || compared.speed.abs() < SILENT && one_is_dead
-        };
-        if quiet(first, one) || quiet(second, other) {
-            return true;
-        }
-        let (part, least) = APART;
-        let noise = libm::sqrt(one.variance + other.variance);
-        (one.speed - other.speed).abs() < part * one.speed.abs() + least + 2.0 * noise
-    }
-
     /// Whether brake and traction act on both wheelsets.
     fn acts(&self, scene: &Scene, silent: bool, wheels_a: f64) -> [bool; 2] {
         let [brakes, drives] = match scene.commanded {
@@ -138,4 +132,18 @@ impl Reach {
         let all = |of: fn(&WheelScene) -> bool| scene.wheels.iter().all(of);
         [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
     }
+}
+
+/// Whether what is read of the wheels is one speed; `dead` is the probability that the sensor of each is.
+fn turn_alike(scene: &Scene, [one, other]: &[Compared; 2], [first_dead, second_dead]: [f64; 2]) -> bool {
+    let [first, second] = &scene.wheels;
+    let quiet = |wheel: &WheelScene, compared: &Compared, dead: f64| {
+        !wheel.read || wheel.stuck || dead > 0.5 && compared.speed.abs() < SILENT
+    };
+    if quiet(first, one, first_dead) || quiet(second, other, second_dead) {
+        return true;
+    }
+    let (part, least) = APART;
+    let noise = libm::sqrt(one.variance + other.variance);
+    (one.speed - other.speed).abs() < part * one.speed.abs() + least + 2.0 * noise
 }
