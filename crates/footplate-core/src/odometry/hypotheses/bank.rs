@@ -85,6 +85,8 @@ pub(in super::super) struct Bank {
     pub(super) side: f64,
     /// Whether each wheel has been turned up to the speed of the train.
     pub(super) touches: [Touch; 2],
+    /// Time since one of them was (s).
+    pub(super) since_touch: f64,
     /// How far the train may be from wheels that lost the rail together.
     reach: Reach,
     /// What came out of the last period.
@@ -112,6 +114,7 @@ impl Bank {
             acted: 0.0,
             side: 1.0,
             touches: [Touch::new(); 2],
+            since_touch: f64::INFINITY,
             reach: Reach::new(),
             speed,
             acceleration: 0.0,
@@ -168,7 +171,7 @@ impl Bank {
     pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
         let [likely, way] = interval(&self.probability, &self.filters, &self.ways, scene, risk, t);
         let wheels = self.compared(scene);
-        let speed = self.reach.widen(likely, scene, &wheels, self.probability.0, self.wheels_a, t);
+        let speed = self.reach.widen(likely, scene, &wheels, self.probability.0, (self.since_touch, self.wheels_a), t);
         let way = Range {
             low: way.low + (speed.low - likely.low) * t,
             high: way.high + (speed.high - likely.high) * t,

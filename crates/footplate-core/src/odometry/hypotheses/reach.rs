@@ -13,6 +13,14 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
 /// takes 0.05 for full traction.
 const UNSEEN: [f64; 2] = [0.2, 0.08];
+/// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
+const UNSEEN_UNTOLD: [f64; 2] = [0.14, 0.07];
+/// Wheels that begin to creep faster than this are seen to (m/s²).
+const UNSEEN_RATE: f64 = 0.8;
+/// Wheels that turn alike so soon after one was turned up to the train (s), and slip with no more than this probability,
+/// roll.
+const TOUCHED_S: f64 = 3.0;
+const ROLLS: f64 = 0.01;
 /// The same of wheelsets that are braked independently: no converter holds both.
 const UNSEEN_INDEPENDENT: f64 = 0.04;
 /// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
@@ -48,6 +56,8 @@ pub(super) struct Reach {
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
+    /// Time since both rolled for certain (s).
+    since_rolling: f64,
     /// The acceleration that was last commanded (m/s²).
     by: f64,
 }
@@ -55,7 +65,7 @@ pub(super) struct Reach {
 impl Reach {
     pub(super) const fn new() -> Self {
         let speed = Range { low: 0.0, high: 0.0 };
-        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2], by: 0.0 }
+        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2], since_rolling: f64::INFINITY, by: 0.0 }
     }
 
     /// The train has turned round.
@@ -63,15 +73,15 @@ impl Reach {
         self.speed = self.speed.reversed();
     }
 
-    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `wheels_a` is how
-    /// the wheels accelerate (m/s²).
+    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `since_touch` the
+    /// time since a wheel was turned up to the train (s), `wheels_a` how the wheels accelerate (m/s²).
     pub(super) fn widen(
         &mut self,
         likely: Range,
         scene: &Scene,
         wheels: &[Compared; 2],
         p: [f64; 8],
-        wheels_a: f64,
+        (since_touch, wheels_a): (f64, f64),
         t: f64,
     ) -> Range {
         let [.., slip, creep, _, first_dead, second_dead] = p;
@@ -87,7 +97,12 @@ impl Reach {
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
         let free = brake <= 0.0 && traction <= 0.0;
-        self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !(alike && free);
+        // A wheel that spins is slowed down to no certain speed.
+        let is_known = scene.commanded.is_some() && traction <= 0.0;
+        let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
+        let roll = alike && (free || touched);
+        self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !roll;
+        self.since_rolling = if roll { 0.0 } else { self.since_rolling + t };
 
         let Range { low, high } = scene.acceleration;
         let commanded = scene.commanded.unwrap_or(0.0);
@@ -104,10 +119,14 @@ impl Reach {
         let moving = larger(likely.high.abs(), likely.low.abs());
         let creeps = |unseen: f64| {
             let unseen = if scene.independent { UNSEEN_INDEPENDENT * effort } else { unseen };
-            let (part, least) = if self.slipped { LASTING } else { (unseen, 0.0) };
-            part * moving + least
+            if self.slipped {
+                LASTING.0 * moving + LASTING.1
+            } else {
+                smaller(unseen * moving, if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY })
+            }
         };
-        let [of_brake, of_traction] = UNSEEN.map(creeps);
+        let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_UNTOLD };
+        let [of_brake, of_traction] = unseen.map(creeps);
         let about = Range { low: likely.low - traction * of_traction, high: likely.high + brake * of_brake };
         let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };

@@ -77,9 +77,11 @@ impl Bank {
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
         let scales = self.scales(scene);
+        self.since_touch += t;
         for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
             let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
             let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
+            self.since_touch = if has_reached { 0.0 } else { self.since_touch };
             if !wheel.read || speed.abs() < SILENT {
                 continue;
             }
