@@ -194,7 +194,7 @@ impl Bank {
         }
     }
 
-    /// Whether both wheels slip, the way they were let to, and have not come back to the train.
+    /// Whether both wheels slip, the way they were let to, and one of them has not come back to the train.
     fn is_away(&self, scene: &Scene) -> bool {
         let [.., slip, creep, _, _, _] = self.probability.0;
         let may = if self.side > 0.0 { scene.slide } else { scene.slip };
@@ -203,7 +203,7 @@ impl Bank {
             self.side * (train - wheel.speed) > AWAY + AWAY_PART * train.abs()
                 || self.side * wheel.acceleration > RETURNS
         };
-        may && slip + creep > 0.5 && scene.wheels.iter().all(away)
+        may && slip + creep > 0.5 && scene.wheels.iter().any(away)
     }
 
     /// The wheels with the ratio of their diameters taken out.
