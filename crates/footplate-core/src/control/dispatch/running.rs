@@ -1,6 +1,6 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
-use crate::control::drive::THERE;
+use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -152,7 +152,7 @@ impl Dispatcher {
             let stop = run.way.place(run.stop)?;
             let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
             // The way may go round to a place at which it stands already.
-            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;

@@ -8,17 +8,17 @@ use crate::units::Length;
 use super::order::Aim;
 
 /// A command this near to where it belongs is in its place: a thousandth of what stops scatter by.
-const MET: Length = Length::from_mm(0.05);
+const TARGET_TOLERANCE: Length = Length::from_mm(0.05);
 /// No command is planned finer than the station's clock of bits is: 1/2400 s.
-const FINEST: TimeSpan = TimeSpan::from_us(100);
-/// The first look beyond the earliest time; twice as far each time that is too soon.
-const FIRST_LOOK: TimeSpan = TimeSpan::from_ms(500);
+const TIME_RESOLUTION: TimeSpan = TimeSpan::from_us(100);
+/// The first step beyond the earliest time; twice as far each time that is too soon.
+const FIRST_STEP: TimeSpan = TimeSpan::from_ms(500);
 /// No stop is planned for later than this, the length of a long session.
 const HORIZON: TimeSpan = TimeSpan::from_s(7_200.0);
-/// Of what is left at least this part is cut off by each look.
+/// Of what is left at least this part is cut off by each step.
 const SHORTEST_PART: f64 = 0.02;
-/// Halvings of the horizon until it is finer than [`FINEST`], with room for those that do not halve.
-const LOOKS: usize = 60;
+/// Halvings of the horizon until it is finer than [`TIME_RESOLUTION`], with room for those that do not halve.
+const MAX_ITERATIONS: usize = 60;
 
 /// When to command, or why there is no such time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,14 +57,14 @@ pub(super) fn command_time(
     mut beyond: impl FnMut(Timestamp) -> Option<(Rest, Length)>,
 ) -> CommandTime {
     let Some((rest, first)) = beyond(earliest) else { return CommandTime::Never };
-    if first > MET {
+    if first > TARGET_TOLERANCE {
         return CommandTime::TooLate(rest, first);
     }
     let mut low = End { at: earliest, miss: first.as_m(), weight: 1.0 };
     let mut best = (earliest, rest);
-    let mut look = FIRST_LOOK;
+    let mut step = FIRST_STEP;
     let mut high = loop {
-        let at = earliest + look;
+        let at = earliest + step;
         match beyond(at) {
             Some((rest, miss)) if miss < Length::ZERO => {
                 low = End { at, miss: miss.as_m(), weight: 1.0 };
@@ -75,24 +75,24 @@ pub(super) fn command_time(
                 break End { at, miss: found.map_or(-low.miss, |(_, miss)| miss.as_m()), weight: 1.0 };
             }
         }
-        if look >= HORIZON {
+        if step >= HORIZON {
             return CommandTime::Never;
         }
-        look += look;
+        step += step;
     };
-    for _ in 0..LOOKS {
+    for _ in 0..MAX_ITERATIONS {
         let width = high.at - low.at;
-        if low.miss.abs() <= MET.as_m() || width <= FINEST {
+        if low.miss.abs() <= TARGET_TOLERANCE.as_m() || width <= TIME_RESOLUTION {
             break;
         }
         let (short, ahead) = (-low.miss * low.weight, high.miss * high.weight);
         let part = (short / (short + ahead)).clamp(SHORTEST_PART, 1.0 - SHORTEST_PART);
         let at = low.at + TimeSpan::from_s(width.as_s() * part);
         match beyond(at) {
-            Some((rest, miss)) if miss <= MET => {
+            Some((rest, miss)) if miss <= TARGET_TOLERANCE => {
                 best = (at, rest);
                 low = End { at, miss: miss.as_m(), weight: 1.0 };
-                if miss.abs() <= MET {
+                if miss.abs() <= TARGET_TOLERANCE {
                     break;
                 }
                 high.weight *= 0.5;

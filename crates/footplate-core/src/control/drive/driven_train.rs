@@ -13,10 +13,10 @@ use crate::units::Length;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
-use super::path_length::contacts_until;
+use super::path_length::sensors_within;
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
-use super::turning::turned;
+use super::turning::reversed_location;
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
@@ -29,7 +29,7 @@ const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
 const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
 /// A contact this many standard deviations behind a train should have reported it, if the train runs as it should: a train
 /// comes to rest so much shorter once in 44 times, contacts miss one in 300, and one start in 1000 gets stuck on dirt. So
-/// of trains that such a contact was silent about most have not come to it.
+/// of trains that such a contact was missed_in_a_row about most have not come to it.
 const SHOULD_HAVE_PASSED: f64 = 2.0;
 /// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
 const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
@@ -53,7 +53,7 @@ pub(super) struct DrivenTrain {
     /// What should come next.
     pub(super) expected: Expectation,
     /// What it shall not pass.
-    pub(super) limit: Option<WayPoint>,
+    pub(super) end_of_authority: Option<WayPoint>,
     /// How far it reaches ahead of and behind the leading end of its pickup.
     pub(super) reach: [Length; 2],
     /// What keeps it to speed restrictions.
@@ -72,17 +72,17 @@ pub(super) struct Expectation {
     /// The next contact.
     pub(super) due: Option<DueContact>,
     pub(super) since: Timestamp,
-    pub(super) overdue_said: bool,
+    pub(super) overdue_reported: bool,
     /// Contacts in a row that should have reported the train.
-    pub(super) silent: u8,
+    pub(super) missed_in_a_row: u8,
     /// A contact that should have reported it, and nothing has reported it since.
-    pub(super) unseen: Option<SensorId>,
+    pub(super) missed_sensor: Option<SensorId>,
     /// When it is lost if nothing reports it until then; only once a contact is overdue.
     pub(super) lost_by: Option<Timestamp>,
     /// When it has to be commanded to stop because the track ends, and where.
-    pub(super) end: Option<(Timestamp, NodeId)>,
+    pub(super) track_end_stop: Option<(Timestamp, NodeId)>,
     /// When it has to be commanded to stop so that it stays within its limit.
-    pub(super) limit: Option<Timestamp>,
+    pub(super) authority_stop: Option<Timestamp>,
 }
 
 /// What a train would run at if it were allowed to.
@@ -91,9 +91,9 @@ pub(super) struct SpeedSupervision {
     /// The step that was asked for, while the train has been told a slower one.
     pub(super) wanted: Option<SpeedStep>,
     /// When the zones about it are looked at next.
-    pub(super) look: Option<Timestamp>,
+    pub(super) next_check: Option<Timestamp>,
     /// The zone that was said to slow it down.
-    pub(super) said: Option<String>,
+    pub(super) reported_zone: Option<String>,
 }
 
 impl DrivenTrain {
@@ -106,7 +106,7 @@ impl DrivenTrain {
             commanded: SpeedStep::STAND,
             unsent: None,
             expected: Expectation::default(),
-            limit: None,
+            end_of_authority: None,
             reach: [TRAIN_REACH; 2],
             speed_supervision: SpeedSupervision::default(),
             pacing: None,
@@ -130,7 +130,7 @@ impl DrivenTrain {
     }
 
     /// As far as is known; a train that nobody can find stands if it was told to and nobody waits for it to.
-    pub(super) fn stands(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
+    pub(super) fn is_at_rest(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let told_to = self.commanded == SpeedStep::STAND && self.unsent.is_none();
         told_to
             && self.located(context, now).map_or_else(
@@ -141,7 +141,7 @@ impl DrivenTrain {
 
     /// Whether it runs, or may.
     pub(super) fn may_move(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
-        !self.stands(context, now)
+        !self.is_at_rest(context, now)
     }
 
     /// A person says where it is.
@@ -154,12 +154,12 @@ impl DrivenTrain {
     ) {
         self.locator.place(now, at, uncertainty);
         self.passages.forget();
-        self.seen();
-        self.limit_here(context, now);
+        self.clear_missed();
+        self.end_authority_here(context, now);
         self.expect_next(context, now);
     }
 
-    pub(super) const fn is_told(&self) -> bool {
+    pub(super) const fn is_all_sent(&self) -> bool {
         self.unsent.is_none()
     }
 
@@ -168,38 +168,38 @@ impl DrivenTrain {
     }
 
     /// Begins something else.
-    pub(super) fn take(&mut self, task: Task, out: &mut Outputs) {
+    pub(super) fn start_task(&mut self, task: Task, out: &mut Outputs) {
         self.locator.repeat(false);
         if let Some(before) = self.task.replace(task) {
-            out.say(Notice::Replaced { order: before.order, train: self.id() });
+            out.notify(Notice::Replaced { order: before.order, train: self.id() });
         }
     }
 
     /// Tells it a step, or the fastest below that the zones about it allow.
-    pub(super) fn issue_step(
+    pub(super) fn command_step(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
         step: SpeedStep,
         out: &mut Outputs,
     ) {
-        let step = self.restrained(context, now, step, out);
-        self.issue_at_once(now, step, out);
+        let step = self.supervised_step(context, now, step, out);
+        self.command_unsupervised(now, step, out);
     }
 
     /// Tells it to stand.
-    pub(super) fn issue_stop(&mut self, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn command_stop(&mut self, now: Timestamp, out: &mut Outputs) {
         self.speed_supervision = SpeedSupervision::default();
-        self.issue_at_once(now, SpeedStep::STAND, out);
+        self.command_unsupervised(now, SpeedStep::STAND, out);
     }
 
     /// Tells it just this step.
-    pub(super) fn issue_at_once(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+    pub(super) fn command_unsupervised(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         self.commanded = step;
-        self.issue(now, Command::Speed { train: self.id(), step }, out);
+        self.send(now, Command::Speed { train: self.id(), step }, out);
     }
 
-    fn issue(&mut self, now: Timestamp, command: Command, out: &mut Outputs) {
+    fn send(&mut self, now: Timestamp, command: Command, out: &mut Outputs) {
         self.unsent = Some((command, now));
         out.command(command);
     }
@@ -214,8 +214,8 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
-        self.take(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
-        self.issue_step(context, now, step, out);
+        self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+        self.command_step(context, now, step, out);
     }
 
     /// Comes to rest if it does not, and turns around.
@@ -228,12 +228,12 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let goal = Goal::Reverse(then);
-        if self.stands(context, now) {
-            self.take(Task { order, goal, phase: Phase::Turning }, out);
-            self.issue(now, Command::Reverse { train: self.id() }, out);
+        if self.is_at_rest(context, now) {
+            self.start_task(Task { order, goal, phase: Phase::Turning }, out);
+            self.send(now, Command::Reverse { train: self.id() }, out);
         } else {
-            self.take(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
-            self.issue_stop(now, out);
+            self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+            self.command_stop(now, out);
         }
     }
 
@@ -255,28 +255,28 @@ impl DrivenTrain {
                 } else if waits_for.is_none() {
                     self.commanded = step;
                 }
-                self.expect_on(context, now);
+                self.expect_after_command(context, now);
                 self.paced_step_left(event.time);
                 self.step_left(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
-                let stood = self.stands_at(context, event.time);
+                let rest = self.located_at_rest(context, event.time);
                 self.locator.handle_command(context, &self.model, event);
                 if matches!(self.unsent, Some((Command::Reverse { .. }, _))) {
                     self.unsent = None;
                 }
-                match stood.and_then(|located| turned(context, &self.model, located)) {
+                match rest.and_then(|located| reversed_location(context, &self.model, located)) {
                     Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
                     None => self.locator.lose(),
                 }
                 self.passages.forget();
-                self.limit_here(context, now);
+                self.end_authority_here(context, now);
                 self.expect_next(context, now);
                 if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
                     if then > SpeedStep::STAND {
                         self.task =
                             Some(Task { order, goal: Goal::Run, phase: Phase::Commanding { promise: None } });
-                        self.issue_step(context, now, then, out);
+                        self.command_step(context, now, then, out);
                     } else {
                         self.finish(context, now, order, None, None, out);
                     }
@@ -286,7 +286,7 @@ impl DrivenTrain {
         }
     }
 
-    fn stands_at(&self, context: TrackContext<'_>, time: Timestamp) -> Option<Located> {
+    fn located_at_rest(&self, context: TrackContext<'_>, time: Timestamp) -> Option<Located> {
         self.located(context, time).filter(|located| located.at_rest)
     }
 
@@ -331,24 +331,24 @@ impl DrivenTrain {
         passed: PassedContact,
         out: &mut Outputs,
     ) {
-        self.seen();
+        self.clear_missed();
         self.note_passage(context, node, passed.at);
-        self.count_limit_from(context, node);
+        self.recount_end_of_authority(context, node);
         self.expect_next(context, now);
-        out.say(Notice::Passed { train: self.id(), passed, next: self.expected.due });
+        out.notify(Notice::Passed { train: self.id(), passed, next: self.expected.due });
         self.paced_passed(context, now, node, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
-            (Phase::Finding { .. }, _) => self.set_out(context, now, task.order, destination, out),
-            (_, Some(at)) => match self.counted_again(context, at, node, &destination) {
+            (Phase::Finding { .. }, _) => self.resume_to_target(context, now, task.order, destination, out),
+            (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
                 Some(at) => {
                     let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
                     self.task = Some(Task { goal, ..task });
                     self.plan(context, now, out);
                     self.keep_time(context, now, out);
                 }
-                None => self.give_up(now, self.no_way(context, node, &destination), out),
+                None => self.give_up(now, self.no_path(context, node, &destination), out),
             },
             _ => {}
         }
@@ -372,26 +372,26 @@ impl DrivenTrain {
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
-        let looks = [self.next_look(), self.zone_look()];
-        [phase, unsent, self.next_doubt(), self.guard()].into_iter().chain(looks).flatten().min()
+        let looks = [self.next_pacing_update(), self.next_zone_check()];
+        [phase, unsent, self.next_overdue(), self.latest_safe_stop()].into_iter().chain(looks).flatten().min()
     }
 
     pub(super) fn handle_timeout(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         if let Some((command, _)) = self.unsent.filter(|(_, since)| now - *since >= UNCONFIRMED) {
-            out.say(Notice::Unconfirmed { command });
+            out.notify(Notice::Unconfirmed { command });
             self.unsent = None;
             if matches!(command, Command::Speed { step: SpeedStep::STAND, .. }) {
-                self.issue(now, command, out);
+                self.send(now, command, out);
             }
         }
-        self.keep_on_track(context, now, out);
+        self.enforce_track_limits(context, now, out);
         if let Some(task) = self.task {
-            self.go_on(context, now, task, out);
+            self.continue_task(context, now, task, out);
         }
-        self.doubt(context, now, out);
+        self.check_overdue(context, now, out);
     }
 
-    fn go_on(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
+    fn continue_task(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
             Phase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
@@ -401,7 +401,7 @@ impl DrivenTrain {
                 self.give_up(now, why, out);
             }
             Phase::Settling { promise, until } if until <= now => {
-                self.rested(context, now, task, promise, out);
+                self.handle_rest(context, now, task, promise, out);
             }
             _ => {}
         }
@@ -415,20 +415,20 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.task = Some(Task { phase: Phase::Commanding { promise }, ..task });
-        self.issue_stop(now, out);
+        self.command_stop(now, out);
     }
 
     /// Ends what cannot be done, and the run with it.
     pub(super) fn give_up(&mut self, now: Timestamp, why: Refusal, out: &mut Outputs) {
         if let Some(task) = self.task.take() {
-            out.say(Notice::GivenUp { order: task.order, train: self.id(), why });
+            out.notify(Notice::GivenUp { order: task.order, train: self.id(), why });
         }
         if self.commanded > SpeedStep::STAND {
-            self.issue_stop(now, out);
+            self.command_stop(now, out);
         }
     }
 
-    fn rested(
+    fn handle_rest(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -443,7 +443,7 @@ impl DrivenTrain {
         match task.goal {
             Goal::Reverse(_) => {
                 self.task = Some(Task { phase: Phase::Turning, ..task });
-                self.issue(now, Command::Reverse { train: self.id() }, out);
+                self.send(now, Command::Reverse { train: self.id() }, out);
             }
             Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),
             Goal::Rest | Goal::Run | Goal::Pace => self.finish(context, now, task.order, None, None, out),
@@ -451,9 +451,13 @@ impl DrivenTrain {
     }
 
     /// A contact that it should have passed, without a report.
-    pub(super) fn passed_unheard(&self, context: TrackContext<'_>, located: &Located) -> Option<SensorId> {
+    pub(super) fn sensor_missed_before(
+        &self,
+        context: TrackContext<'_>,
+        located: &Located,
+    ) -> Option<SensorId> {
         let passed = located.at.way - located.uncertainty * SHOULD_HAVE_PASSED;
-        contacts_until(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
+        sensors_within(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
     /// The order has been carried out.
@@ -473,11 +477,12 @@ impl DrivenTrain {
             error: target.and_then(|target| self.beyond(context, located.at, target)),
         });
         if let Some(located) = located {
-            self.expected.unseen = self.expected.unseen.or(self.passed_unheard(context, &located));
+            self.expected.missed_sensor =
+                self.expected.missed_sensor.or(self.sensor_missed_before(context, &located));
         }
         self.task = None;
-        let unseen = self.expected.unseen;
-        out.say(Notice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
+        let unseen = self.expected.missed_sensor;
+        out.notify(Notice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
     }
 }
 

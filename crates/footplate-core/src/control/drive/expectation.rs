@@ -16,10 +16,10 @@ use crate::control::Notice;
 
 /// A contact is overdue this long after the last of 99.7 % of cases.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
-/// The contact behind one that was silent is late this long after the last of 99.7 % of cases: two polls of all modules. Who
+/// The contact behind one that was missed_in_a_row is late this long after the last of 99.7 % of cases: two polls of all modules. Who
 /// follows the train waits no longer.
 const LATE: TimeSpan = TimeSpan::from_ms(250);
-/// Contacts that stay silent in a row until the train is lost: two are missed one after the other once in 100 000 times,
+/// Contacts that stay missed_in_a_row in a row until the train is lost: two are missed one after the other once in 100 000 times,
 /// and trains are stuck, derailed or lifted ten times as often.
 const MOST_SILENT: u8 = 2;
 /// And however far the next one is, when at least this long has passed, or twice the way there.
@@ -34,18 +34,18 @@ const NEARER: Ratio = Ratio::from_percent(0.1);
 
 impl DrivenTrain {
     /// A contact that should have reported it long ago: it may never have come there.
-    pub(super) const fn unseen(&self) -> Option<SensorId> {
-        self.expected.unseen
+    pub(super) const fn missed_sensor(&self) -> Option<SensorId> {
+        self.expected.missed_sensor
     }
 
-    /// Whether one contact was silent, and the next is not late.
+    /// Whether one contact was missed_in_a_row, and the next is not late.
     pub(super) fn missed_just_one(&self, now: Timestamp) -> bool {
-        let Expectation { due, overdue_said, silent, .. } = self.expected;
+        let Expectation { due, overdue_reported, missed_in_a_row, .. } = self.expected;
         let by = due.map(|due| due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s()) + LATE);
-        match silent {
+        match missed_in_a_row {
             // Passed for certain, and not overdue yet.
             0 => true,
-            1 => !overdue_said && by.is_some_and(|by| now < by),
+            1 => !overdue_reported && by.is_some_and(|by| now < by),
             _ => false,
         }
     }
@@ -58,76 +58,84 @@ impl DrivenTrain {
     /// Looks ahead to the next contact, to the end of the track and to the limit.
     pub(super) fn expect_next(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let due = self.locator.next_contact(context, &self.model, now);
-        let end = self.end_of_track(context, now);
-        let limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
-        self.look_at_zones(context, now);
+        let track_end_stop = self.track_end_stop(context, now);
+        let authority_stop = self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
+        self.schedule_zone_check(context, now);
         // What was missed is not forgotten because something was commanded.
-        self.expected = Expectation { due, since: now, overdue_said: false, end, limit, ..self.expected };
+        self.expected = Expectation {
+            due,
+            since: now,
+            overdue_reported: false,
+            track_end_stop,
+            authority_stop,
+            ..self.expected
+        };
     }
 
     /// Looks at another limit, and at nothing else.
-    pub(super) fn expect_limit(&mut self, context: TrackContext<'_>, now: Timestamp) {
-        self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
+    pub(super) fn update_authority_stop(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        self.expected.authority_stop =
+            self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
     }
 
     /// The same after a command to it. A contact that it should have come by already stays due: who is told something
     /// else every other second must not be lost for that without anybody noticing.
-    pub(super) fn expect_on(&mut self, context: TrackContext<'_>, now: Timestamp) {
+    pub(super) fn expect_after_command(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let before = self.expected;
         self.expect_next(context, now);
         if self.commanded == SpeedStep::STAND {
-            // Each run is judged by its own contacts; that one was silent stays known.
-            self.expected.silent = 0;
+            // Each run is judged by its own contacts; that one was missed_in_a_row stays known.
+            self.expected.missed_in_a_row = 0;
             self.expected.lost_by = None;
         } else if let (Some(due), Some(next)) = (before.due, self.expected.due)
-            && (due.sensor != next.sensor || before.overdue_said)
+            && (due.sensor != next.sensor || before.overdue_reported)
         {
-            let Expectation { due, since, overdue_said, .. } = before;
-            self.expected = Expectation { due, since, overdue_said, ..self.expected };
+            let Expectation { due, since, overdue_reported, .. } = before;
+            self.expected = Expectation { due, since, overdue_reported, ..self.expected };
         }
     }
 
     /// It was seen where it can be.
-    pub(super) const fn seen(&mut self) {
-        self.expected.unseen = None;
-        self.expected.silent = 0;
+    pub(super) const fn clear_missed(&mut self) {
+        self.expected.missed_sensor = None;
+        self.expected.missed_in_a_row = 0;
         self.expected.lost_by = None;
     }
 
     /// When a contact that does not come is overdue, and after that when the train is lost.
-    pub(super) fn next_doubt(&self) -> Option<Timestamp> {
+    pub(super) fn next_overdue(&self) -> Option<Timestamp> {
         // Nothing is expected of a train that has not heard yet that it should move.
-        if self.commanded == SpeedStep::STAND || !self.is_told() {
+        if self.commanded == SpeedStep::STAND || !self.is_all_sent() {
             return None;
         }
-        let Expectation { due, since, overdue_said, .. } = self.expected;
+        let Expectation { due, since, overdue_reported, .. } = self.expected;
         let Some(due) = due else {
             return self.locator.is_located().then_some(since + LOST_WITHOUT);
         };
         let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
-        let overdue = (!overdue_said).then_some(latest + OVERDUE);
+        let overdue = (!overdue_reported).then_some(latest + OVERDUE);
         overdue.into_iter().chain(self.expected.lost_by).min()
     }
 
-    pub(super) fn doubt(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
-        if self.next_doubt().is_none_or(|at| now < at) {
+    pub(super) fn check_overdue(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
+        if self.next_overdue().is_none_or(|at| now < at) {
             return;
         }
         let is_over = self.expected.lost_by.is_some_and(|by| by <= now);
         match self.expected.due {
-            Some(due) if !self.expected.overdue_said && !is_over => {
-                out.say(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+            Some(due) if !self.expected.overdue_reported && !is_over => {
+                out.notify(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
                 let way = due.time - self.expected.since;
                 self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
-                self.expected.unseen.get_or_insert(due.sensor);
-                self.expected.silent = self.expected.silent.saturating_add(1);
-                if self.expected.silent >= MOST_SILENT {
+                self.expected.missed_sensor.get_or_insert(due.sensor);
+                self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
+                if self.expected.missed_in_a_row >= MOST_SILENT {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_contact(context, &self.model, now);
                 // The one behind it is waited for now; where none is known only the clock ends the wait.
                 let next = next.filter(|next| next.sensor != due.sensor);
-                self.expected.overdue_said = next.is_none();
+                self.expected.overdue_reported = next.is_none();
                 self.expected.since = now;
                 self.expected.due = next.or(self.expected.due);
             }
@@ -141,48 +149,54 @@ impl DrivenTrain {
         self.passages.forget();
         self.expected = Expectation { since: now, ..Expectation::default() };
         let train = self.id();
-        out.say(Notice::Lost { train });
+        out.notify(Notice::Lost { train });
         self.give_up(now, Refusal::Lost { train }, out);
     }
 
     /// When the train has to be commanded to stop so that it stays on the track and within its limit, whatever is reported
     /// until then.
-    pub(super) fn guard(&self) -> Option<Timestamp> {
-        [self.end_guard(), self.limit_guard()].into_iter().flatten().min()
+    pub(super) fn latest_safe_stop(&self) -> Option<Timestamp> {
+        [self.track_end_stop_time(), self.authority_stop_time()].into_iter().flatten().min()
     }
 
     /// Whoever has a plan stops before the end of the track.
-    fn end_guard(&self) -> Option<Timestamp> {
+    fn track_end_stop_time(&self) -> Option<Timestamp> {
         let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
-        let (leaves, _) = self.expected.end.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
+        let (leaves, _) =
+            self.expected.track_end_stop.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
         Some(leaves - self.link.command)
     }
 
     /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
-    fn limit_guard(&self) -> Option<Timestamp> {
-        let leaves = self.expected.limit.filter(|_| self.commanded > SpeedStep::STAND)?;
+    fn authority_stop_time(&self) -> Option<Timestamp> {
+        let leaves = self.expected.authority_stop.filter(|_| self.commanded > SpeedStep::STAND)?;
         Some(leaves - self.link.command)
     }
 
     /// Stops the train where the track ends ahead of it, or what it may enter.
-    pub(super) fn keep_on_track(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
+    pub(super) fn enforce_track_limits(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        out: &mut Outputs,
+    ) {
         let train = self.id();
-        if self.limit_guard().is_some_and(|at| at <= now) {
-            self.expected.limit = None;
-            out.say(Notice::AuthorityEnds { train });
+        if self.authority_stop_time().is_some_and(|at| at <= now) {
+            self.expected.authority_stop = None;
+            out.notify(Notice::AuthorityEnds { train });
             self.give_up(now, Refusal::AtLimit { train }, out);
         }
-        if let (Some(at), Some((_, end))) = (self.end_guard(), self.expected.end)
+        if let (Some(at), Some((_, end))) = (self.track_end_stop_time(), self.expected.track_end_stop)
             && at <= now
         {
-            self.expected.end = None;
+            self.expected.track_end_stop = None;
             let name = context.layout.node_name(end).into();
-            out.say(Notice::TrackEnds { train, end });
+            out.notify(Notice::TrackEnds { train, end });
             self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
         }
     }
 
-    fn end_of_track(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
+    fn track_end_stop(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
         let located = self.located(context, now).filter(|_| self.commanded > SpeedStep::STAND)?;
         let (end, way) = track_end(context, &self.model, located.at.node)?;
         let at = WayPoint { node: located.at.node, way: way - BEFORE_END };

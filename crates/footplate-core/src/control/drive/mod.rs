@@ -4,32 +4,32 @@
 //! contacts, plans each stop anew at every report, and commands it at the planned time by the clock, whatever is or is
 //! not reported until then.
 
+mod ambiguity;
 mod approach;
-mod attribution;
 mod command_time;
-mod contact_conduct;
-mod doubt;
+mod data_association;
 mod driven_train;
 mod driver;
+mod end_of_authority;
 mod expectation;
 mod hypotheses;
 mod known_track;
-mod limit;
 mod order;
 mod outputs;
 mod pacing;
 mod path_length;
 mod refusal;
 mod restricted_stretch;
+mod sensor_faults;
 mod speed_supervision;
 mod stop_planning;
 mod task;
 mod turning;
 mod turnout_guard;
-mod watched;
+mod watchdog_queries;
 
 pub use driver::Driver;
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use pacing::ArrivalProfile;
 pub use refusal::Refusal;
-pub(in crate::control) use stop_planning::THERE;
+pub(in crate::control) use stop_planning::AT_TARGET;

@@ -22,7 +22,7 @@ impl Outputs {
         self.queue.push_back(Output::Command(command));
     }
 
-    pub(super) fn say(&mut self, notice: Notice) {
+    pub(super) fn notify(&mut self, notice: Notice) {
         self.queue.push_back(Output::Notice(notice));
     }
 

@@ -7,8 +7,8 @@ use crate::tracking::{TrackContext, WayPoint};
 use crate::units::Length;
 
 /// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after
-/// as many hops as there are nodes, which is more than one lap of any circuit.
-fn felt_hops<'g>(
+/// as many hops as there are nodes, which is more than one circuit_length of any circuit.
+fn hop_ranges<'g>(
     context: TrackContext<'g>,
     model: &MotionModel,
     from: NodeId,
@@ -22,7 +22,7 @@ fn felt_hops<'g>(
 }
 
 /// The way from one node to another that is ahead of it.
-pub(super) fn way_between(
+pub(super) fn distance_between(
     context: TrackContext<'_>,
     model: &MotionModel,
     from: NodeId,
@@ -31,18 +31,18 @@ pub(super) fn way_between(
     if from == to {
         return Some(Length::ZERO);
     }
-    felt_hops(context, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
+    hop_ranges(context, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
 }
 
 /// The way once round from a node to itself, on a circuit. Hops end at contacts: from any other node it is the way round
 /// from the next contact, if that leads over the node.
-pub(super) fn lap(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
+pub(super) fn circuit_length(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
     let contact = match context.layout.sensor_at(node) {
         Some(_) => node,
         None => context.hops_ahead(node).next()?.to,
     };
     let mut over_it = contact == node;
-    let (_, [_, end]) = felt_hops(context, model, contact).find(|(hop, _)| {
+    let (_, [_, end]) = hop_ranges(context, model, contact).find(|(hop, _)| {
         let starts_at = |edge: &EdgeId| context.layout.edge(*edge).is_some_and(|edge| edge.from == node);
         over_it |= hop.edges.iter().any(starts_at);
         hop.to == contact
@@ -52,24 +52,24 @@ pub(super) fn lap(context: TrackContext<'_>, model: &MotionModel, node: NodeId) 
 
 /// The same point counted from another node, which the train came to since: ahead of the one before, and once round if
 /// it is the same.
-pub(super) fn counted_from(
+pub(super) fn recount_from(
     context: TrackContext<'_>,
     model: &MotionModel,
     point: WayPoint,
     node: NodeId,
 ) -> Option<WayPoint> {
-    let (_, [_, between]) = felt_hops(context, model, point.node).find(|(hop, _)| hop.to == node)?;
+    let (_, [_, between]) = hop_ranges(context, model, point.node).find(|(hop, _)| hop.to == node)?;
     Some(WayPoint { node, way: point.way - between })
 }
 
 /// The contacts ahead of a node up to a way, with their ways.
-pub(super) fn contacts_until<'g>(
+pub(super) fn sensors_within<'g>(
     context: TrackContext<'g>,
     model: &MotionModel,
     from: NodeId,
     until: Length,
 ) -> impl Iterator<Item = (SensorId, Length)> {
-    felt_hops(context, model, from)
+    hop_ranges(context, model, from)
         .take_while(move |(_, [_, end])| *end <= until)
         .filter_map(|(hop, [_, end])| Some((hop.sensor?, end)))
 }
@@ -80,7 +80,7 @@ pub(super) fn track_end(
     model: &MotionModel,
     from: NodeId,
 ) -> Option<(NodeId, Length)> {
-    let (hop, [_, end]) = felt_hops(context, model, from).find(|(hop, _)| hop.sensor.is_none())?;
+    let (hop, [_, end]) = hop_ranges(context, model, from).find(|(hop, _)| hop.sensor.is_none())?;
     Some((hop.to, end))
 }
 

@@ -7,10 +7,10 @@ use crate::model::MotionModel;
 use crate::track::{Hop, Zone};
 use crate::tracking::TrackContext;
 
-/// Hops looked at in either direction: more than a lap of any layout in use.
-const MOST_HOPS: usize = 200;
+/// Hops looked at in either direction: more than a circuit_length of any layout in use.
+const MAX_HOPS: usize = 200;
 /// Edges that are this near to each other (m) follow one another: sums of lengths are rounded.
-const TOUCHING: f64 = 1e-6;
+const ADJACENT: f64 = 1e-6;
 
 /// A part of the way on which the speed is restricted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +33,7 @@ impl<'g> RestrictedStretch<'g> {
     ) -> Vec<Self> {
         let mut found = Vec::new();
         let mut at = 0.0;
-        for hop in context.hops_ahead(node.reverse()).take(MOST_HOPS) {
+        for hop in context.hops_ahead(node.reverse()).take(MAX_HOPS) {
             if at > behind {
                 break;
             }
@@ -44,7 +44,7 @@ impl<'g> RestrictedStretch<'g> {
         }
         found.reverse();
         let (mut at, mut end) = (0.0, node);
-        for hop in context.hops_ahead(node).take(MOST_HOPS) {
+        for hop in context.hops_ahead(node).take(MAX_HOPS) {
             if at > ahead {
                 return found;
             }
@@ -66,9 +66,9 @@ fn add<'g>(
     hop: &Hop<'g>,
     begins: f64,
 ) -> f64 {
-    let felt = model.length(context.sections, hop)[0].as_m();
+    let path_length = model.length(context.sections, hop)[0].as_m();
     let surveyed = hop.length.as_m();
-    let scale = if surveyed > 0.0 { felt / surveyed } else { 1.0 };
+    let scale = if surveyed > 0.0 { path_length / surveyed } else { 1.0 };
     let mut along = begins;
     for id in hop.edges {
         let Some(edge) = context.layout.edge(*id) else { continue };
@@ -76,9 +76,9 @@ fn add<'g>(
         along = to;
         let Some(zone) = context.layout.zone(*id) else { continue };
         match found.last_mut() {
-            Some(last) if last.zone == zone && (from - last.to).abs() <= TOUCHING => last.to = to,
+            Some(last) if last.zone == zone && (from - last.to).abs() <= ADJACENT => last.to = to,
             _ => found.push(RestrictedStretch { zone, from, to }),
         }
     }
-    felt
+    path_length
 }

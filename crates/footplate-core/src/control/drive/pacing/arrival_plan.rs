@@ -240,7 +240,7 @@ impl DrivenTrain {
                 stop_time: stands.after(speed(&step)),
             }
         };
-        let last: Vec<FinalStep> = self.sure_steps(usable).into_iter().map(stop_from).collect();
+        let last: Vec<FinalStep> = self.precise_steps(usable).into_iter().map(stop_from).collect();
         let slow = self.slow_parts(context, now, at);
         let least = last.iter().map(|last| last.speed).fold(f64::INFINITY, f64::min);
         let is_slower =

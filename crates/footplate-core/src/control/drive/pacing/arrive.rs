@@ -8,7 +8,7 @@ use crate::control::drive::command_time::{CommandTime, spread};
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::path_length::{counted_from, lap};
+use crate::control::drive::path_length::{circuit_length, recount_from};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
@@ -60,7 +60,7 @@ impl Arriving {
     ) -> Option<Reference> {
         let (at, plan) = (self.destination.at?, self.plan?);
         if at.node != node {
-            self.destination.at = counted_from(context, model, at, node);
+            self.destination.at = recount_from(context, model, at, node);
         }
         let zero = self.destination.at?.way.as_m() - plan.begins.left;
         let since = now - self.begins();
@@ -82,11 +82,11 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
         context.layout.locate(target, context.turnouts).map_err(Refusal::Place)?;
-        let stands = self.stands(context, now);
-        if !stands && self.commanded == SpeedStep::STAND {
+        let at_rest = self.is_at_rest(context, now);
+        if !at_rest && self.commanded == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        let located = self.located(context, now).filter(|_| self.unseen().is_none() || !stands);
+        let located = self.located(context, now).filter(|_| self.missed_sensor().is_none() || !at_rest);
         let located = located.ok_or(Refusal::Lost { train: self.id() })?;
         let mut destination = Destination {
             named: Some(target),
@@ -96,20 +96,20 @@ impl DrivenTrain {
             next_round: false,
             in_time: None,
         };
-        let mut at = self.waypoint(context, now, &located, &destination, stands);
+        let mut at = self.locate_target(context, now, &located, &destination, at_rest);
         if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
             destination.next_round = true;
-            at = self.waypoint(context, now, &located, &destination, stands);
+            at = self.locate_target(context, now, &located, &destination, at_rest);
         }
         let at = at?;
-        let round = lap(context, &self.model, at.node);
+        let round = circuit_length(context, &self.model, at.node);
         let (mut latest, mut unreached) = (None, None);
         let rounds = if round.is_some() { MOST_ROUNDS } else { 0 };
         for rounds in 0..=rounds {
             let further = round.unwrap_or(Length::ZERO) * f64::from(rounds);
             destination.at = Some(WayPoint { way: at.way + further, ..at });
             destination.in_time = Some(now + within);
-            let found = if stands {
+            let found = if at_rest {
                 self.begun_at_rest(context, now, &located, destination, within)
             } else {
                 self.on_the_run(context, now, destination, within)
@@ -146,8 +146,8 @@ impl DrivenTrain {
         let train = self.id();
         let starts = arriving.start.map(|step| (arriving.since, step));
         let profile = arriving.plan.map(|plan| ArrivalProfile::new(plan, arriving.begins()));
-        out.say(Notice::Arrives(PlannedArrival { order, train, by, starts, profile }));
-        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        out.notify(Notice::Arrives(PlannedArrival { order, train, by, starts, profile }));
+        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Arrive(Box::new(arriving)), self.usable_steps(), now));
         self.goes_by_plan(context, now, out);
     }
@@ -300,7 +300,7 @@ impl DrivenTrain {
             if arriving.plan.is_none() {
                 self.leave_to_stop(task, destination);
             }
-            self.issue_step(context, now, step, out);
+            self.command_step(context, now, step, out);
             return false;
         }
         if now < begins {
@@ -312,7 +312,7 @@ impl DrivenTrain {
         }
         self.leave_to_stop(task, destination);
         match self.step_in_time(context, now, &destination) {
-            Some(step) => self.issue_step(context, now, step, out),
+            Some(step) => self.command_step(context, now, step, out),
             None => self.plan(context, now, out),
         }
         false
@@ -334,12 +334,12 @@ impl DrivenTrain {
     ) {
         let Some(Pacing { pace: Pace::Arrive(arriving), .. }) = &mut self.pacing else { return };
         let destination = arriving.destination;
-        let again = destination.at.and_then(|at| self.counted_again(context, at, node, &destination));
+        let again = destination.at.and_then(|at| self.recount_target(context, at, node, &destination));
         match (again, &mut self.pacing) {
             (Some(at), Some(Pacing { pace: Pace::Arrive(arriving), .. })) => {
                 arriving.destination.at = Some(at);
             }
-            _ => self.give_up(now, self.no_way(context, node, &destination), out),
+            _ => self.give_up(now, self.no_path(context, node, &destination), out),
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::path_length::way_between;
+use crate::control::drive::path_length::distance_between;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
 use crate::event::Approach;
@@ -31,7 +31,7 @@ use super::command_budget::seconds;
 use super::lead_line::LeadLine;
 use super::pace::{Following, Pace, Pacing};
 use super::reference::Reference;
-use super::surveyed_way::SurveyedWay;
+use super::surveyed_path::SurveyedPath;
 
 /// From the rear of one train to the front of the next there is never less: a hand's breadth.
 pub(in crate::control) const SAFE: Length = Length::from_mm(50.0);
@@ -47,7 +47,7 @@ const SLOWS: f64 = 0.35;
 /// So far a train strays from where it should be.
 const STRAYS: Length = Length::from_mm(25.0);
 /// A step that was told is followed by a stop no sooner than this: the next look, and a poll.
-const UNDONE: TimeSpan = TimeSpan::from_ms(300);
+const MIN_STEP_TIME: TimeSpan = TimeSpan::from_ms(300);
 /// A leader is looked at this often (s), whatever is reported.
 const LOOK_AGAIN: f64 = 0.4;
 /// A train that was held back starts again when it can run so far before it would have to stop: no train should start for
@@ -120,7 +120,7 @@ impl DrivenTrain {
         if is_short {
             return Err(Refusal::GapTooShort { leader, shortest });
         }
-        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         let following =
             Following { leader, gap, is_held: self.commanded == SpeedStep::STAND, rear: None, fastest: None };
         self.pacing = Some(Pacing::new(Pace::Follow(following), self.usable_steps(), now));
@@ -211,7 +211,7 @@ impl DrivenTrain {
         others: &Others,
     ) -> Option<Reference> {
         let located = self.located(context, now)?;
-        let past = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
+        let past = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
         let (mut late, mut behind) = (0.0, 0.0);
         let (mut train, mut following) = (self, following);
         // The first of all, by the sum of what is kept.
@@ -254,7 +254,7 @@ impl DrivenTrain {
             surely.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
-        let between = way_between(context, &self.model, node, from)?;
+        let between = distance_between(context, &self.model, node, from)?;
         Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE })
     }
 
@@ -264,7 +264,7 @@ impl DrivenTrain {
     fn is_in_doubt(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let Some(located) = self.located(context, now) else { return true };
         let speed = self.model.steady_speed(self.commanded, Approach::Below);
-        if self.unseen().is_none() {
+        if self.missed_sensor().is_none() {
             return self.commanded > SpeedStep::STAND && speed < CREEPS;
         }
         let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
@@ -327,16 +327,16 @@ impl DrivenTrain {
             following.is_held = false;
             let slower = fastest.filter(|step| *step < commanded);
             if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
-                self.issue_step(context, now, step, out);
+                self.command_step(context, now, step, out);
             }
             return slower.is_none();
         }
         if commanded > SpeedStep::STAND {
             if !following.is_held {
                 following.is_held = true;
-                out.say(Notice::HeldBack { order: task.order, train: self.id(), leader });
+                out.notify(Notice::HeldBack { order: task.order, train: self.id(), leader });
             }
-            self.issue_stop(now, out);
+            self.command_stop(now, out);
         }
         false
     }
@@ -352,7 +352,7 @@ impl DrivenTrain {
         let Some(following) = self.followed().filter(|_| step > self.commanded) else { return true };
         let Some(rear) = following.rear else { return false };
         let start = now + self.link.usually_left();
-        let rest = self.locator.rest_after_move(context, &self.model, start, step, start + UNDONE);
+        let rest = self.locator.rest_after_move(context, &self.model, start, step, start + MIN_STEP_TIME);
         let beyond = rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
         beyond.is_some_and(|beyond| beyond <= Length::ZERO)
     }

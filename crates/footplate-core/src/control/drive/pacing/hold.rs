@@ -15,7 +15,7 @@ use crate::units::{Length, Speed};
 use super::ideal_line::IdealLine;
 use super::pace::{Holding, Pace, Pacing};
 use super::reference::Reference;
-use super::surveyed_way::SurveyedWay;
+use super::surveyed_path::SurveyedPath;
 
 impl Holding {
     /// Where it should be; `None` before there is a line, and when the way does not lead on from it any more.
@@ -26,7 +26,7 @@ impl Holding {
         node: NodeId,
     ) -> Option<Reference> {
         if self.line?.node != node {
-            self.line = self.line?.counted_from(context, node, now);
+            self.line = self.line?.recount_from(context, node, now);
         }
         let line = self.line?;
         let speed = line.speed.as_m_per_s();
@@ -65,12 +65,12 @@ impl DrivenTrain {
             self.model.settles_within(self.commanded, step)
         };
         let holding = Holding { speed, settled: now + settles, line: None };
-        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
         // Where zones are, it may have to slow down at any time, and what keeps it to them knows it as it was calibrated.
         self.locator.repeat(context.layout.zones().is_empty());
         if step != self.commanded {
-            self.issue_step(context, now, step, out);
+            self.command_step(context, now, step, out);
         }
         Ok(())
     }
@@ -86,15 +86,15 @@ impl DrivenTrain {
     ) {
         let Some(located) = self.located(context, now) else { return };
         let node = located.at.node;
-        holding.line = holding.line.and_then(|line| line.counted_from(context, node, now));
-        if holding.line.is_some() || now < holding.settled || self.is_restrained() {
+        holding.line = holding.line.and_then(|line| line.recount_from(context, node, now));
+        if holding.line.is_some() || now < holding.settled || self.is_speed_limited() {
             return;
         }
-        let way = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
+        let way = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
         let line = IdealLine { node, way: Length::from_m(way), time: now, speed: holding.speed };
         holding.line = Some(line);
         let IdealLine { way, time, speed, .. } = line;
-        out.say(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+        out.notify(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
     }
 
     /// How far it is ahead of its line, as far as is believed; `None` while there is none.
@@ -107,8 +107,8 @@ impl DrivenTrain {
             return None;
         };
         let at = self.located(context, now)?.at;
-        let line = line.counted_from(context, at.node, now)?;
-        let way = SurveyedWay::ahead(context, &self.model, at.node).of_felt(at.way.as_m());
+        let line = line.recount_from(context, at.node, now)?;
+        let way = SurveyedPath::ahead(context, &self.model, at.node).surveyed(at.way.as_m());
         Some(Length::from_m(way - line.place(now)))
     }
 

@@ -5,7 +5,7 @@ use crate::time::Timestamp;
 use crate::tracking::TrackContext;
 use crate::units::{Length, Speed};
 
-use super::surveyed_way::surveyed_between;
+use super::surveyed_path::surveyed_distance;
 
 /// A speed held from a place and a time on, in surveyed lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ impl IdealLine {
 
     /// The same line counted from another contact, for a train that is near it: one that was passed since, or one before
     /// if a report has turned out to be another train's. `None` if no way leads from one to the other.
-    pub(super) fn counted_from(
+    pub(super) fn recount_from(
         self,
         context: TrackContext<'_>,
         node: NodeId,
@@ -35,13 +35,15 @@ impl IdealLine {
     ) -> Option<Self> {
         if node == self.node {
             // Once more if it has been round since.
-            let lap = surveyed_between(context, node, node);
-            let laps = lap.map_or(0.0, |lap| libm::round((self.place(now) / lap.as_m()).max(0.0)));
-            let way = self.way - lap.unwrap_or(Length::ZERO) * laps;
+            let circuit_length = surveyed_distance(context, node, node);
+            let laps = circuit_length.map_or(0.0, |circuit_length| {
+                libm::round((self.place(now) / circuit_length.as_m()).max(0.0))
+            });
+            let way = self.way - circuit_length.unwrap_or(Length::ZERO) * laps;
             return Some(Self { way, ..self });
         }
-        let after = surveyed_between(context, self.node, node).map(|between| self.way - between);
-        let before = surveyed_between(context, node, self.node).map(|between| self.way + between);
+        let after = surveyed_distance(context, self.node, node).map(|between| self.way - between);
+        let before = surveyed_distance(context, node, self.node).map(|between| self.way + between);
         let off = |way: &Length| Self { way: *way, ..self }.place(now).abs();
         let way = after.into_iter().chain(before).min_by(|one, other| off(one).total_cmp(&off(other)))?;
         Some(Self { node, way, ..self })

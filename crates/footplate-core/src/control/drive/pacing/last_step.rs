@@ -40,11 +40,11 @@ impl DrivenTrain {
             return;
         };
         let is_soon = plan.is_some_and(|plan| plan.leaves - now < FELT);
-        if destination.in_time.is_none() || is_soon || !self.is_told() {
+        if destination.in_time.is_none() || is_soon || !self.is_all_sent() {
             return;
         }
         if let Some(step) = self.step_in_time(context, now, &destination) {
-            self.issue_step(context, now, step, out);
+            self.command_step(context, now, step, out);
         }
     }
 

@@ -13,7 +13,7 @@ use crate::time::Timestamp;
 use crate::tracking::{Rollout, TrackContext};
 use crate::units::Length;
 
-use super::surveyed_way::{SurveyedWay, surveyed_between};
+use super::surveyed_path::{SurveyedPath, surveyed_distance};
 
 /// Half of the time (s) over which a speed is taken: two places of one line that far apart say it to a few mm/s.
 const SPEED_SPAN: f64 = 0.15;
@@ -26,7 +26,7 @@ pub(super) struct LeadLine<'a> {
     /// Where it goes from there: from the last of them, or from where it was put.
     rollout: Rollout,
     begins: f64,
-    way: SurveyedWay,
+    way: SurveyedPath,
     model: &'a MotionModel,
     /// Now, on the clock of the rollout.
     now: f64,
@@ -42,13 +42,13 @@ impl<'a> LeadLine<'a> {
         (from, past): (NodeId, f64),
     ) -> Option<Self> {
         let rollout = leader.locator.rollout()?;
-        let way = SurveyedWay::ahead(context, &leader.model, rollout.node());
+        let way = SurveyedPath::ahead(context, &leader.model, rollout.node());
         let zero = rollout.seconds(now);
         let mut here = rollout;
-        let since = way.of_felt(here.place(&leader.model, zero));
+        let since = way.surveyed(here.place(&leader.model, zero));
         let mut begins = ahead_of(context, from, rollout.node())?;
         // It may have come by the contact without a report, and be less than a round ahead.
-        if let Some(round) = surveyed_between(context, from, from).map(Length::as_m)
+        if let Some(round) = surveyed_distance(context, from, from).map(Length::as_m)
             && begins + since - round > past
         {
             begins -= round;
@@ -57,7 +57,7 @@ impl<'a> LeadLine<'a> {
         let (mut surveyed, mut next) = (begins, rollout.node());
         for (node, time) in leader.passages.iter().rev() {
             if node != next {
-                surveyed -= surveyed_between(context, node, next)?.as_m();
+                surveyed -= surveyed_distance(context, node, next)?.as_m();
             }
             next = node;
             marks.push([(time - now).as_s(), surveyed]);
@@ -85,7 +85,7 @@ impl<'a> LeadLine<'a> {
             return from + (to - from) * (time - at) / (until - at);
         }
         let mut rollout = self.rollout;
-        let since = self.way.of_felt(rollout.place(self.model, self.now + time));
+        let since = self.way.surveyed(rollout.place(self.model, self.now + time));
         self.begins + since
     }
 
@@ -97,5 +97,5 @@ impl<'a> LeadLine<'a> {
 
 /// The surveyed way (m) from a contact to one ahead of it, which may be itself.
 fn ahead_of(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<f64> {
-    if from == to { Some(0.0) } else { surveyed_between(context, from, to).map(Length::as_m) }
+    if from == to { Some(0.0) } else { surveyed_distance(context, from, to).map(Length::as_m) }
 }

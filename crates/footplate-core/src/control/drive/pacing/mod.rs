@@ -17,7 +17,7 @@ mod pacer;
 mod passages;
 mod reference;
 mod step_search;
-mod surveyed_way;
+mod surveyed_path;
 mod task;
 mod zoned_transit;
 

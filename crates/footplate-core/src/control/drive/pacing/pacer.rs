@@ -11,7 +11,7 @@ use crate::units::Length;
 impl Driver {
     /// Looks at the trains whose time has come.
     pub(in crate::control::drive) fn pace(&mut self, now: Timestamp) {
-        let due = |train: &DrivenTrain| train.next_look().is_some_and(|at| at <= now);
+        let due = |train: &DrivenTrain| train.next_pacing_update().is_some_and(|at| at <= now);
         let due: Vec<TrainId> =
             self.trains.values().filter(|train| due(train)).map(DrivenTrain::id).collect();
         let context = self.track.context();

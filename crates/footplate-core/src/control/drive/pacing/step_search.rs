@@ -13,7 +13,7 @@
 
 use super::command_budget::CommandBudget;
 use super::reference::{GRID, LOOKS, Reference};
-use super::surveyed_way::SurveyedWay;
+use super::surveyed_path::SurveyedPath;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::MotionModel;
@@ -57,7 +57,7 @@ struct Sequence {
 /// The search from one moment.
 pub(super) struct StepSearch<'a> {
     pub(super) model: &'a MotionModel,
-    pub(super) way: &'a SurveyedWay,
+    pub(super) way: &'a SurveyedPath,
     pub(super) reference: &'a Reference,
     /// The moment (s on the clock of the rollout) from which the grid counts, and how much later a command leaves than it
     /// is given.
@@ -72,7 +72,7 @@ impl<'a> StepSearch<'a> {
     /// behind its reference. Times as in the fields of those names.
     pub(super) fn new(
         model: &'a MotionModel,
-        way: &'a SurveyedWay,
+        way: &'a SurveyedPath,
         reference: &'a Reference,
         usable: &[SpeedStep],
         [now, leaves_after]: [f64; 2],
@@ -118,7 +118,7 @@ impl<'a> StepSearch<'a> {
                 next.command(self.model, leaves, *step);
                 left.take(time);
             }
-            let place = self.way.of_felt(next.place(self.model, time + GRID));
+            let place = self.way.surveyed(next.place(self.model, time + GRID));
             let off = place - ideal;
             let so_far = Sequence {
                 budget: left,
@@ -133,7 +133,7 @@ impl<'a> StepSearch<'a> {
     fn end(&mut self, rollout: &Rollout, Sequence { cost, first, .. }: Sequence) {
         let time = self.now + GRID * LOOKS as f64;
         let [place, speed] = rollout.settled_place_and_speed(self.model, time);
-        let off = self.way.of_felt(place) - self.reference.last();
+        let off = self.way.surveyed(place) - self.reference.last();
         let [_, wanted] = self.reference.speeds;
         let faster = speed - wanted;
         let cost = cost + END_WEIGHT * off * off + SPEED_WEIGHT * faster * faster;

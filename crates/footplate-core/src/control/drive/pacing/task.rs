@@ -13,7 +13,7 @@ use super::follow::Others;
 use super::pace::{Pace, Pacing};
 use super::reference::GRID;
 use super::step_search::StepSearch;
-use super::surveyed_way::SurveyedWay;
+use super::surveyed_path::SurveyedPath;
 
 /// The module of a contact is watched from this long before the contact is due: three standard deviations of an
 /// expectation, and the poll of all modules that may be on the line then.
@@ -36,8 +36,8 @@ impl DrivenTrain {
     }
 
     /// When it wants to be looked at, if nothing is reported before.
-    pub(in crate::control::drive) fn next_look(&self) -> Option<Timestamp> {
-        self.paced()?.look.filter(|_| self.is_told())
+    pub(in crate::control::drive) fn next_pacing_update(&self) -> Option<Timestamp> {
+        self.paced()?.look.filter(|_| self.is_all_sent())
     }
 
     /// The contact that it comes to next, and from when until when its report is waited for.
@@ -100,7 +100,7 @@ impl DrivenTrain {
     ) {
         // Who holds a speed that a zone does not allow waits until it has left that.
         let is_holding = matches!(&self.pacing, Some(Pacing { pace: Pace::Hold(_), .. }));
-        if is_holding && self.is_restrained() {
+        if is_holding && self.is_speed_limited() {
             self.pacing.iter_mut().for_each(|pacing| pacing.look = None);
             return;
         }
@@ -118,13 +118,13 @@ impl DrivenTrain {
         let guard = pacing.look.take().filter(|_| matches!(pacing.pace, Pace::Follow(_)));
         let (reference, way) = match &mut pacing.pace {
             Pace::Hold(holding) => {
-                (holding.reference(context, now, node), SurveyedWay::ahead(context, model, node))
+                (holding.reference(context, now, node), SurveyedPath::ahead(context, model, node))
             }
             Pace::Arrive(arriving) => {
                 pacing.look = Some(now + TimeSpan::from_s(AGAIN));
-                (arriving.reference(context, model, now, node), SurveyedWay::felt())
+                (arriving.reference(context, model, now, node), SurveyedPath::unscaled())
             }
-            Pace::Follow(_) => (followed, SurveyedWay::ahead(context, model, node)),
+            Pace::Follow(_) => (followed, SurveyedPath::ahead(context, model, node)),
         };
         let Some(reference) = reference else {
             pacing.look = guard.or(pacing.look);
@@ -133,7 +133,7 @@ impl DrivenTrain {
         let leaves = self.link.usually_left().as_s();
         let at = rollout.seconds(now);
         let mut here = rollout;
-        let behind = reference.now() - way.of_felt(here.place(&self.model, at));
+        let behind = reference.now() - way.surveyed(here.place(&self.model, at));
         let fastest = match pacing.pace {
             Pace::Follow(following) => following.fastest(),
             Pace::Hold(_) | Pace::Arrive(_) => None,
@@ -147,7 +147,7 @@ impl DrivenTrain {
             Some((0, step)) => {
                 pacing.look = Some(now + SPACING);
                 if self.could_still_stop(context, now, step) {
-                    self.issue_step(context, now, step, out);
+                    self.command_step(context, now, step, out);
                 }
             }
             Some((grid, _)) => {

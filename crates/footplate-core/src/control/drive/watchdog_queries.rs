@@ -11,15 +11,15 @@ use super::driver::Driver;
 impl Driver {
     /// What is believed of where a train is was wrong: from now on nobody knows.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
-        self.attribution.forget(train);
+        self.association.forget(train);
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
             train.locator.lose();
             train.passages.forget();
-            train.seen();
+            train.clear_missed();
             train.expect_next(context, now);
         }
-        self.wish(now);
+        self.update_line_requests(now);
     }
 
     /// What the trains move on.

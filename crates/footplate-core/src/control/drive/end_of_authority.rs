@@ -11,8 +11,8 @@ use crate::units::Length;
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::OrderId;
-use super::path_length::{counted_from, lap};
-use super::turning::{trailing_place, turned_as_it_lies, turned_place};
+use super::path_length::{circuit_length, recount_from};
+use super::turning::{reversed_on_current_path, reversed_position, trailing_position};
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
@@ -20,18 +20,18 @@ impl Driver {
     /// the clock if nothing is heard of it, so that it comes to rest before but for one time in a thousand. Whoever plans
     /// a stop plans it before the limit. A train that is put elsewhere or turned around may not move until it is given
     /// another limit; `None` lifts it.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
-            train.set_limit(context, now, limit);
+            train.set_end_of_authority(context, now, end);
         }
-        self.wish(now);
+        self.update_line_requests(now);
     }
 
     /// What a train shall not pass.
     #[must_use]
     pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
-        self.trains.get(&train)?.limit
+        self.trains.get(&train)?.end_of_authority
     }
 
     /// A number for something that is made of several orders: no order will have it.
@@ -75,13 +75,13 @@ impl Driver {
     #[must_use]
     pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
-        train.unseen().or_else(|| train.passed_unheard(context, &train.located(context, now)?))
+        train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
 
     /// Whether it is not sure which contacts a train has passed: it may be where it would be otherwise.
     #[must_use]
     pub fn is_in_doubt(&self, train: TrainId) -> bool {
-        self.attribution.doubts(train)
+        self.association.is_ambiguous(train)
     }
 
     /// Counts a train at rest from the node behind its pickup, whatever is there: how turnouts further away lie makes no
@@ -90,7 +90,7 @@ impl Driver {
         let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
         let at = self.position_at(train, located.at).and_then(|place| {
             let model = &self.trains.get(&train)?.model;
-            let trailing = trailing_place(self.track.context(), model, located.at)?;
+            let trailing = trailing_position(self.track.context(), model, located.at)?;
             let behind = self.track.layout.edge(trailing.edge)?.from;
             if behind == located.at.node { None } else { self.way_point(train, behind, place) }
         });
@@ -125,7 +125,7 @@ impl Driver {
         if found.way > from.way {
             return Some(found);
         }
-        let round = lap(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
+        let round = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
         Some(WayPoint { way: found.way + round, ..found })
     }
 
@@ -134,13 +134,13 @@ impl Driver {
     #[must_use]
     pub fn turned_place(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         let at = self.locate(train, now)?.at;
-        turned_place(self.track.context(), &self.trains.get(&train)?.model, at)
+        reversed_position(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// The same for a train that would stand at a place, wherever it came from.
     #[must_use]
     pub fn turned_place_at(&self, place: Position) -> Option<Position> {
-        turned_as_it_lies(self.track.context(), place)
+        reversed_on_current_path(self.track.context(), place)
     }
 
     /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads
@@ -154,24 +154,29 @@ impl Driver {
 
 impl DrivenTrain {
     /// Sets another limit, or none.
-    pub(super) fn set_limit(&mut self, context: TrackContext<'_>, now: Timestamp, limit: Option<WayPoint>) {
-        self.limit = limit;
-        self.expect_limit(context, now);
+    pub(super) fn set_end_of_authority(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        end: Option<WayPoint>,
+    ) {
+        self.end_of_authority = end;
+        self.update_authority_stop(context, now);
     }
 
     /// The train was put somewhere or turned around: whatever it was allowed before, it was not allowed from here.
-    pub(super) fn limit_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
-        if self.limit.is_some() {
-            self.limit = self.located(context, now).map(|located| located.at);
+    pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        if self.end_of_authority.is_some() {
+            self.end_of_authority = self.located(context, now).map(|located| located.at);
         }
     }
 
     /// The train has come to a contact. Where no way leads from there to the limit it is somewhere else than it should
     /// be, and the limit is here.
-    pub(super) fn count_limit_from(&mut self, context: TrackContext<'_>, node: NodeId) {
-        if let Some(limit) = self.limit {
-            let counted = counted_from(context, &self.model, limit, node);
-            self.limit = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
+    pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
+        if let Some(end) = self.end_of_authority {
+            let counted = recount_from(context, &self.model, end, node);
+            self.end_of_authority = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
         }
     }
 }

@@ -6,19 +6,19 @@ use crate::tracking::TrackContext;
 use crate::units::Length;
 
 /// Contact-to-contact hops looked at: 3 m of the densest known track.
-const MOST_HOPS: usize = 12;
+const MAX_HOPS: usize = 12;
 
 /// Hops ahead of a contact, by their ends in both measures (m past the contact).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SurveyedWay {
-    ends: [[f64; 2]; MOST_HOPS],
+pub(super) struct SurveyedPath {
+    ends: [[f64; 2]; MAX_HOPS],
     count: usize,
 }
 
-impl SurveyedWay {
+impl SurveyedPath {
     /// The way ahead of a node as the turnouts lie.
     pub(super) fn ahead(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Self {
-        let mut way = Self { ends: [[0.0; 2]; MOST_HOPS], count: 0 };
+        let mut way = Self { ends: [[0.0; 2]; MAX_HOPS], count: 0 };
         let (mut felt, mut surveyed) = (0.0, 0.0);
         for (hop, end) in context.hops_ahead(node).zip(&mut way.ends) {
             felt += model.length(context.sections, &hop)[0].as_m();
@@ -30,13 +30,13 @@ impl SurveyedWay {
     }
 
     /// The way as the train feels it, for what is planned in its own measure.
-    pub(super) const fn felt() -> Self {
-        Self { ends: [[0.0; 2]; MOST_HOPS], count: 0 }
+    pub(super) const fn unscaled() -> Self {
+        Self { ends: [[0.0; 2]; MAX_HOPS], count: 0 }
     }
 
     /// The surveyed way to where the train feels it has come so far: in proportion within a hop, and beyond the hops that
     /// are known as within the last.
-    pub(super) fn of_felt(&self, way: f64) -> f64 {
+    pub(super) fn surveyed(&self, way: f64) -> f64 {
         let ([mut felt, mut surveyed], mut slope) = ([0.0, 0.0], 1.0);
         for (nth, [until, there]) in self.ends.iter().take(self.count).enumerate() {
             if *until > felt {
@@ -53,7 +53,7 @@ impl SurveyedWay {
 }
 
 /// The surveyed way from one contact to the next time another is passed: once round if it is the same.
-pub(super) fn surveyed_between(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<Length> {
+pub(super) fn surveyed_distance(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<Length> {
     let mut way = Length::ZERO;
     for hop in context.hops_ahead(from).take(context.layout.nodes().len()) {
         way += hop.length;
