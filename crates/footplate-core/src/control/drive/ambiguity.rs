@@ -1,4 +1,4 @@
-//! A detection of which nobody is sure, and how things are with one train if it was branches than is believed.
+//! An ambiguous detection, and the state of one train under each alternative explanation.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -11,53 +11,53 @@ use crate::tracking::{Locator, PassedContact, TrackContext};
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
 
-/// A detection that is still not explained after this long never will be: two contacts further even at a crawl.
+/// An ambiguity that lasts longer is never resolved: even a creeping train reaches two more sensors in this time.
 const RESOLVE_WITHIN: TimeSpan = TimeSpan::from_s(15.0);
-/// More ways in which it may be branches are not kept in mind at once: all trains of a layout in ambiguity twice.
+/// The number of alternatives kept: two for each train of a layout.
 const MAX_BRANCHES: usize = 8;
 
-/// A contact that a train passed.
+/// A sensor that a train passed in a branch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pass {
     pub(super) detection: Detection,
     pub(super) explanation: Explanation,
-    /// How, and what had been expected.
+    /// The detection beside its prediction.
     pub(super) passed: PassedContact,
 }
 
-/// How things are with one train if they are not as is believed.
+/// The state of one train if the assignment is wrong.
 #[derive(Debug, Clone)]
 pub(super) struct Branch {
-    /// What is in ambiguity, and whether the train did it.
+    /// The ambiguous detection, and whether the train caused it.
     pub(super) detection: Detection,
     pub(super) caused: bool,
     pub(super) train: TrainId,
-    /// What it passed from that detection on.
+    /// What the train has passed since, that detection included.
     pub(super) passes: Vec<Pass>,
-    /// How turnouts lie then that are believed to lie branches.
+    /// Turnout positions that differ from the known ones in this branch.
     pub(super) legs: Vec<(TurnoutId, Leg)>,
-    /// As it was followed from there since.
+    /// Its position in this branch.
     pub(super) locator: Locator,
-    /// A contact that should have reported it before.
+    /// A sensor that should have reported it before.
     pub(super) missed_sensor: Option<SensorId>,
-    /// Its probability before what came after.
+    /// The prior probability, updated with each later detection.
     pub(super) probability: f64,
 }
 
-/// A detection of which nobody is sure.
+/// An ambiguous detection.
 #[derive(Debug, Clone)]
 pub(super) struct Ambiguity {
     pub(super) detection: Detection,
-    /// Whether a train is believed to have done it.
+    /// Whether it was assigned to a train.
     pub(super) is_assigned: bool,
-    /// The probability of what is believed.
+    /// The probability of that.
     pub(super) probability: f64,
     pub(super) branches: Vec<Branch>,
     until: Timestamp,
 }
 
 impl Ambiguity {
-    /// A detection that nobody is believed to have done, and the ways in which somebody may have.
+    /// A detection that was not assigned, and the trains that may have caused it.
     pub(super) fn unassigned(
         now: Timestamp,
         detection: Detection,
@@ -67,8 +67,8 @@ impl Ambiguity {
         Self { detection, is_assigned: false, probability, branches, until: now + RESOLVE_WITHIN }
     }
 
-    /// A detection that a train is believed to have done, with this probability of the times that it did not; and what was in
-    /// ambiguity before stays so.
+    /// A detection that was assigned to a train, with the branch in which that train did not cause it. Branches of an
+    /// earlier assignment are kept.
     pub(super) fn assigned(now: Timestamp, not_passed: Branch, before: Option<Self>) -> Self {
         let detection = not_passed.detection;
         let did = 1.0 - not_passed.probability;
@@ -89,7 +89,7 @@ impl Ambiguity {
 }
 
 impl Branch {
-    /// A train as it goes on from a contact, if it passed it.
+    /// The branch in which a train caused a detection.
     pub(super) fn passing(
         trains: &BTreeMap<TrainId, DrivenTrain>,
         context: TrackContext<'_>,
@@ -105,7 +105,8 @@ impl Branch {
         Some(branch)
     }
 
-    /// A train as it goes on if it did not pass a contact, as is believed. What that has shown of a turnout is not so then.
+    /// The branch in which a train did not cause the detection that was assigned to it. A turnout position that the
+    /// assignment showed is then not known.
     pub(super) fn not_passing(
         train: &DrivenTrain,
         context: TrackContext<'_>,
@@ -135,12 +136,12 @@ impl Branch {
         }
     }
 
-    /// A turnout was thrown: however it lay before.
+    /// A turnout was commanded: forget its position in this branch.
     pub(super) fn turnout_thrown(&mut self, thrown: TurnoutId) {
         self.legs.retain(|(turnout, _)| *turnout != thrown);
     }
 
-    /// All trains, and how the turnouts lie, if it is so.
+    /// All trains and turnout positions in this branch.
     fn world(
         &self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
@@ -160,7 +161,7 @@ impl Branch {
         turnouts
     }
 
-    /// What explains a detection if it is so.
+    /// The hypotheses for a detection in this branch.
     pub(super) fn explains(
         &self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
@@ -172,7 +173,7 @@ impl Branch {
         hypotheses(&trains, TrackContext { turnouts: &turnouts, ..context }, now, detection)
     }
 
-    /// Goes on over one more detection if the likeliest explanation of it is this train.
+    /// Adds a further detection to the branch if this train is its most likely cause.
     pub(super) fn extend(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,

@@ -1,9 +1,10 @@
-//! Which train closed a contact: the likeliest of everything that may have, if it is likely enough.
+//! Data association: decides which train caused a detection.
 //!
-//! Each explanation has a density in time (1/s) with its prior chance in it; that of a contact closing by itself comes
-//! from the contact's own faults. The probability of a train in the sum of all is the probability that it was this train. A
-//! train is believed from [`ASSIGNED_FROM`] on. Below that nobody's estimate is touched. What may have been branches is kept as
-//! [`Branch`]es, and the next closures resolve between them: a train that was distinguished wrongly is taken back.
+//! Each hypothesis has a density in time (1/s) that includes its prior probability. The density of a spurious
+//! detection comes from the record of the sensor. Normalised, the densities are posterior probabilities. A detection
+//! is assigned to a train whose probability is [`ASSIGNED_FROM`] or more; otherwise no estimate changes. Other
+//! possibilities are kept as [`Branch`]es until later detections decide between them; a wrong assignment is then
+//! corrected.
 
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
@@ -19,40 +20,41 @@ use super::driven_train::DrivenTrain;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
 use super::sensor_faults::SensorFaults;
 
-/// A train closed a contact if that is at least this probable.
+/// A detection is assigned to a train from this probability on.
 const ASSIGNED_FROM: f64 = 0.9;
-/// What was believed from the first is not looked at again once it is this probable.
+/// An assignment is final from this probability on.
 const RESOLVED_FROM: f64 = 0.9999;
-/// What is less probable is not kept in mind.
+/// Hypotheses below this probability are dropped.
 const NEGLIGIBLE: f64 = 0.01;
-/// A density (ln 1/s) that is less than this is unusual: a contact was missed, a turnout failed, a train has changed.
+/// Below this density (ln 1/s) an explanation is unusual: a sensor missed the train, a turnout failed, or the train
+/// has changed.
 const UNUSUAL: f64 = -3.0;
 
-/// What is made of a detection.
+/// The result for a detection.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Association {
-    /// It was this train.
+    /// One train caused it.
     Explained(Explanation),
-    /// It may have been one of two, or one and spurious; what comes next decides.
+    /// Two trains, or one and a fault, may have caused it; later detections decide.
     Ambiguous { likeliest: TrainId, or: Option<TrainId> },
-    /// Nothing that trains can do.
+    /// No train can have caused it.
     Unexplained,
-    /// The same, of a contact that is not believed from now on.
+    /// No train can have caused it, and the sensor counts as stuck from now on.
     Stuck,
-    /// Of a contact that is not believed.
+    /// The sensor is stuck, so its report is ignored.
     Ignored,
 }
 
-/// An earlier detection in ambiguity that has been decided.
+/// How later detections decided an ambiguous one.
 #[derive(Debug, Clone)]
 pub(super) enum Resolution {
-    /// It was branches than is believed.
+    /// The assignment was wrong; this branch is right.
     Revised(Box<Branch>),
-    /// No train did it, as is believed.
+    /// No train caused it, and it was assigned to none.
     Spurious(Detection),
 }
 
-/// Judges closures one after the other.
+/// Associates detections with trains, one after the other.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DataAssociation {
     faults: SensorFaults,
@@ -60,30 +62,29 @@ pub(super) struct DataAssociation {
 }
 
 impl DataAssociation {
-    /// A contact that was stuck and is believed again; until `None`.
+    /// A stuck sensor whose reports are used again; call until `None`.
     pub(super) fn next_restored(&mut self, now: Timestamp) -> Option<SensorId> {
         self.faults.next_restored(now)
     }
 
-    /// Somebody knows better where a train is, or that nobody does: what may have been does not matter any more.
+    /// Drops an ambiguity about a train whose position was entered or is lost.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.ambiguity.take_if(|ambiguity| ambiguity.branches.iter().any(|branch| branch.train == train));
     }
 
-    /// Whether a train may be elsewhere than it is believed to be, because a contact that it passed or did not pass is in
-    /// ambiguity.
+    /// Whether the position of a train depends on an ambiguous detection.
     pub(super) fn is_ambiguous(&self, train: TrainId) -> bool {
         let branches = self.ambiguity.iter().flat_map(|ambiguity| &ambiguity.branches);
         branches.into_iter().any(|branch| branch.train == train)
     }
 
-    /// A turnout was set somehow: what it may have been before does not matter any more.
+    /// A turnout was commanded: branches no longer depend on where it was before.
     pub(super) fn turnout_thrown(&mut self, turnout: TurnoutId) {
         let branches = self.ambiguity.iter_mut().flat_map(|ambiguity| &mut ambiguity.branches);
         branches.for_each(|branch| branch.turnout_thrown(turnout));
     }
 
-    /// A command to a train has left: those that it may be hear it, too.
+    /// Applies a command to a train in its branches, too.
     pub(super) fn command_left(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
@@ -98,7 +99,8 @@ impl DataAssociation {
         }
     }
 
-    /// Looks whether one more detection decides what an earlier one was. To be asked before it is judged itself.
+    /// Updates the branches with a further detection and returns the result if that decides between them. Call it
+    /// before [`associate`](Self::associate).
     pub(super) fn resolve(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
@@ -111,7 +113,7 @@ impl DataAssociation {
             return (!ambiguity.is_assigned).then_some(Resolution::Spurious(ambiguity.detection));
         }
         let log_spurious = self.faults.log_rate(detection.sensor, now);
-        // How well the new detection is explained, if the earlier one was so.
+        // The likelihood of the further detection in one branch.
         let likely = |found: &[Hypothesis]| {
             libm::exp(log_spurious) + found.iter().map(|one| libm::exp(one.log_density)).sum::<f64>()
         };
@@ -155,7 +157,7 @@ impl DataAssociation {
         None
     }
 
-    /// Judges a detection.
+    /// Associates a detection with a train, if one is probable enough.
     pub(super) fn associate(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
@@ -193,7 +195,7 @@ impl DataAssociation {
                     if self.ambiguity.as_ref().is_some_and(|ambiguity| {
                         !ambiguity.is_assigned || ambiguity.probability < ASSIGNED_FROM
                     }) {
-                        // What came before may explain it better, once that is decided.
+                        // An earlier ambiguity may explain this one better once it is resolved.
                         return Association::Ambiguous { likeliest: train, or: None };
                     }
                     if let Some(train) = trains.get(&train) {
@@ -216,7 +218,7 @@ impl DataAssociation {
             .iter()
             .filter(|one| density(one) >= NEGLIGIBLE * all)
             .filter_map(|one| Branch::passing(trains, context, detection, one, density(one) / all));
-        // One ambiguity at a time: an older one that this detection did not resolve is given up.
+        // Only one ambiguity is kept: this one replaces an older one that the detection did not resolve.
         self.ambiguity = Some(Ambiguity::unassigned(now, detection, spurious / all, branches.collect()));
         let second = of_trains.get(1).filter(|(_, probability)| *probability >= spurious / all);
         Association::Ambiguous { likeliest, or: second.map(|(train, _)| *train) }
@@ -233,8 +235,8 @@ impl DataAssociation {
     }
 }
 
-/// How probable an explanation has to be to be believed. That a train is not where it was believed to be takes a second
-/// detection: by one that it did not make its place would be given to others while it stands there.
+/// The probability from which an explanation is accepted. That a train is not where it was estimated takes a second
+/// detection: after a single spurious one, its track would be released while it is still there.
 const fn required_probability(explanation: &Explanation) -> f64 {
     match explanation {
         Explanation::Strayed(_) => RESOLVED_FROM,

@@ -1,4 +1,4 @@
-//! One train: where it is, how it moves, what it was told and what it is busy with.
+//! One train: its position, motion model, last command and task.
 
 use alloc::string::String;
 
@@ -19,80 +19,80 @@ use super::task::{Destination, Goal, Phase, Task};
 use super::turning::reversed_location;
 use crate::control::{Achieved, Finished, Notice, Promise};
 
-/// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
-/// then.
+/// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
+/// is urgent then.
 const REST_MARGIN: TimeSpan = TimeSpan::from_ms(300);
 const REST_MARGIN_PART: f64 = 0.2;
-/// Where no time to rest is foreseen: longer than any train of the published tables takes (up to 5 s).
+/// Time to rest where none can be predicted: longer than any train of the published tables takes (up to 5 s).
 const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
-/// A command is written within two polls of a few dozen bytes; after this long the line is not what it was.
+/// A command is sent within two polls of a few dozen bytes each. If it takes longer than this, the line is disturbed.
 const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
-/// A contact this many standard deviations behind a train should have reported it, if the train runs as it should: a train
-/// comes to rest so much shorter once in 44 times, contacts miss one in 300, and one start in 1000 gets stuck on dirt. So
-/// of trains that such a contact was missed_in_a_row about most have not come to it.
+/// A train should have passed a sensor that is this many standard deviations behind its estimate. Stops end that much
+/// shorter once in 44 times, sensors miss one passage in 300, and one start in 1000 stalls on dirt: of the trains
+/// that such a sensor did not report, most have not reached it.
 const SHOULD_HAVE_PASSED: f64 = 2.0;
-/// A train that is looked for reaches a contact within this long at a crawl: 3 m of 50 mm/s.
+/// A lost train reaches a sensor within this time when it creeps: 3 m at 50 mm/s.
 const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
 
-/// From the pickup to either end of a train, which nobody has measured: a long locomotive of the gauge, or a short one
-/// with a wagon.
+/// Length from the pickup to either end of a train that was not measured: a long locomotive of the gauge, or a short
+/// one with a wagon.
 pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 
-/// A train that is driven.
+/// A train with its motion model and everything that changes as it runs.
 #[derive(Debug, Clone)]
 pub(super) struct DrivenTrain {
     pub(super) locator: Locator,
     pub(super) model: MotionModel,
-    /// One standard deviation of its widest stop from a step that moves it.
+    /// One standard deviation of the least precise stop from a step that moves it.
     pub(super) widest_stop: Option<Length>,
     pub(super) task: Option<Task>,
-    /// The step it was commanded last, whether or not that has left yet.
+    /// The step commanded last, sent or not.
     pub(super) commanded: SpeedStep,
-    /// What has not left yet, and since when it waits.
+    /// The command that has not been sent yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
-    /// What should come next.
+    /// What should be reported next.
     pub(super) expected: Expectation,
-    /// What it shall not pass.
+    /// Where its movement authority ends; `None` without a limit.
     pub(super) end_of_authority: Option<WayPoint>,
-    /// How far it reaches ahead of and behind the leading end of its pickup.
+    /// Its lengths ahead of and behind the leading end of the pickup.
     pub(super) reach: [Length; 2],
-    /// What keeps it to speed restrictions.
+    /// The state of its speed supervision.
     pub(super) speed_supervision: SpeedSupervision,
-    /// What it is paced for, while that is its goal.
+    /// How it is paced, while pacing is its goal.
     pub(super) pacing: Option<Pacing>,
-    /// When it came by the contacts behind it, for who follows it.
+    /// When it passed the sensors behind it, for trains that follow it.
     pub(super) passages: Passages,
-    /// How long the link to the station takes.
+    /// The timing of the link to the station.
     pub(super) link: TimeModel,
 }
 
-/// What is expected of a train, as of when something was last known.
+/// What should happen to a train next, as of the last report or command.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Expectation {
-    /// The next contact.
+    /// The next detection.
     pub(super) due: Option<DueContact>,
     pub(super) since: Timestamp,
     pub(super) overdue_reported: bool,
-    /// Contacts in a row that should have reported the train.
+    /// How many sensors in a row should have reported the train and did not.
     pub(super) missed_in_a_row: u8,
-    /// A contact that should have reported it, and nothing has reported it since.
+    /// A sensor that should have reported it, if none has reported it since.
     pub(super) missed_sensor: Option<SensorId>,
-    /// When it is lost if nothing reports it until then; only once a contact is overdue.
+    /// When it counts as lost unless it is reported before; set once a detection is overdue.
     pub(super) lost_by: Option<Timestamp>,
-    /// When it has to be commanded to stop because the track ends, and where.
+    /// When a stop has to be commanded before the end of the track, and which end that is.
     pub(super) track_end_stop: Option<(Timestamp, NodeId)>,
-    /// When it has to be commanded to stop so that it stays within its limit.
+    /// When a stop has to be commanded before the end of authority.
     pub(super) authority_stop: Option<Timestamp>,
 }
 
-/// What a train would run at if it were allowed to.
+/// The state of a train's speed supervision.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SpeedSupervision {
-    /// The step that was asked for, while the train has been told a slower one.
+    /// The ordered step, while a slower one is commanded.
     pub(super) wanted: Option<SpeedStep>,
-    /// When the zones about it are looked at next.
+    /// When the zones around the train are checked next.
     pub(super) next_check: Option<Timestamp>,
-    /// The zone that was said to slow it down.
+    /// The zone that was reported to slow the train down.
     pub(super) reported_zone: Option<String>,
 }
 
@@ -115,7 +115,7 @@ impl DrivenTrain {
         }
     }
 
-    /// Puts something better in the place of what is known of how it moves.
+    /// Replaces the motion model.
     pub(super) fn set_model(&mut self, model: MotionModel) {
         self.widest_stop = widest_stop(&model);
         self.model = model;
@@ -129,7 +129,8 @@ impl DrivenTrain {
         self.locator.locate(context, &self.model, now)
     }
 
-    /// As far as is known; a train that nobody can find stands if it was told to and nobody waits for it to.
+    /// Whether it is estimated to be at rest. A train of unknown position counts as at rest once its stop command has
+    /// been sent, unless a task waits for its standstill.
     pub(super) fn is_at_rest(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let told_to = self.commanded == SpeedStep::STAND && self.unsent.is_none();
         told_to
@@ -139,12 +140,12 @@ impl DrivenTrain {
             )
     }
 
-    /// Whether it runs, or may.
+    /// Whether it runs, or may run.
     pub(super) fn may_move(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         !self.is_at_rest(context, now)
     }
 
-    /// A person says where it is.
+    /// Sets its position as an operator entered it.
     pub(super) fn place(
         &mut self,
         context: TrackContext<'_>,
@@ -167,7 +168,7 @@ impl DrivenTrain {
         self.task.map(|task| task.goal)
     }
 
-    /// Begins something else.
+    /// Replaces its task by another.
     pub(super) fn start_task(&mut self, task: Task, out: &mut Outputs) {
         self.locator.repeat(false);
         if let Some(before) = self.task.replace(task) {
@@ -175,7 +176,7 @@ impl DrivenTrain {
         }
     }
 
-    /// Tells it a step, or the fastest below that the zones about it allow.
+    /// Commands a step, or the fastest lower step that the zones around the train permit.
     pub(super) fn command_step(
         &mut self,
         context: TrackContext<'_>,
@@ -187,13 +188,13 @@ impl DrivenTrain {
         self.command_unsupervised(now, step, out);
     }
 
-    /// Tells it to stand.
+    /// Commands a stop.
     pub(super) fn command_stop(&mut self, now: Timestamp, out: &mut Outputs) {
         self.speed_supervision = SpeedSupervision::default();
         self.command_unsupervised(now, SpeedStep::STAND, out);
     }
 
-    /// Tells it just this step.
+    /// Commands a step without speed supervision.
     pub(super) fn command_unsupervised(&mut self, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         self.commanded = step;
         self.send(now, Command::Speed { train: self.id(), step }, out);
@@ -204,7 +205,7 @@ impl DrivenTrain {
         out.command(command);
     }
 
-    /// Runs at a step, or comes to rest if that is 0.
+    /// Runs at a step, or stops if it is 0.
     pub(super) fn run(
         &mut self,
         context: TrackContext<'_>,
@@ -218,7 +219,7 @@ impl DrivenTrain {
         self.command_step(context, now, step, out);
     }
 
-    /// Comes to rest if it does not, and turns around.
+    /// Reverses, after a stop if it moves.
     pub(super) fn reverse(
         &mut self,
         context: TrackContext<'_>,
@@ -237,7 +238,7 @@ impl DrivenTrain {
         }
     }
 
-    /// A command to this train has left the line.
+    /// A command to this train has been sent.
     pub(super) fn command_left(
         &mut self,
         context: TrackContext<'_>,
@@ -296,7 +297,7 @@ impl DrivenTrain {
             (Phase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
                 self.finish(context, now, task.order, None, None, out);
             }
-            // A stop that leaves after it has been commanded to run again was of what it did before.
+            // A stop that is sent after a new step has been commanded belongs to the earlier task.
             (Phase::Commanding { .. } | Phase::Running { .. }, _)
                 if step == SpeedStep::STAND && self.commanded == SpeedStep::STAND =>
             {
@@ -322,7 +323,7 @@ impl DrivenTrain {
         }
     }
 
-    /// A contact was judged to have been closed by this train.
+    /// This train has caused a detection.
     pub(super) fn passed(
         &mut self,
         context: TrackContext<'_>,
@@ -354,7 +355,8 @@ impl DrivenTrain {
         }
     }
 
-    /// The report says when within a poll, and where it was expected just then says it better.
+    /// Notes the time of a passage. The report gives it within one poll; the predicted time within that poll is more
+    /// precise.
     fn note_passage(&mut self, context: TrackContext<'_>, node: NodeId, middle: Timestamp) {
         let located =
             self.located(context, middle).filter(|located| located.at.node == node && !located.at_rest);
@@ -363,7 +365,7 @@ impl DrivenTrain {
         self.passages.note(node, middle - since);
     }
 
-    /// When it wants to look at the clock.
+    /// When it has to be called again without a report.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         let phase = match self.task.map(|task| task.phase) {
             Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
@@ -418,7 +420,7 @@ impl DrivenTrain {
         self.command_stop(now, out);
     }
 
-    /// Ends what cannot be done, and the run with it.
+    /// Ends the task and stops the train.
     pub(super) fn give_up(&mut self, now: Timestamp, why: Refusal, out: &mut Outputs) {
         if let Some(task) = self.task.take() {
             out.notify(Notice::GivenUp { order: task.order, train: self.id(), why });
@@ -436,7 +438,7 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        // From now on it stands, whatever a better model may make of its way to here.
+        // From now on it is at rest here, even if a better model would predict another distance for this stop.
         if let Some(located) = self.located(context, now) {
             self.locator.place(now, located.at, located.uncertainty);
         }
@@ -450,7 +452,7 @@ impl DrivenTrain {
         }
     }
 
-    /// A contact that it should have passed, without a report.
+    /// The last sensor that it should have passed without a report.
     pub(super) fn sensor_missed_before(
         &self,
         context: TrackContext<'_>,
@@ -460,7 +462,7 @@ impl DrivenTrain {
         sensors_within(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
-    /// The order has been carried out.
+    /// Reports that an order has been carried out.
     pub(super) fn finish(
         &mut self,
         context: TrackContext<'_>,

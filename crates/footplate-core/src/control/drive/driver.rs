@@ -1,4 +1,4 @@
-//! Drives trains to where they are ordered, report by report.
+//! The driver: carries out orders, one report at a time.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -26,34 +26,36 @@ use super::task::Phase;
 use super::turnout_guard::train_on;
 use crate::control::Notice;
 
-/// A contact that is seen closed again within this long was never open: wheels bounce, and no train follows so soon.
+/// A sensor that reports again within this time was occupied all along: wheels bounce, and no second train follows so
+/// soon.
 const BOUNCE_TIME: TimeSpan = TimeSpan::from_ms(300);
-/// The line is watched for one contact only this long before its report decides a stop.
+/// The line polls one sensor more often only this long before its report decides a stop.
 const WATCH_AHEAD: TimeSpan = TimeSpan::from_s(6.0);
-/// What an aim may leave beyond the target: more is no promise, less no stop can keep.
+/// The range of probabilities of stopping beyond the target that an order may ask for: above it is no limit, below it
+/// no stop can comply.
 const AIM_PROBABILITIES: [f64; 2] = [1e-6, 0.5];
-/// The longest move that is believed to be meant: a hundred metres, as long as no layout is.
+/// The longest move accepted: 100 m, longer than any layout.
 const LONGEST_MOVE: Length = Length::from_m(100.0);
 
-/// Knows where the trains are, and tells them when to do what.
+/// Locates trains and sends their commands at the right times.
 #[derive(Debug, Clone)]
 pub struct Driver {
     pub(super) track: KnownTrack,
     pub(super) trains: BTreeMap<TrainId, DrivenTrain>,
     pub(super) outputs: Outputs,
-    /// When each contact was last seen last_detections.
+    /// The last detection of each sensor.
     last_detections: BTreeMap<SensorId, Timestamp>,
-    /// Turnouts that were commanded_turnout for and have not been told yet, by which order.
+    /// Turnout commands that have not been sent yet, with their orders.
     pending_turnouts: Vec<(TurnoutId, OrderId)>,
     pub(super) association: DataAssociation,
     pub(super) orders: u32,
-    /// When the contact to be watched changes.
+    /// When the sensor to be polled more often changes.
     pub(super) watch_changes: Option<Timestamp>,
     link: TimeModel,
 }
 
 impl Driver {
-    /// Nothing to drive yet. How the turnouts lie, as far as is known.
+    /// A driver without trains, for a layout with known turnout positions.
     #[must_use]
     pub fn new(layout: Layout, turnouts: TurnoutStates) -> Self {
         Self {
@@ -69,38 +71,38 @@ impl Driver {
         }
     }
 
-    /// How long the link to the station takes, from now on; without it the slowest one is supposed.
+    /// Sets the timing of the link to the station. Until then the driver assumes the slowest link.
     pub fn set_link(&mut self, link: TimeModel) {
         self.link = link;
         self.trains.values_mut().for_each(|train| train.link = link);
     }
 
-    /// Drives a train that moves like this, and of which nobody knows where it stands. Replaces what was known of it.
+    /// Adds a train whose position is unknown. Replaces a train of the same number and all that was known of it.
     pub fn add_train(&mut self, model: MotionModel) {
         let locator = Locator::new(model.train());
         self.add_located(model, locator);
     }
 
-    /// Drives a train that somebody else has followed until now.
+    /// Adds a train together with its position.
     pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
         self.association.forget(model.train());
         self.trains.insert(model.train(), DrivenTrain::new(model, locator, self.link));
     }
 
-    /// What is known of how a train moves.
+    /// The motion model of a train.
     #[must_use]
     pub fn model(&self, train: TrainId) -> Option<&MotionModel> {
         self.trains.get(&train).map(|train| &train.model)
     }
 
-    /// Puts something better in its place.
+    /// Replaces the motion model of a train.
     pub fn set_model(&mut self, model: MotionModel) {
         if let Some(train) = self.trains.get_mut(&model.train()) {
             train.set_model(model);
         }
     }
 
-    /// The trains that are driven.
+    /// The trains that are driven, by number.
     pub fn trains(&self) -> impl Iterator<Item = TrainId> {
         self.trains.keys().copied()
     }
@@ -111,49 +113,50 @@ impl Driver {
         &self.track.layout
     }
 
-    /// How the turnouts lie.
+    /// The turnout positions.
     #[must_use]
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.track.turnouts
     }
 
-    /// Where a train is at a time not before the last entry; `None` if nobody knows.
+    /// Where a train is at a time not before the last event; `None` if its position is unknown.
     #[must_use]
     pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {
         self.trains.get(&train)?.located(self.track.context(), now)
     }
 
-    /// A point of a train's way as people name it.
+    /// A point of a train's path as a landmark and an offset.
     #[must_use]
     pub fn landmark(&self, train: TrainId, at: WayPoint) -> Option<Landmark> {
         Some(landmark_of(self.track.context(), &self.trains.get(&train)?.model, at))
     }
 
-    /// Whether a train stands, as far as is known.
+    /// Whether a train is estimated to be at rest.
     #[must_use]
     pub fn stands(&self, train: TrainId, now: Timestamp) -> bool {
         self.trains.get(&train).is_some_and(|train| train.is_at_rest(self.track.context(), now))
     }
 
-    /// The step that a train was commanded last, whether or not that has left yet; 0 for one that is not part of this session.
+    /// The step that a train was last commanded, sent or not; 0 for a train that is not part of this session.
     #[must_use]
     pub fn commanded(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.commanded)
     }
 
-    /// The step at which a train that nobody has seen is let run over a contact; 0 for one that is not part of this session.
+    /// The step at which a train of unknown position creeps to a sensor; 0 for a train that is not part of this
+    /// session.
     #[must_use]
     pub fn finding_step(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, DrivenTrain::finding_step)
     }
 
-    /// The order that a train is busy with.
+    /// The order that a train is carrying out.
     #[must_use]
     pub fn busy(&self, train: TrainId) -> Option<OrderId> {
         Some(self.trains.get(&train)?.task?.order)
     }
 
-    /// A person put a train there, or read off where it stands.
+    /// Sets the position of a train, as an operator entered it.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         self.association.forget(train);
         if let Some(train) = self.trains.get_mut(&train) {
@@ -161,17 +164,17 @@ impl Driver {
         }
     }
 
-    /// Begins to carry out an order. What the train was busy with ends.
+    /// Starts an order. It replaces the train's present order.
     ///
     /// # Errors
-    /// Why it cannot be carried out; nothing has changed then.
+    /// Why the order cannot be carried out; nothing has changed then.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         self.check(&order)?;
         let id = OrderId(self.orders);
         let context = self.track.context();
         let out = &mut self.outputs;
         if let Order::Follow { train, leader, gap } = order {
-            // Whoever follows looks at the others.
+            // A follower reads the states of the other trains.
             if let Some(mut follower) = self.trains.remove(&train) {
                 let taken = follower.follow(context, now, id, (leader, gap), &self.trains, out);
                 self.trains.insert(train, follower);
@@ -200,7 +203,7 @@ impl Driver {
         Ok(id)
     }
 
-    /// Whether an order makes sense at all.
+    /// Checks the values of an order, whatever the state of the railway.
     fn check(&self, order: &Order) -> Result<(), Refusal> {
         let Some(id) = order.train() else { return Ok(()) };
         let train = self.trains.get(&id).ok_or(Refusal::UnknownTrain { train: id })?;
@@ -234,7 +237,8 @@ impl Driver {
         }
     }
 
-    /// Throws a turnout unless a train is on it; the other one in its place goes straight first.
+    /// Commands a turnout, unless a train is on it. If it shares its place with another turnout, that one is set
+    /// straight first.
     fn throw(
         &mut self,
         now: Timestamp,
@@ -271,7 +275,7 @@ impl Driver {
         self.association.turnout_thrown(turnout);
         let out = &mut self.outputs;
         let mut is_ordered = false;
-        // Whoever commanded_turnout for it is answered; a line may say once what was commanded_turnout twice.
+        // Answers every order for this turnout: the line may send two equal commands as one.
         self.pending_turnouts.retain(|(commanded_turnout, order)| {
             if *commanded_turnout == turnout {
                 is_ordered = true;
@@ -323,7 +327,7 @@ impl Driver {
         }
     }
 
-    /// A train passed a contact just now.
+    /// Updates a train that caused a detection.
     fn passed(&mut self, now: Timestamp, detection: Detection, explanation: Explanation) {
         if let Explanation::Turnout { train, turnout, leg } = explanation {
             self.adopt_leg(train, turnout, leg);
@@ -345,7 +349,7 @@ impl Driver {
         }
     }
 
-    /// A train passed a contact a while ago, or did not, as has turned out.
+    /// Corrects a train after later detections have shown that it caused an earlier one, or that it did not.
     fn revise(&mut self, now: Timestamp, branch: Branch) {
         let Branch { detection, caused, train, passes, legs, locator, missed_sensor, .. } = branch;
         if !caused {
@@ -370,14 +374,14 @@ impl Driver {
         }
     }
 
-    /// Takes over what a train showed of a turnout.
+    /// Adopts a turnout position that a train has shown by the leg it took.
     fn adopt_leg(&mut self, train: TrainId, turnout: TurnoutId, leg: Leg) {
         self.track.turnouts.set(turnout, leg);
         let curved = leg.is_curved();
         self.outputs.notify(Notice::TurnoutMismatch { turnout, curved, train });
     }
 
-    /// Says of the line what the plans want of it.
+    /// Requests a free line for the next planned command and frequent polls of the sensor that decides it.
     pub(super) fn update_line_requests(&mut self, now: Timestamp) {
         let plans = || {
             self.trains.values().filter_map(|train| match train.task?.phase {
@@ -394,7 +398,8 @@ impl Driver {
             .find(|sensor| triggers().any(|trigger| trigger == *sensor));
         let guard = self.trains.values().filter_map(DrivenTrain::latest_safe_stop);
         let hold = next.map(|plan| plan.leaves - self.link.command).into_iter().chain(guard).min();
-        // Asked in any case: it also says when to look again, and a time that stays behind would be waited for for ever.
+        // Called even if the plans have a sensor: it also sets when the watched sensor changes next. A stale time
+        // would never let the driver sleep.
         let paced = self.due_of_paced(now);
         let watched = watched.or(paced);
         self.outputs.hold_line(hold);

@@ -1,4 +1,4 @@
-//! What a train shall not pass, whatever it was ordered, and places as whoever sets limits needs them.
+//! The end of a train's movement authority, and positions on its path for those who set it.
 
 use alloc::collections::BTreeSet;
 
@@ -16,10 +16,10 @@ use super::turning::{reversed_on_current_path, reversed_position, trailing_posit
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
-    /// What a train shall not pass, whatever it is ordered to do and whatever is reported: it is commanded to stop in time, by
-    /// the clock if nothing is heard of it, so that it comes to rest before but for one time in a thousand. Whoever plans
-    /// a stop plans it before the limit. A train that is put elsewhere or turned around may not move until it is given
-    /// another limit; `None` lifts it.
+    /// Sets the end of a train's movement authority. Whatever is ordered or reported, the driver commands a stop in
+    /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
+    /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
+    /// set. `None` removes the limit.
     pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
@@ -28,64 +28,63 @@ impl Driver {
         self.update_line_requests(now);
     }
 
-    /// What a train shall not pass.
+    /// The end of a train's movement authority.
     #[must_use]
     pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
         self.trains.get(&train)?.end_of_authority
     }
 
-    /// A number for something that is made of several orders: no order will have it.
+    /// An order number for a sequence of orders; no single order gets it.
     pub(in crate::control) const fn number(&mut self) -> OrderId {
         let id = OrderId(self.orders);
         self.orders = self.orders.wrapping_add(1);
         id
     }
 
-    /// Where a train comes to rest, most likely, if the command to stop leaves at a time that is not before the last
-    /// entry.
+    /// The median place of rest if a stop command is sent at a time not before the last event.
     #[must_use]
     pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<WayPoint> {
         Some(self.stopped_at(train, at)?.at)
     }
 
-    /// The same with how sure that is, and when it stands.
+    /// The same with its uncertainty and the time of rest.
     #[must_use]
     pub fn stopped_at(&self, train: TrainId, at: Timestamp) -> Option<Rest> {
         let train = self.trains.get(&train)?;
         train.locator.rest_if_stopped(self.track.context(), &train.model, at)
     }
 
-    /// How far a train reaches ahead of and behind the leading end of its pickup, whichever way it runs. Unless it is said,
-    /// as far as a long locomotive might (250 mm).
+    /// Sets the lengths of a train ahead of and behind the leading end of its pickup; not exchanged when it reverses.
+    /// The default is 250 mm, for a long locomotive.
     pub fn set_reach(&mut self, train: TrainId, ahead: Length, behind: Length) {
         if let Some(train) = self.trains.get_mut(&train) {
             train.reach = [ahead, behind].map(|reach| reach.max(Length::ZERO));
         }
     }
 
-    /// One standard deviation of the widest stop that a train may make from a step that moves it; `None` if none is known
+    /// One standard deviation of the least precise stop from a step that moves the train; `None` if no step is known
     /// to.
     #[must_use]
     pub fn widest_stop(&self, train: TrainId) -> Option<Length> {
         self.trains.get(&train)?.widest_stop
     }
 
-    /// A contact that a train should have closed and did not, since it was seen last: it may be far behind where it is
-    /// believed to be.
+    /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
+    /// its estimate.
     #[must_use]
     pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
 
-    /// Whether it is not sure which contacts a train has passed: it may be where it would be otherwise.
+    /// Whether the position of a train depends on an ambiguous detection.
     #[must_use]
     pub fn is_in_doubt(&self, train: TrainId) -> bool {
         self.association.is_ambiguous(train)
     }
 
-    /// Counts a train at rest from the node behind its pickup, whatever is there: how turnouts further away lie makes no
-    /// difference from now on.
+    /// Measures the position of a train at rest from the node behind its pickup: turnouts further away no longer
+    /// affect it.
     pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
         let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
         let at = self.position_at(train, located.at).and_then(|place| {
@@ -99,26 +98,27 @@ impl Driver {
         }
     }
 
-    /// The turnouts that cannot be thrown now for this train.
+    /// The turnouts that cannot be thrown now because of this train.
     #[must_use]
     pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
         let train = self.trains.get(&train);
         train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.context(), train, now))
     }
 
-    /// The place of a train on the layout; `None` if nobody knows it.
+    /// The position of a train on the layout; `None` if it is unknown.
     #[must_use]
     pub fn position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         self.position_at(train, self.locate(train, now)?.at)
     }
 
-    /// The place on the layout of a point of a train's way as the turnouts lie.
+    /// A point of a train's path as a position on the layout, with the turnouts as they are.
     #[must_use]
     pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
         place_of(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
-    /// The same ahead of a point of its way: where the way leads there only once round, that is taken.
+    /// A position on the layout as a point of a train's path ahead of another point; on a circuit, after one more lap
+    /// if need be.
     #[must_use]
     pub fn way_point_ahead(&self, train: TrainId, from: WayPoint, to: Position) -> Option<WayPoint> {
         let found = self.way_point(train, from.node, to)?;
@@ -129,22 +129,22 @@ impl Driver {
         Some(WayPoint { way: found.way + round, ..found })
     }
 
-    /// Where the leading end of the pickup will be taken to be when a train at rest has turned around. It is counted from
-    /// the node behind it then: a turnout there has to lie for where it stands.
+    /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
+    /// node behind it: a turnout there must be set for the track under the train.
     #[must_use]
     pub fn turned_place(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         let at = self.locate(train, now)?.at;
         reversed_position(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
-    /// The same for a train that would stand at a place, wherever it came from.
+    /// The same for a train that would be at rest at a position, arriving on any path.
     #[must_use]
     pub fn turned_place_at(&self, place: Position) -> Option<Position> {
         reversed_on_current_path(self.track.context(), place)
     }
 
-    /// A place on the layout as a point of a train's way, counted from a node as the turnouts lie; `None` if none leads
-    /// there.
+    /// A position on the layout as a point of a train's path from a node, with the turnouts as they are; `None` if no
+    /// path leads there.
     #[must_use]
     pub fn way_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<WayPoint> {
         let way = way_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
@@ -153,7 +153,7 @@ impl Driver {
 }
 
 impl DrivenTrain {
-    /// Sets another limit, or none.
+    /// Sets the end of authority, or removes it.
     pub(super) fn set_end_of_authority(
         &mut self,
         context: TrackContext<'_>,
@@ -164,15 +164,15 @@ impl DrivenTrain {
         self.update_authority_stop(context, now);
     }
 
-    /// The train was put somewhere or turned around: whatever it was allowed before, it was not allowed from here.
+    /// Ends the authority where the train is: it was placed or reversed, and the authority no longer applies.
     pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
         if self.end_of_authority.is_some() {
             self.end_of_authority = self.located(context, now).map(|located| located.at);
         }
     }
 
-    /// The train has come to a contact. Where no way leads from there to the limit it is somewhere else than it should
-    /// be, and the limit is here.
+    /// Measures the end of authority from a sensor that the train has passed. If no path leads there from this
+    /// sensor, the train has left its route, and its authority ends here.
     pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
         if let Some(end) = self.end_of_authority {
             let counted = recount_from(context, &self.model, end, node);

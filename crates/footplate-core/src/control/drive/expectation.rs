@@ -1,4 +1,4 @@
-//! What should happen next to a train that runs, and what follows when it does not.
+//! The next detection of a running train, and what follows if it does not come.
 
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
@@ -14,54 +14,56 @@ use super::refusal::Refusal;
 use super::task::Phase;
 use crate::control::Notice;
 
-/// A contact is overdue this long after the last of 99.7 % of cases.
+/// A detection is overdue this long after its 99.7 % bound.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
-/// The contact behind one that was missed_in_a_row is late this long after the last of 99.7 % of cases: two polls of all modules. Who
-/// follows the train waits no longer.
+/// After one missed detection, the next is late this long after its 99.7 % bound: two polls of all modules. A
+/// follower is not kept waiting longer.
 const LATE: TimeSpan = TimeSpan::from_ms(250);
-/// Contacts that stay missed_in_a_row in a row until the train is lost: two are missed one after the other once in 100 000 times,
-/// and trains are stuck, derailed or lifted ten times as often.
-const MOST_SILENT: u8 = 2;
-/// And however far the next one is, when at least this long has passed, or twice the way there.
+/// The number of missed detections in a row after which a train is lost: sensors miss two in a row once in 100 000
+/// times; trains stall, derail or are lifted ten times as often.
+const LOST_AFTER_MISSED: u8 = 2;
+/// After a missed detection, the train is lost after this time, or twice the predicted travel time to the next sensor
+/// if that is longer.
 const LOST: TimeSpan = TimeSpan::from_s(10.0);
-/// Where nobody knows which contact comes next, it is lost after this long: the longest way of the known tracks between
-/// two contacts, 1.5 m, at a crawl.
+/// Where the next sensor is unknown, the train is lost after this time: the longest hop of the known layouts, 1.5 m,
+/// at creep speed.
 const LOST_WITHOUT: TimeSpan = TimeSpan::from_s(40.0);
-/// What of a train is ahead of its pickup, and a little: this much of the track is left before its end.
+/// The length kept free before the end of the track: the front of a train, ahead of its pickup, and a margin.
 const BEFORE_END: Length = Length::from_mm(200.0);
-/// How often a train that is stopped for the end of the track may come nearer than that, or pass its limit.
+/// The probability that a train stopped before the end of the track, or its end of authority, comes closer than
+/// intended.
 const NEARER: Ratio = Ratio::from_percent(0.1);
 
 impl DrivenTrain {
-    /// A contact that should have reported it long ago: it may never have come there.
+    /// A sensor that should have reported it: it may not have got there.
     pub(super) const fn missed_sensor(&self) -> Option<SensorId> {
         self.expected.missed_sensor
     }
 
-    /// Whether one contact was missed_in_a_row, and the next is not late.
+    /// Whether at most one detection was missed and the next is not late.
     pub(super) fn missed_just_one(&self, now: Timestamp) -> bool {
         let Expectation { due, overdue_reported, missed_in_a_row, .. } = self.expected;
         let by = due.map(|due| due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s()) + LATE);
         match missed_in_a_row {
-            // Passed for certain, and not overdue yet.
+            // The train has passed it, and the next is not overdue yet.
             0 => true,
             1 => !overdue_reported && by.is_some_and(|by| now < by),
             _ => false,
         }
     }
 
-    /// The next contact and when it is due.
+    /// The next sensor and the predicted time of its detection.
     pub(super) fn due(&self) -> Option<(SensorId, Timestamp)> {
         self.expected.due.map(|due| (due.sensor, due.time))
     }
 
-    /// Looks ahead to the next contact, to the end of the track and to the limit.
+    /// Predicts the next detection and the latest stops before the end of the track and the end of authority.
     pub(super) fn expect_next(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let due = self.locator.next_contact(context, &self.model, now);
         let track_end_stop = self.track_end_stop(context, now);
         let authority_stop = self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
         self.schedule_zone_check(context, now);
-        // What was missed is not forgotten because something was commanded.
+        // A command does not clear the record of missed detections.
         self.expected = Expectation {
             due,
             since: now,
@@ -72,19 +74,19 @@ impl DrivenTrain {
         };
     }
 
-    /// Looks at another limit, and at nothing else.
+    /// Predicts only the latest stop before the end of authority.
     pub(super) fn update_authority_stop(&mut self, context: TrackContext<'_>, now: Timestamp) {
         self.expected.authority_stop =
             self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
     }
 
-    /// The same after a command to it. A contact that it should have come by already stays due: who is told something
-    /// else every other second must not be lost for that without anybody noticing.
+    /// Predicts again after a command. A detection that is already due remains due: otherwise a train commanded every
+    /// other second would never be reported lost.
     pub(super) fn expect_after_command(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let before = self.expected;
         self.expect_next(context, now);
         if self.commanded == SpeedStep::STAND {
-            // Each run is judged by its own contacts; that one was missed_in_a_row stays known.
+            // Each run counts its own missed detections; `missed_sensor` remains.
             self.expected.missed_in_a_row = 0;
             self.expected.lost_by = None;
         } else if let (Some(due), Some(next)) = (before.due, self.expected.due)
@@ -95,16 +97,16 @@ impl DrivenTrain {
         }
     }
 
-    /// It was seen where it can be.
+    /// A sensor reported it where it can be.
     pub(super) const fn clear_missed(&mut self) {
         self.expected.missed_sensor = None;
         self.expected.missed_in_a_row = 0;
         self.expected.lost_by = None;
     }
 
-    /// When a contact that does not come is overdue, and after that when the train is lost.
+    /// When the next detection is overdue, or the train is lost.
     pub(super) fn next_overdue(&self) -> Option<Timestamp> {
-        // Nothing is expected of a train that has not heard yet that it should move.
+        // A train whose start command has not been sent yet is not expected anywhere.
         if self.commanded == SpeedStep::STAND || !self.is_all_sent() {
             return None;
         }
@@ -129,11 +131,11 @@ impl DrivenTrain {
                 self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
                 self.expected.missed_sensor.get_or_insert(due.sensor);
                 self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
-                if self.expected.missed_in_a_row >= MOST_SILENT {
+                if self.expected.missed_in_a_row >= LOST_AFTER_MISSED {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_contact(context, &self.model, now);
-                // The one behind it is waited for now; where none is known only the clock ends the wait.
+                // From now on the sensor behind the missed one is due; if none is known, only the time limit applies.
                 let next = next.filter(|next| next.sensor != due.sensor);
                 self.expected.overdue_reported = next.is_none();
                 self.expected.since = now;
@@ -143,7 +145,7 @@ impl DrivenTrain {
         }
     }
 
-    /// Nobody knows any more where the train is.
+    /// Gives up the position and the task.
     fn lose(&mut self, now: Timestamp, out: &mut Outputs) {
         self.locator.lose();
         self.passages.forget();
@@ -153,13 +155,13 @@ impl DrivenTrain {
         self.give_up(now, Refusal::Lost { train }, out);
     }
 
-    /// When the train has to be commanded to stop so that it stays on the track and within its limit, whatever is reported
-    /// until then.
+    /// The latest time at which a stop has to be commanded, whatever is reported until then, to stay on the track and
+    /// within the authority.
     pub(super) fn latest_safe_stop(&self) -> Option<Timestamp> {
         [self.track_end_stop_time(), self.authority_stop_time()].into_iter().flatten().min()
     }
 
-    /// Whoever has a plan stops before the end of the track.
+    /// A planned stop already ends before the end of the track.
     fn track_end_stop_time(&self) -> Option<Timestamp> {
         let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
         let (leaves, _) =
@@ -167,13 +169,13 @@ impl DrivenTrain {
         Some(leaves - self.link.command)
     }
 
-    /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
+    /// The end of authority applies to planned stops, too: a plan aims at the median, the authority at the bound.
     fn authority_stop_time(&self) -> Option<Timestamp> {
         let leaves = self.expected.authority_stop.filter(|_| self.commanded > SpeedStep::STAND)?;
         Some(leaves - self.link.command)
     }
 
-    /// Stops the train where the track ends ahead of it, or what it may enter.
+    /// Stops a train before the end of its track or of its authority.
     pub(super) fn enforce_track_limits(
         &mut self,
         context: TrackContext<'_>,
@@ -203,9 +205,9 @@ impl DrivenTrain {
         Some((self.last_stop_before(context, now, at)?, end))
     }
 
-    /// The latest time at which a command to stop may leave so that the train comes to rest before a point, but for one
-    /// time in [`NEARER`]; the earliest that can still be kept where even that is too late; `None` while it does not
-    /// come so far.
+    /// The latest time at which a stop command may be sent for a rest before a point, with probability 1 −
+    /// [`NEARER`]. Returns the earliest possible time if even that is too late, and `None` if the train does not get
+    /// so far.
     pub(super) fn last_stop_before(
         &self,
         context: TrackContext<'_>,

@@ -1,5 +1,5 @@
-//! What may have closed a contact: each train that can be there, by the turnouts as they lie or by one that did not
-//! move; a train that is lost, or has strayed; or nothing.
+//! What may have caused a detection: each train that can be there, with the turnouts as known or with one that
+//! failed; a lost or displaced train; or no train.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -13,27 +13,28 @@ use crate::tracking::TrackContext;
 
 use super::driven_train::DrivenTrain;
 
-/// Hops ahead of a train within which a turnout may have been taken the other way: the one it is on and the next.
+/// How many hops ahead of a train a turnout failure is considered: the present hop and the next.
 const HOPS_AHEAD: usize = 2;
-/// A turnout does not lie as it was told in 0.3 % of cases (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
+/// ln of the probability that a turnout does not move when commanded, 0.3 % (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
 ///
 /// [`LOG_CHANCE_OF_SILENCE`]: crate::tracking::Locator::claim
 const LOG_TURNOUT_FAILS: f64 = -5.809;
-/// Where a way by the turnouts as they lie is as likely as this (ln 1/s), no other is looked for: half a second's doubt.
+/// Turnout failures are considered only if the density (ln 1/s) with the known positions is below this: an
+/// uncertainty of about half a second.
 const LIKELY: f64 = 0.0;
-/// A train that is not seen where it should be was missed by the contact (0.3 %), has changed (0.1 %, as in its claim),
-/// or is not there at all (0.01 %, chosen: lifted, derailed, stuck). ln of the sum, and of the share of the last.
+/// A train that a sensor should have reported was missed by the sensor (0.3 %), has changed (0.1 %, as in its claim),
+/// or is not there (0.01 %, chosen: lifted, derailed, stalled). ln of the sum, and of the share of the last.
 const LOG_MISSED: f64 = -5.5;
 /// See [`LOG_MISSED`].
 const LOG_STRAYED: f64 = -3.7;
-/// A train of which nothing strange is known is elsewhere with this chance, as ln (chosen).
+/// ln of the probability that a train without any missed sensor is elsewhere (chosen).
 const LOG_LIFTED: f64 = -9.2;
-/// Forecasts of when a train stands are wrong by less than this; for so long it may still close a contact.
+/// Largest error of a predicted time of rest: until then a train may still cause a detection.
 const REST_TIME_ERROR: TimeSpan = TimeSpan::from_ms(1_500);
-/// The length of way that a lost train may be anywhere on, where a layout says nothing (m).
+/// Total track length (m) assumed for a lost train if the layout states no lengths.
 const UNKNOWN_TRACK_M: f64 = 20.0;
 
-/// A contact was seen closed.
+/// One detection: a sensor, and the time window in which it was reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Detection {
     pub(super) sensor: SensorId,
@@ -43,11 +44,11 @@ pub(super) struct Detection {
 /// What explains a detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Explanation {
-    /// This train, which was expected somewhere there, or of which nobody knew where it was.
+    /// This train, near its predicted time, or a lost train.
     Train(TrainId),
-    /// This train, if the turnout lay otherwise than it was told.
+    /// This train, if the turnout is not in its commanded position.
     Turnout { train: TrainId, turnout: TurnoutId, leg: Leg },
-    /// This train, which is not where it was believed to be.
+    /// This train, if it is not at its estimated position.
     Strayed(TrainId),
 }
 
@@ -59,14 +60,14 @@ impl Explanation {
     }
 }
 
-/// An explanation and ln of the density (1/s) with which it makes the contact close at that time.
+/// An explanation, and ln of the density (1/s) of the detection under it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis {
     pub(super) explanation: Explanation,
     pub(super) log_density: f64,
 }
 
-/// Everything that trains have to do with a detection.
+/// All hypotheses in which a train caused a detection.
 pub(super) fn hypotheses(
     trains: &BTreeMap<TrainId, DrivenTrain>,
     context: TrackContext<'_>,
@@ -87,7 +88,7 @@ pub(super) fn hypotheses(
             continue;
         }
         let is_missed = train.missed_sensor().is_some();
-        // That it was not seen has happened already, whichever way it is explained.
+        // The missed sensor has already happened under every hypothesis: condition on it.
         let conditioned = if is_missed { -LOG_MISSED } else { 0.0 };
         let claim = |context: TrackContext<'_>| {
             let claim = train.locator.claim(context, &train.model, detection.sensor, detection.window)?;
@@ -113,7 +114,7 @@ pub(super) fn hypotheses(
     found
 }
 
-/// A train that stands closes no contact.
+/// Whether a train moved in the window or just before it; a train at rest causes no detection.
 fn may_have_moved(
     train: &DrivenTrain,
     context: TrackContext<'_>,
@@ -127,8 +128,8 @@ fn may_have_moved(
     before.is_some_and(|before| !before.at_rest)
 }
 
-/// ln of the density (1/s) with which a train that may be anywhere comes to one contact: its speed over all track there
-/// are, in either direction.
+/// ln of the density (1/s) with which a train of unknown position reaches one sensor: its speed over the length of
+/// all track, both directions.
 fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
     let speed = train.model.speed(train.commanded, Approach::Below).value.as_m_per_s();
     let track: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
@@ -136,7 +137,7 @@ fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
     libm::log(speed.max(f64::MIN_POSITIVE) / track)
 }
 
-/// The turnouts that a train meets at their toes before long, with the leg for which they are not believed to lie.
+/// The turnouts that a train will soon pass from the toe, each with the leg that it is not set for.
 fn other_legs<'g>(
     train: &DrivenTrain,
     context: TrackContext<'g>,

@@ -1,10 +1,10 @@
-//! The layout as it lies, owned by who drives on it.
+//! The track that a driver runs trains on.
 
 use crate::model::survey::SectionIndex;
 use crate::track::{Layout, TurnoutStates};
 use crate::tracking::TrackContext;
 
-/// What [`TrackContext`] points to.
+/// The owner of what a [`TrackContext`] refers to.
 #[derive(Debug, Clone)]
 pub(super) struct KnownTrack {
     pub(super) layout: Layout,

@@ -1,8 +1,8 @@
-//! Driving: from an order to a train at rest within millimetres of where it should be.
+//! Driving: from an order to a train at rest within millimetres of its target.
 //!
-//! A [`Driver`] takes [`Order`]s and says with [`Notice`]s what comes of them. It follows every train between
-//! contacts, plans each stop anew at every report, and commands it at the planned time by the clock, whatever is or is
-//! not reported until then.
+//! A [`Driver`] accepts [`Order`]s and reports their progress in [`Notice`](super::Notice)s. It estimates every
+//! train's position between sensors, plans each stop again after every detection, and sends the stop command at the
+//! planned time by the clock, even if no further sensor reports.
 
 mod ambiguity;
 mod approach;

@@ -1,4 +1,4 @@
-//! What is to be done and said next, in order.
+//! The outputs of a driver, in order.
 
 use alloc::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use crate::time::Timestamp;
 
 use crate::control::Notice;
 
-/// A queue of outputs, which says of the line only what changed.
+/// A queue of outputs. Requests to the line are queued only when they change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outputs {
     queue: VecDeque<Output<Notice>>,

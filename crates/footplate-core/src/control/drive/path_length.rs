@@ -1,4 +1,4 @@
-//! Ways along the hops as the turnouts lie, in lengths as a train feels them.
+//! Distances along hops, with the turnouts as they are, in path lengths of a train.
 
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::model::MotionModel;
@@ -6,8 +6,8 @@ use crate::track::{Hop, NodeKind};
 use crate::tracking::{TrackContext, WayPoint};
 use crate::units::Length;
 
-/// The hops ahead of a node, each with where it begins and ends as way from there. Ends where the way does, and after
-/// as many hops as there are nodes, which is more than one circuit_length of any circuit.
+/// The hops ahead of a node, each with the distances to its start and end. Ends where the path ends, and after as
+/// many hops as there are nodes, more than one lap of any circuit.
 fn hop_ranges<'g>(
     context: TrackContext<'g>,
     model: &MotionModel,
@@ -21,7 +21,7 @@ fn hop_ranges<'g>(
     })
 }
 
-/// The way from one node to another that is ahead of it.
+/// The distance from a node to another ahead of it.
 pub(super) fn distance_between(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -34,8 +34,8 @@ pub(super) fn distance_between(
     hop_ranges(context, model, from).find(|(hop, _)| hop.to == to).map(|(_, [_, end])| end)
 }
 
-/// The way once round from a node to itself, on a circuit. Hops end at contacts: from any other node it is the way round
-/// from the next contact, if that leads over the node.
+/// The length of the circuit through a node. Hops end at sensors: from another node it is the circuit of the next
+/// sensor, if that passes the node.
 pub(super) fn circuit_length(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Option<Length> {
     let contact = match context.layout.sensor_at(node) {
         Some(_) => node,
@@ -50,8 +50,8 @@ pub(super) fn circuit_length(context: TrackContext<'_>, model: &MotionModel, nod
     (over_it && end > Length::ZERO).then_some(end)
 }
 
-/// The same point counted from another node, which the train came to since: ahead of the one before, and once round if
-/// it is the same.
+/// The same point, measured from a node that the train has passed since: the next on its path, or the same after one
+/// lap.
 pub(super) fn recount_from(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -62,7 +62,7 @@ pub(super) fn recount_from(
     Some(WayPoint { node, way: point.way - between })
 }
 
-/// The contacts ahead of a node up to a way, with their ways.
+/// The sensors ahead of a node up to a distance, with their distances.
 pub(super) fn sensors_within<'g>(
     context: TrackContext<'g>,
     model: &MotionModel,
@@ -74,7 +74,8 @@ pub(super) fn sensors_within<'g>(
         .filter_map(|(hop, [_, end])| Some((hop.sensor?, end)))
 }
 
-/// Where the way ahead of a node ends, and how far that is; `None` on a circuit, and where a turnout is not known.
+/// The end of the track ahead of a node and its distance; `None` on a circuit, and beyond a turnout of unknown
+/// position.
 pub(super) fn track_end(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -84,7 +85,7 @@ pub(super) fn track_end(
     Some((hop.to, end))
 }
 
-/// The first turnout ahead of a node at which the way forks and nobody knows where it leads.
+/// The first facing turnout ahead of a node whose position is unknown.
 pub(super) fn unknown_turnout(context: TrackContext<'_>, from: NodeId) -> Option<TurnoutId> {
     let last = context.hops_ahead(from).take(context.layout.nodes().len()).last().map_or(from, |hop| hop.to);
     let hop = context.layout.open_hops_from(last, context.turnouts).next()?;
@@ -92,7 +93,7 @@ pub(super) fn unknown_turnout(context: TrackContext<'_>, from: NodeId) -> Option
     Some(fork.turnout)
 }
 
-/// The nodes of a turnout: met at its toe, and from its legs.
+/// The nodes of a turnout: at its toe, and at its legs.
 pub(super) fn nodes_of_turnout(context: TrackContext<'_>, turnout: TurnoutId) -> Option<[NodeId; 2]> {
     let branch = context.layout.branch(turnout)?;
     debug_assert!(context.layout.node(branch).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))));

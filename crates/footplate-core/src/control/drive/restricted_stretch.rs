@@ -1,4 +1,4 @@
-//! Speed restrictions on the way of a train, in lengths as the train feels them.
+//! Speed restrictions around a train, in its path lengths.
 
 use alloc::vec::Vec;
 
@@ -7,23 +7,23 @@ use crate::model::MotionModel;
 use crate::track::{Hop, Zone};
 use crate::tracking::TrackContext;
 
-/// Hops looked at in either direction: more than a circuit_length of any layout in use.
+/// Hops examined in either direction: more than a lap of any layout in use.
 const MAX_HOPS: usize = 200;
-/// Edges that are this near to each other (m) follow one another: sums of lengths are rounded.
+/// Edges closer together than this (m) are adjacent: sums of lengths are rounded.
 const ADJACENT: f64 = 1e-6;
 
-/// A part of the way on which the speed is restricted.
+/// A part of the path with a speed restriction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RestrictedStretch<'g> {
     pub(super) zone: &'g Zone,
-    /// Where it begins and where it ends (m past the node from which the train is counted, negative behind it).
+    /// Start and end (m past the node from which the train's position is measured, negative behind it).
     pub(super) from: f64,
     pub(super) to: f64,
 }
 
 impl<'g> RestrictedStretch<'g> {
-    /// What is restricted behind a node and ahead of it, so far each (m), as the turnouts lie; the ways behind first. Where
-    /// nobody knows how a turnout ahead lies, what is restricted on either leg.
+    /// The restrictions behind and ahead of a node, up to these distances (m), in order along the path. Where the
+    /// position of a turnout ahead is unknown, those of both legs.
     pub(super) fn about(
         context: TrackContext<'g>,
         model: &MotionModel,
@@ -58,7 +58,7 @@ impl<'g> RestrictedStretch<'g> {
     }
 }
 
-/// Adds the restricted edges of a hop that begins so far ahead (m); returns how long the train feels the hop.
+/// Adds the restricted edges of a hop that starts at a distance (m). Returns the train's path length of the hop.
 fn add<'g>(
     found: &mut Vec<RestrictedStretch<'g>>,
     context: TrackContext<'g>,

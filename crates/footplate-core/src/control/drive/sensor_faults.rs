@@ -1,24 +1,25 @@
-//! How records have behaved: which of them close where no train can be, and how often.
+//! Sensor faults: how often each sensor reports where no train can be.
 
 use alloc::collections::BTreeMap;
 
 use crate::ids::SensorId;
 use crate::time::{TimeSpan, Timestamp};
 
-/// How often one contact closes by itself that never did so (1/s): on a layout of eighty that is once in twenty minutes
-/// over all (well-kept course layouts: 0.05 a minute).
+/// Rate of spurious detections (1/s) of a sensor that had none so far: once in twenty minutes over the eighty sensors
+/// of a layout (well-kept course layouts: 0.05 per minute).
 const SPURIOUS_RATE: f64 = 1e-5;
-/// Strange closures are forgotten over this time (chosen: longer than a train's round).
+/// Time constant with which unexplained detections are forgotten (chosen: longer than a train's lap).
 const FORGETTING_TIME: TimeSpan = TimeSpan::from_s(120.0);
-/// A contact with so many that are not forgotten is stuck: three within half a minute. By chance that happens to one
-/// contact in a century of running.
+/// A sensor with this many unexplained detections is stuck: three within half a minute. By chance that happens to one
+/// sensor in a century of running.
 const STUCK_FROM: f64 = 2.4;
-/// Below so many it has behaved: two minutes without another one, or two closures just when a train was due.
+/// A stuck sensor is used again below this: after two minutes without an unexplained detection, or two detections
+/// when a train was due.
 const RESTORED_BELOW: f64 = 0.9;
-/// What one detection at the right time leaves of the strange ones.
+/// The factor by which one explained detection reduces the unexplained ones.
 const EXPLAINED_FACTOR: f64 = 0.5;
 
-/// The faults of all records.
+/// The fault records of all sensors.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SensorFaults {
     records: BTreeMap<SensorId, Record>,
@@ -26,7 +27,7 @@ pub(super) struct SensorFaults {
 
 #[derive(Debug, Clone, Copy)]
 struct Record {
-    /// Strange closures, as of the last entry.
+    /// Unexplained detections with forgetting, as of `at`.
     unexplained: f64,
     at: Timestamp,
     is_stuck: bool,
@@ -40,18 +41,18 @@ impl Record {
 }
 
 impl SensorFaults {
-    /// ln of how often (1/s) a contact closes by itself, by what it did of late.
+    /// ln of the recent rate (1/s) of spurious detections of a sensor.
     pub(super) fn log_rate(&self, sensor: SensorId, now: Timestamp) -> f64 {
         let strange = self.records.get(&sensor).map_or(0.0, |record| record.unexplained_at(now));
         libm::log(SPURIOUS_RATE + strange / FORGETTING_TIME.as_s())
     }
 
-    /// Whether it is not believed.
+    /// Whether its reports are ignored.
     pub(super) fn is_stuck(&self, sensor: SensorId) -> bool {
         self.records.get(&sensor).is_some_and(|record| record.is_stuck)
     }
 
-    /// It closed where no train can have been. Returns whether it counts as stuck from now on.
+    /// Records an unexplained detection. Returns whether the sensor counts as stuck from now on.
     pub(super) fn note_unexplained(&mut self, sensor: SensorId, now: Timestamp) -> bool {
         let record =
             self.records.entry(sensor).or_insert(Record { unexplained: 0.0, at: now, is_stuck: false });
@@ -62,7 +63,7 @@ impl SensorFaults {
         record.is_stuck && !was_stuck
     }
 
-    /// It closed when a train came by, as it should.
+    /// Records a detection that a train caused.
     pub(super) fn note_explained(&mut self, sensor: SensorId, now: Timestamp) {
         if let Some(record) = self.records.get_mut(&sensor) {
             record.unexplained = record.unexplained_at(now) * EXPLAINED_FACTOR;
@@ -70,7 +71,7 @@ impl SensorFaults {
         }
     }
 
-    /// A contact that was stuck and has behaved since; it is believed from now on. Until `None`.
+    /// A stuck sensor that is used again from now on; call until `None`.
     pub(super) fn next_restored(&mut self, now: Timestamp) -> Option<SensorId> {
         let restored = |record: &Record| record.is_stuck && record.unexplained_at(now) < RESTORED_BELOW;
         let (sensor, record) = self.records.iter_mut().find(|(_, record)| restored(record))?;

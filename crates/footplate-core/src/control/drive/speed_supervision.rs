@@ -1,9 +1,10 @@
-//! What keeps a train to speed restrictions, whatever it was told and by whom.
+//! Speed supervision: keeps trains below the speed limits of zones, whatever was ordered.
 //!
-//! A train is told the step that is asked for, or the fastest below it that the zones about it allow: within a zone those of
-//! which its speed is believed to be within the limit but for a stated share of cases, ahead of one those from which it can
-//! still be slowed down before its front comes there. Whatever is reported, it is told the slower step by the clock, at the
-//! last moment at which that is sure. When its rear end has certainly left, it is told what was asked for.
+//! A train is commanded the ordered step, or the fastest lower step that the zones around it permit. Within a zone, a
+//! permitted step keeps the speed below the limit with a stated probability. Ahead of a zone, a permitted step leaves
+//! time to slow down before the front of the train enters. The slower step is commanded by the clock, at the last
+//! safe time, even if no sensor reports. The ordered step is commanded again when the rear of the train has certainly
+//! left the zone.
 //!
 //! ```text
 //! x(t) + k σ_x + front = zone   ⇒   v(t) + k σ_v ≤ limit          until   x(t) − k σ_x − rear ≥ end of the zone
@@ -26,50 +27,50 @@ use super::restricted_stretch::RestrictedStretch;
 use super::task::{Destination, Goal, Phase};
 use crate::control::Notice;
 
-/// How often a train may come to a zone nearer than is believed, and how often it may be faster there: in one case of a
-/// hundred each. A restriction is no end of the track, where ten times as much is asked.
+/// Probability of entering a zone earlier than assumed, and of being faster in it, each. The probabilities for the
+/// end of the track are ten times lower.
 const OVERSPEED_PROBABILITY: Ratio = Ratio::from_percent(1.0);
-/// A step that was asked for is followed by a slower one no sooner than this: the next look, and a poll.
+/// Shortest time between an ordered step and a slower one: the next check, and a poll.
 const MIN_STEP_TIME: TimeSpan = TimeSpan::from_ms(300);
-/// A train that has left a zone gets faster when it need not slow down again for so long: about what it takes to be faster
-/// at all.
+/// A train behind a zone accelerates only if it need not slow down again for this long: about the time that it needs
+/// to become faster at all.
 const MIN_FASTER_TIME: TimeSpan = TimeSpan::from_ms(2_000);
-/// Within a zone a train gets faster only where this part of the limit is left: no train is told up and down for a
+/// A train within a zone accelerates only if this part of the limit remains: the step does not toggle for a
 /// thousandth.
 const LIMIT_MARGIN: f64 = 0.03;
-/// Where not even the slowest step is within the limit, the train has slowed down for it once its speed is within this
-/// part of that step's.
+/// Where even the slowest step exceeds the limit, the train has slowed down once its speed is within this part of
+/// that step's.
 const SETTLED: f64 = 0.03;
-/// What is restricted is looked at again after this, whatever is reported.
+/// The zones are checked again after this time without a report.
 const RECHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(1_000);
-/// Looks are no nearer to each other: a train of 400 mm/s runs 8 mm.
+/// Shortest time between two checks: 8 mm at 400 mm/s.
 const MIN_CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(20);
-/// Halvings of a few seconds that leave less than a look takes.
+/// Enough to halve a few seconds down to a check interval.
 const HALVINGS: usize = 8;
 
-/// From where a train is judged: when a command can leave, how far it reaches and how it moves.
+/// What one check uses: the time of the next command, the extent of the train, and its reachable set.
 struct Lookahead<'t> {
     train: &'t DrivenTrain,
     here: ReachableSet,
     now: Timestamp,
     usable: Vec<SpeedStep>,
     k: f64,
-    /// Whether it is still faster than the step commanded last will have it, ...
+    /// Whether it is still faster than the last commanded step, ...
     is_slowing: bool,
-    /// ... or slower, or one of the two.
+    /// ... or in any transition between speeds.
     is_changing: bool,
-    /// Where its front may be and where its rear may still be (m past the contact).
+    /// Extreme positions of its front and rear (m past the sensor).
     ends: [f64; 2],
 }
 
-/// A restricted way, and the fastest step that keeps to it.
+/// A restricted stretch, and the fastest step that keeps its limit.
 struct Restriction<'g> {
     stretch: RestrictedStretch<'g>,
     step: SpeedStep,
 }
 
 impl Driver {
-    /// Looks at the zones about the trains for which that is due.
+    /// Checks the zones around the trains whose check is due.
     pub(super) fn supervise_speed(&mut self, now: Timestamp) {
         let context = self.track.context();
         if context.layout.zones().is_empty() {
@@ -84,22 +85,22 @@ impl Driver {
 }
 
 impl DrivenTrain {
-    /// When the zones about it are looked at next.
+    /// When the zones around it are checked next.
     pub(super) fn next_zone_check(&self) -> Option<Timestamp> {
         self.speed_supervision.next_check.filter(|_| self.commanded > SpeedStep::STAND)
     }
 
-    /// Something is known anew, or the train was told something. Where nothing is restricted nobody looks.
+    /// Schedules a check now, after a report or command; none if the layout has no zones.
     pub(super) fn schedule_zone_check(&mut self, context: TrackContext<'_>, now: Timestamp) {
         self.speed_supervision.next_check = (!context.layout.zones().is_empty()).then_some(now);
     }
 
-    /// Whether it has been told a slower step than it was asked to run at.
+    /// Whether a slower step than the ordered one is commanded.
     pub(super) const fn is_speed_limited(&self) -> bool {
         self.speed_supervision.wanted.is_some()
     }
 
-    /// The fastest step of those that move it, if zones leave less than all of them.
+    /// The fastest permitted step, if zones permit fewer than all.
     pub(super) fn fastest_allowed(&self, context: TrackContext<'_>, now: Timestamp) -> Option<SpeedStep> {
         if context.layout.zones().is_empty() {
             return None;
@@ -108,7 +109,7 @@ impl DrivenTrain {
         zone.map(|_| fastest)
     }
 
-    /// What is restricted on the way to a place, each with the fastest step that keeps to it.
+    /// The restrictions on the path to a point, each with the fastest step that keeps its limit.
     pub(super) fn restricted_until<'g>(
         &self,
         context: TrackContext<'g>,
@@ -128,7 +129,7 @@ impl DrivenTrain {
             .collect()
     }
 
-    /// The step to be told if one is asked for, which is kept in mind. Says so if zones leave less.
+    /// Stores an ordered step and returns the one to command. Reports a zone that limits it.
     pub(super) fn supervised_step(
         &mut self,
         context: TrackContext<'_>,
@@ -157,7 +158,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The fastest step up to one that may be commanded now, and the zone that leaves no more.
+    /// The fastest step, up to a given one, that may be commanded now, and the zone that limits it.
     fn permitted_step<'g>(
         &self,
         context: TrackContext<'g>,
@@ -166,8 +167,8 @@ impl DrivenTrain {
     ) -> (SpeedStep, Option<&'g Zone>) {
         let lookahead = Lookahead::of(self, now);
         let restrictions = lookahead.restrictions(context, step);
-        // Who slows down for a zone is commanded nothing faster until it has: what came of a change and its opposite within a moment
-        // nobody could say.
+        // A train that is slowing for a zone gets no faster step until it has settled: two opposite changes in a row
+        // cannot be predicted.
         if lookahead.is_slowing
             && step > self.commanded
             && self.commanded > SpeedStep::STAND
@@ -187,7 +188,7 @@ impl DrivenTrain {
         (lookahead.fastest_below(&restrictions, step, MIN_STEP_TIME), Some(zone))
     }
 
-    /// Slows down for what is ahead, and gets faster where nothing restricts it any more.
+    /// Slows down for zones ahead, and accelerates to the ordered step behind them.
     fn supervise_speed(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         let commanded = self.commanded;
         let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > commanded);
@@ -215,7 +216,7 @@ impl DrivenTrain {
             next.chain(Some(now + RECHECK_INTERVAL)).min().unwrap_or(now).max(now + MIN_CHECK_INTERVAL);
         self.speed_supervision.next_check = Some(next);
         if let Some((step, zone)) = slower {
-            // Who is paced is told what it should do at every look.
+            // Pacing chooses the step again at every update.
             if self.is_paced_by_itself() {
                 self.speed_supervision.wanted = None;
             } else {
@@ -235,7 +236,8 @@ impl DrivenTrain {
         }
     }
 
-    /// Whether a train should get faster that is under way to a place: only if it can stop from the faster step as surely.
+    /// Whether a train on its way to a target may accelerate: only if it can still settle and stop as precisely from
+    /// the faster step.
     fn can_settle_at(&self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep) -> bool {
         let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };
         let is_running = matches!(self.task.map(|task| task.phase), Some(Phase::Running { .. }));
@@ -256,13 +258,13 @@ impl<'t> Lookahead<'t> {
         Self { train, here, now, usable: train.usable_steps(), k, is_slowing, is_changing, ends }
     }
 
-    /// When a command can leave at the latest.
+    /// The latest time at which the next command is sent.
     fn start(&self) -> Timestamp {
         self.now + self.train.link.soonest
     }
 
-    /// The zones that matter for a train that runs at a step or faster; for one of which nobody knows where it is, the
-    /// slowest of all, wherever it goes.
+    /// The zones that matter for a train at a step or faster. If its position is unknown: the slowest zone,
+    /// everywhere.
     fn restrictions<'g>(&self, context: TrackContext<'g>, step: SpeedStep) -> Vec<Restriction<'g>> {
         let restriction = |stretch: RestrictedStretch<'g>| Restriction {
             stretch,
@@ -292,7 +294,7 @@ impl<'t> Lookahead<'t> {
             .collect()
     }
 
-    /// The fastest step within a limit, of which the slowest that moves it is taken to be.
+    /// The fastest step within a limit; the slowest usable step always counts as within.
     fn within(&self, limit: f64) -> SpeedStep {
         let keeps = |step: &SpeedStep| {
             let mut commanded = self.here;
@@ -304,8 +306,8 @@ impl<'t> Lookahead<'t> {
         self.usable.get(within - 1).copied().unwrap_or(SpeedStep::STAND)
     }
 
-    /// By which factor it is faster at a step than if it came to it from below: a train that is told another step while
-    /// it still changes to the last one may come to it from above.
+    /// The ratio of a step's speed reached from above to that reached from below: during a transition, a new step may
+    /// be reached from above.
     fn gain_from_above(&self, step: SpeedStep) -> f64 {
         if !self.is_changing || step <= self.train.commanded {
             return 1.0;
@@ -315,12 +317,12 @@ impl<'t> Lookahead<'t> {
         if below > Speed::ZERO { (above / below).max(1.0) } else { 1.0 }
     }
 
-    /// Whether it may be on a way already.
+    /// Whether its front may be on a stretch.
     fn may_be_on(&self, stretch: &RestrictedStretch<'_>) -> bool {
         stretch.from <= self.ends[0]
     }
 
-    /// The first zone that a step would be too fast for, if it is commanded now and a slower one so long after.
+    /// The first zone whose limit a step would exceed, if it is commanded now and a slower one after `lasting`.
     fn too_fast_for<'g>(
         &self,
         restrictions: &[Restriction<'g>],
@@ -340,7 +342,7 @@ impl<'t> Lookahead<'t> {
         restrictions.iter().find(is_too_fast).map(|restriction| restriction.stretch.zone)
     }
 
-    /// Whether a step leaves something of the limit of every zone that it may be in.
+    /// Whether a step leaves a margin below the limit of every zone that the train may be in.
     fn leaves_margin(&self, restrictions: &[Restriction<'_>], step: SpeedStep) -> bool {
         let mut on = restrictions.iter().filter(|restriction| self.may_be_on(&restriction.stretch));
         on.all(|restriction| {
@@ -348,7 +350,7 @@ impl<'t> Lookahead<'t> {
         })
     }
 
-    /// Whether a train is within the limit when it comes to a zone ahead if it is told the slower step at a time.
+    /// Whether the train enters a zone within its limit if the slower step is commanded at a time.
     fn can_slow_for(
         &self,
         mut commanded: ReachableSet,
@@ -364,13 +366,13 @@ impl<'t> Lookahead<'t> {
         enters.is_none_or(|enters| commanded.fastest_from(model, enters, self.k) <= limit)
     }
 
-    /// Where it is when its front comes to a way.
+    /// Where the pickup is (m) when the front reaches a stretch.
     fn entry(&self, stretch: &RestrictedStretch<'_>) -> f64 {
         stretch.from - self.train.reach[0].as_m()
     }
 
-    /// The fastest step below one that may be commanded now if a slower one follows so long after; the slowest that moves it where
-    /// none may.
+    /// The fastest step below a given one that may be commanded now if a slower one follows after `lasting`;
+    /// otherwise the slowest usable one.
     fn fastest_below(
         &self,
         restrictions: &[Restriction<'_>],
@@ -385,7 +387,7 @@ impl<'t> Lookahead<'t> {
         below.get(may - 1).copied().unwrap_or(step)
     }
 
-    /// When a slower step has to leave at the latest, and for which zone; at once for a zone that it may be in.
+    /// The latest time for a slower step, and the zone that requires it; now for a zone that the train may be in.
     fn slow_down_by<'g>(
         &self,
         restrictions: &[Restriction<'g>],
@@ -414,7 +416,7 @@ impl<'t> Lookahead<'t> {
         restrictions.iter().filter_map(by).min_by_key(|(at, _)| *at)
     }
 
-    /// When its rear end will have left the first of the zones that it may be in.
+    /// When the rear will have left the first of the zones that the train may be in.
     fn leaves_zone_at(&self, restrictions: &[Restriction<'_>]) -> Option<Timestamp> {
         let model = &self.train.model;
         let after = self.here.after_all(model);

@@ -1,4 +1,4 @@
-//! Stops at a place: whether one can be made, from which step, and when the command has to leave.
+//! Plans stops at a place: whether the train can stop there, from which step, and when to send the command.
 
 use alloc::string::{String, ToString};
 
@@ -17,15 +17,15 @@ use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Plan, Task};
 use crate::control::{Notice, PlannedStop, Promise};
 
-/// A plan that moved by less is no news.
+/// Smallest change of a plan that is reported.
 const REPORTABLE_CHANGE: TimeSpan = TimeSpan::from_ms(1);
-/// An overshoot that is less than any stop scatters is no news either.
+/// Smallest overshoot that is reported: less than the spread of any stop.
 const REPORTABLE_OVERSHOOT: Length = Length::from_mm(5.0);
-/// A train that stands this near to where it should is there.
+/// A train at rest this close to its target has arrived.
 pub(in crate::control) const AT_TARGET: Length = Length::from_mm(1.0);
 
 impl DrivenTrain {
-    /// Takes an order to stop somewhere.
+    /// Starts an order to stop at a place.
     pub(super) fn stop_at(
         &mut self,
         context: TrackContext<'_>,
@@ -47,7 +47,7 @@ impl DrivenTrain {
         if !at_rest && self.commanded == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        // Who was not seen where it should have been is looked for first.
+        // A train that a sensor should have reported and did not is located first.
         let located = self.located(context, now).filter(|_| self.missed_sensor().is_none() || !at_rest);
         let Some(located) = located else {
             self.start_task(
@@ -64,7 +64,7 @@ impl DrivenTrain {
         self.start_towards(context, now, order, &located, destination, at_rest, out)
     }
 
-    /// A train that was looked for is located again: goes on to where it should. What is too near is passed once more.
+    /// Continues to the target once the train has been located. A target that is too near is passed once first.
     pub(super) fn resume_to_target(
         &mut self,
         context: TrackContext<'_>,
@@ -91,7 +91,7 @@ impl DrivenTrain {
         }
     }
 
-    /// Takes an order to move on.
+    /// Starts an order to move ahead.
     pub(super) fn start_move(
         &mut self,
         context: TrackContext<'_>,
@@ -100,7 +100,8 @@ impl DrivenTrain {
         distance: Length,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        // Who was not seen where it should have been is not where it is believed to be: no contact would fit the move.
+        // A train that a sensor should have reported and did not is not where it is estimated: no later detection
+        // would fit the move.
         let located = self.located(context, now).filter(|_| self.missed_sensor().is_none());
         let located = located.ok_or(Refusal::Lost { train: self.id() })?;
         if !self.is_at_rest(context, now) {
@@ -152,7 +153,7 @@ impl DrivenTrain {
         Ok(())
     }
 
-    /// The target on the way of a train, the first time it comes there and can rest there.
+    /// The target as a point of the path: the first passage at which the train can stop there.
     pub(super) fn locate_target(
         &self,
         context: TrackContext<'_>,
@@ -223,7 +224,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The target counted from a contact that the way as it was known did not lead to.
+    /// The target measured from a node that the earlier path did not lead to.
     pub(super) fn target_from(
         &self,
         context: TrackContext<'_>,
@@ -233,8 +234,8 @@ impl DrivenTrain {
         Some(WayPoint { node, way: way_to_landmark(context, &self.model, node, destination.named?)? })
     }
 
-    /// A target that has a name, found again from the node that it is counted from: lengths are learnt on the way, and
-    /// turnouts thrown. As many rounds from now as before; `None` if no way leads there any more.
+    /// A named target, measured again from the same node: path lengths are learnt and turnouts thrown on the run.
+    /// Keeps the number of laps; `None` if no path leads there any more.
     fn relocate_named_target(
         &self,
         context: TrackContext<'_>,
@@ -247,8 +248,7 @@ impl DrivenTrain {
         Some(WayPoint { way: again.way + round * rounds, ..at })
     }
 
-    /// The target counted from a contact that the train came to since, as its way is known now; `None` if no way leads
-    /// there any more.
+    /// The target measured from a sensor that the train has passed since; `None` if no path leads there any more.
     pub(super) fn recount_target(
         &self,
         context: TrackContext<'_>,
@@ -266,7 +266,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The turnouts lie otherwise: is the target still where it was?
+    /// Measures the target again after a turnout was thrown.
     pub(super) fn turnouts_changed(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         self.expect_next(context, now);
         let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { .. }, .. }) = self.task
@@ -285,7 +285,7 @@ impl DrivenTrain {
         self.plan(context, now, out);
     }
 
-    /// Plans the stop anew with what is known now. A stop for which it is too late is made at once.
+    /// Plans the stop again. If it is too late, the train stops at once.
     pub(super) fn plan(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         let Some(task) = self.task.filter(|_| self.is_all_sent()) else { return };
         let (Goal::RestAt(Destination { at: Some(at), aim, .. }), Phase::Running { plan: before }) =
@@ -316,7 +316,7 @@ impl DrivenTrain {
                 }
                 self.stop_now(now, task, self.promise(context, &rest, at), out);
             }
-            // What was planned before is kept by the clock.
+            // The clock carries out the earlier plan.
             CommandTime::Never if before.is_some() => {}
             CommandTime::Never => {
                 let target = match task.goal {
@@ -346,7 +346,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The last two contacts whose reports come in time to move a command that leaves then.
+    /// The last two sensors whose reports can still change a command sent at a time, the later one first.
     fn triggers(
         &self,
         context: TrackContext<'_>,
@@ -366,14 +366,14 @@ impl DrivenTrain {
         triggers
     }
 
-    /// Where a rest lies against the target.
+    /// The rest relative to the target, with its 95 % interval.
     pub(super) fn promise(&self, context: TrackContext<'_>, rest: &Rest, at: WayPoint) -> Option<Promise> {
         let median = self.beyond(context, rest.at, at)?;
         let half = spread(rest) * HALF_95;
         Some(Promise { median, low: median - half, high: median + half })
     }
 
-    /// How far beyond the target the part of a rest lies that is aimed with.
+    /// How far the aimed quantile of a rest lies beyond the target.
     pub(super) fn aimed_beyond(
         &self,
         context: TrackContext<'_>,
@@ -384,7 +384,7 @@ impl DrivenTrain {
         Some(self.beyond(context, rest.at, at)? + spread(rest) * aim.margin())
     }
 
-    /// How far one point of the way lies beyond another.
+    /// How far one point of the path lies beyond another.
     pub(super) fn beyond(
         &self,
         context: TrackContext<'_>,
@@ -399,7 +399,7 @@ impl DrivenTrain {
     }
 }
 
-/// What people call a target.
+/// The name of a target, as operators know it.
 pub(super) fn name(context: TrackContext<'_>, destination: &Destination) -> String {
     destination
         .named

@@ -1,19 +1,19 @@
-//! Where a train is once it has reversed_location around: its shoe's other end leads.
+//! The position of a train after it has reversed: the other end of its pickup leads.
 
 use crate::model::MotionModel;
 use crate::track::Position;
 use crate::tracking::{Located, TrackContext, WayPoint, place_of, way_to};
 use crate::units::Length;
 
-/// The length of a pickup shoe along the track, which nobody has measured for this train. Shoes for three-rail track
-/// are sold in lengths of 30 to 50 mm, and trains of the course were reported 20 to 90 mm apart by direction.
+/// Length of a pickup shoe along the track where it was not measured. Shoes for three-rail track are sold in lengths
+/// of 30 to 50 mm; detections of the course's trains differ by 20 to 90 mm between directions.
 const SHOE_LENGTH: Length = Length::from_mm(35.0);
 /// One standard deviation of that.
 const SHOE_DEVIATION: Length = Length::from_mm(12.0);
 
-/// The place of a train at rest after it reversed_location around on the spot, and one standard deviation of it. Counted from the
-/// node behind it, whatever is there: how turnouts further away lie makes no difference then. `None` where the way back
-/// is not known, or does not lead to where the train stands.
+/// The position of a train at rest after reversing, and one standard deviation. It is measured from the node behind
+/// the train: turnouts further away no longer affect it. `None` where the path back is unknown or does not lead to
+/// the train.
 pub(super) fn reversed_location(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -26,7 +26,7 @@ pub(super) fn reversed_location(
     Some((WayPoint { node: behind, way }, uncertainty))
 }
 
-/// Where the leading end of the pickup is once a train at rest has reversed_location around.
+/// Where the leading end of the pickup is once a train at rest has reversed.
 pub(super) fn reversed_position(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -35,8 +35,8 @@ pub(super) fn reversed_position(
     context.layout.reversed(trailing_position(context, model, at)?)
 }
 
-/// Where the trailing end of the pickup is, facing as its leading end does: back along the way that the train came, over
-/// points that may lie for another leg by now, or lay for it all the time and gave way.
+/// Where the trailing end of the pickup is, facing as the leading end does. Found along the path on which the train
+/// came: a trailing turnout on it may be set for the other leg by now, or may have been run through.
 pub(super) fn trailing_position(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -48,7 +48,7 @@ pub(super) fn trailing_position(
     context.layout.reversed(reversed_on_current_path(context, place_of(context, model, at)?)?)
 }
 
-/// The same for a train that would stand at a place, wherever it came from.
+/// The same for a train at rest at a position, whatever path it came on.
 pub(super) fn reversed_on_current_path(context: TrackContext<'_>, place: Position) -> Option<Position> {
     context.layout.advance(context.layout.reversed(place)?, SHOE_LENGTH, context.turnouts).ok()
 }

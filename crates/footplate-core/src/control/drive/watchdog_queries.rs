@@ -1,4 +1,4 @@
-//! What somebody who watches over a driver asks of it.
+//! Queries and corrections that the watchdog makes on a driver.
 
 use crate::ids::{NodeId, SensorId, TrainId};
 use crate::model::MotionFit;
@@ -9,7 +9,7 @@ use crate::units::Length;
 use super::driver::Driver;
 
 impl Driver {
-    /// What is believed of where a train is was wrong: from now on nobody knows.
+    /// Gives up the position of a train that was found to be wrong.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.association.forget(train);
         let context = self.track.context();
@@ -22,12 +22,12 @@ impl Driver {
         self.update_line_requests(now);
     }
 
-    /// What the trains move on.
+    /// The layout, turnouts and lengths as estimators use them.
     pub(crate) const fn context(&self) -> TrackContext<'_> {
         self.track.context()
     }
 
-    /// The contact that a train comes to next if it goes on, as the turnouts lie, whether it moves or not.
+    /// The next sensor ahead of a train, with the turnouts as they are, whether or not the train moves.
     #[must_use]
     pub fn contact_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let located = self.locate(train, now)?;
@@ -44,7 +44,7 @@ impl Driver {
         None
     }
 
-    /// The way from one node to the contact that is next behind it, as a train feels it; `None` if the other one is not.
+    /// The path length of a train from one node to the next sensor's node; `None` if `to` is not that node.
     #[must_use]
     pub fn felt_hop(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
         let context = self.track.context();
@@ -52,13 +52,13 @@ impl Driver {
         Some(self.model(train)?.length(context.sections, &hop)[0])
     }
 
-    /// The node of the contact that a train passed.
+    /// The node of the sensor that a train passed.
     #[must_use]
     pub fn node_passed(&self, passed: &PassedContact) -> Option<NodeId> {
         self.track.layout.sensor_node(passed.sensor)
     }
 
-    /// Fits a train's motion anew; see [`MotionFit::refit`].
+    /// Repeats the fit of a train's motion; see [`MotionFit::refit`].
     pub(crate) fn refit(&self, fit: &mut MotionFit) {
         fit.refit(&self.track.sections);
     }
