@@ -11,7 +11,7 @@ use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::DrivenTrain;
-use super::path_length::sensors_within;
+use super::path::sensors_within;
 use super::refusal::Refusal;
 use super::task::Destination;
 
@@ -157,7 +157,7 @@ impl DrivenTrain {
         let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
         let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
         at.node == located.at.node
-            && sensors_within(context, &self.model, at.node, last).any(|(_, way)| way > settled)
+            && sensors_within(context, &self.model, at.node, last).any(|(_, distance)| distance > settled)
     }
 
     pub(super) fn short_run(

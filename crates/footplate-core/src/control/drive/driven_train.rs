@@ -13,10 +13,9 @@ use crate::units::Length;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
-use super::path_length::sensors_within;
+use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
-use super::turning::reversed_location;
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
@@ -257,7 +256,7 @@ impl DrivenTrain {
                     self.commanded = step;
                 }
                 self.expect_after_command(context, now);
-                self.paced_step_left(event.time);
+                self.pacing_step_sent(event.time);
                 self.step_left(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
@@ -337,7 +336,7 @@ impl DrivenTrain {
         self.recount_end_of_authority(context, node);
         self.expect_next(context, now);
         out.notify(Notice::Passed { train: self.id(), passed, next: self.expected.due });
-        self.paced_passed(context, now, node, out);
+        self.pacing_passed(context, now, node, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
@@ -374,8 +373,12 @@ impl DrivenTrain {
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
-        let looks = [self.next_pacing_update(), self.next_zone_check()];
-        [phase, unsent, self.next_overdue(), self.latest_safe_stop()].into_iter().chain(looks).flatten().min()
+        let checks = [self.next_pacing_update(), self.next_zone_check()];
+        [phase, unsent, self.next_overdue(), self.latest_safe_stop()]
+            .into_iter()
+            .chain(checks)
+            .flatten()
+            .min()
     }
 
     pub(super) fn handle_timeout(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {

@@ -3,11 +3,10 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use crate::control::{Machine, Output};
+use crate::control::{Machine, Notice, Output};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
-use crate::link::ContactWindow;
-use crate::link::TimeModel;
+use crate::link::{ContactWindow, TimeModel};
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
@@ -18,13 +17,12 @@ use super::ambiguity::Branch;
 use super::data_association::{Association, DataAssociation, Resolution};
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Detection, Explanation};
-use super::known_track::KnownTrack;
 use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
+use super::path::KnownTrack;
 use super::refusal::Refusal;
 use super::task::Phase;
 use super::turnout_guard::train_on;
-use crate::control::Notice;
 
 /// A sensor that reports again within this time was occupied all along: wheels bounce, and no second train follows so
 /// soon.
@@ -400,7 +398,7 @@ impl Driver {
         let hold = next.map(|plan| plan.leaves - self.link.command).into_iter().chain(guard).min();
         // Called even if the plans have a sensor: it also sets when the watched sensor changes next. A stale time
         // would never let the driver sleep.
-        let paced = self.due_of_paced(now);
+        let paced = self.next_paced_sensor(now);
         let watched = watched.or(paced);
         self.outputs.hold_line(hold);
         self.outputs.watch(watched);

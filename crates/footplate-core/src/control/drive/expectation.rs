@@ -1,15 +1,16 @@
-//! The next detection of a running train, and what follows if it does not come.
+//! The next detection of a running train and the end of its authority, and what follows if the detection does not come.
 
-use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
 use super::driven_train::{DrivenTrain, Expectation};
+use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
-use super::path_length::track_end;
+use super::path::{recount_from, track_end};
 use super::refusal::Refusal;
 use super::task::Phase;
 use crate::control::Notice;
@@ -33,6 +34,26 @@ const BEFORE_END: Length = Length::from_mm(200.0);
 /// The probability that a train stopped before the end of the track, or its end of authority, comes closer than
 /// intended.
 const NEARER: Ratio = Ratio::from_percent(0.1);
+
+impl Driver {
+    /// Sets the end of a train's movement authority. Whatever is ordered or reported, the driver commands a stop in
+    /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
+    /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
+    /// set. `None` removes the limit.
+    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
+        let context = self.track.context();
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.set_end_of_authority(context, now, end);
+        }
+        self.update_line_requests(now);
+    }
+
+    /// The end of a train's movement authority.
+    #[must_use]
+    pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
+        self.trains.get(&train)?.end_of_authority
+    }
+}
 
 impl DrivenTrain {
     /// A sensor that should have reported it: it may not have got there.
@@ -127,8 +148,8 @@ impl DrivenTrain {
         match self.expected.due {
             Some(due) if !self.expected.overdue_reported && !is_over => {
                 out.notify(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
-                let way = due.time - self.expected.since;
-                self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
+                let travel = due.time - self.expected.since;
+                self.expected.lost_by.get_or_insert(now + LOST.max(travel + travel));
                 self.expected.missed_sensor.get_or_insert(due.sensor);
                 self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
                 if self.expected.missed_in_a_row >= LOST_AFTER_MISSED {
@@ -226,6 +247,33 @@ impl DrivenTrain {
             CommandTime::At(leaves, _) => Some(leaves),
             CommandTime::TooLate(..) => Some(earliest),
             CommandTime::Never => None,
+        }
+    }
+
+    /// Sets the end of authority, or removes it.
+    pub(super) fn set_end_of_authority(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        end: Option<WayPoint>,
+    ) {
+        self.end_of_authority = end;
+        self.update_authority_stop(context, now);
+    }
+
+    /// Ends the authority where the train is: it was placed or reversed, and the authority no longer applies.
+    pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        if self.end_of_authority.is_some() {
+            self.end_of_authority = self.located(context, now).map(|located| located.at);
+        }
+    }
+
+    /// Measures the end of authority from a sensor that the train has passed. If no path leads there from this
+    /// sensor, the train has left its route, and its authority ends here.
+    pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
+        if let Some(end) = self.end_of_authority {
+            let counted = recount_from(context, &self.model, end, node);
+            self.end_of_authority = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
         }
     }
 }

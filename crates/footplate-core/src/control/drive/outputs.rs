@@ -2,18 +2,16 @@
 
 use alloc::collections::VecDeque;
 
-use crate::control::Output;
+use crate::control::{Notice, Output};
 use crate::event::Command;
 use crate::ids::SensorId;
 use crate::time::Timestamp;
-
-use crate::control::Notice;
 
 /// A queue of outputs. Requests to the line are queued only when they change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outputs {
     queue: VecDeque<Output<Notice>>,
-    held: Option<Timestamp>,
+    line_free_by: Option<Timestamp>,
     watched: Option<SensorId>,
 }
 
@@ -27,8 +25,8 @@ impl Outputs {
     }
 
     pub(super) fn hold_line(&mut self, until: Option<Timestamp>) {
-        if self.held != until {
-            self.held = until;
+        if self.line_free_by != until {
+            self.line_free_by = until;
             self.queue.push_back(Output::HoldLine(until));
         }
     }

@@ -23,7 +23,7 @@ use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
-use super::restricted_stretch::RestrictedStretch;
+use super::path::RestrictedStretch;
 use super::task::{Destination, Goal, Phase};
 use crate::control::Notice;
 
@@ -217,7 +217,7 @@ impl DrivenTrain {
         self.speed_supervision.next_check = Some(next);
         if let Some((step, zone)) = slower {
             // Pacing chooses the step again at every update.
-            if self.is_paced_by_itself() {
+            if self.chooses_steps_itself() {
                 self.speed_supervision.wanted = None;
             } else {
                 self.speed_supervision.wanted.get_or_insert(commanded);
@@ -236,7 +236,7 @@ impl DrivenTrain {
         }
     }
 
-    /// Whether a train on its way to a target may accelerate: only if it can still settle and stop as precisely from
+    /// Whether a train that runs to a target may accelerate: only if it can still settle and stop as precisely from
     /// the faster step.
     fn can_settle_at(&self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep) -> bool {
         let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };

@@ -12,7 +12,7 @@ use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::DrivenTrain;
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
-use super::path_length::{circuit_length, distance_between, recount_from, sensors_within, unknown_turnout};
+use super::path::{circuit_length, distance_between, recount_from, sensors_within, unknown_turnout};
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Plan, Task};
 use crate::control::{Notice, PlannedStop, Promise};
@@ -243,9 +243,9 @@ impl DrivenTrain {
         destination: &Destination,
     ) -> Option<WayPoint> {
         let again = self.target_from(context, at.node, destination)?;
-        let Some(round) = circuit_length(context, &self.model, at.node) else { return Some(again) };
-        let rounds = libm::round((at.way - again.way) / round).max(0.0);
-        Some(WayPoint { way: again.way + round * rounds, ..at })
+        let Some(lap) = circuit_length(context, &self.model, at.node) else { return Some(again) };
+        let laps = libm::round((at.way - again.way) / lap).max(0.0);
+        Some(WayPoint { way: again.way + lap * laps, ..at })
     }
 
     /// The target measured from a sensor that the train has passed since; `None` if no path leads there any more.
@@ -358,8 +358,8 @@ impl DrivenTrain {
         };
         let last = there.at.way - there.speed * self.link.reaction;
         let mut triggers = [None; 2];
-        for (sensor, way) in sensors_within(context, &self.model, here.at.node, last) {
-            if way > here.at.way {
+        for (sensor, distance) in sensors_within(context, &self.model, here.at.node, last) {
+            if distance > here.at.way {
                 triggers = [Some(sensor), triggers[0]];
             }
         }

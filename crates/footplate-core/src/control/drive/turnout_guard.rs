@@ -10,7 +10,7 @@ use crate::tracking::{TrackContext, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
-use super::path_length::nodes_of_turnout;
+use super::path::nodes_of_turnout;
 
 /// Bound on the error of a train's estimated position, in standard deviations: exceeded once in 15 000 times.
 const CERTAIN: f64 = 4.0;
@@ -69,17 +69,17 @@ fn nodes_within(context: TrackContext<'_>, from: Position, limit: Length, found:
     if from.offset <= AT_NODE {
         open.push((edge.from, Length::ZERO));
     }
-    while let Some((node, way)) = open.pop() {
-        let nearer = |(known, before): &(NodeId, Length)| *known == node && *before <= way;
-        if way > limit || found.iter().skip(begin).any(nearer) {
+    while let Some((node, distance)) = open.pop() {
+        let nearer = |(known, before): &(NodeId, Length)| *known == node && *before <= distance;
+        if distance > limit || found.iter().skip(begin).any(nearer) {
             continue;
         }
-        found.push((node, way));
+        found.push((node, distance));
         for id in context.layout.ways(node).edges() {
             if let Some(next) = context.layout.edge(id)
                 && context.layout.needs_of(id).all(|need| context.turnouts.allow(need))
             {
-                open.push((next.to, way + next.length));
+                open.push((next.to, distance + next.length));
             }
         }
     }

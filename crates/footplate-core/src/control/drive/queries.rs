@@ -1,39 +1,20 @@
-//! The end of a train's movement authority, and positions on its path for those who set it.
+//! Queries about trains and their paths, and the corrections that dispatcher and watchdog make.
 
 use alloc::collections::BTreeSet;
 
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
+use crate::model::MotionFit;
 use crate::time::Timestamp;
 use crate::track::Position;
-use crate::tracking::{Rest, TrackContext, WayPoint, place_of, way_to};
+use crate::tracking::{PassedContact, Rest, TrackContext, WayPoint, place_of, way_to};
 use crate::units::Length;
 
-use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::OrderId;
-use super::path_length::{circuit_length, recount_from};
-use super::turning::{reversed_on_current_path, reversed_position, trailing_position};
+use super::path::{circuit_length, reversed_on_current_path, reversed_position, trailing_position};
 use super::turnout_guard::turnouts_under;
 
 impl Driver {
-    /// Sets the end of a train's movement authority. Whatever is ordered or reported, the driver commands a stop in
-    /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
-    /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
-    /// set. `None` removes the limit.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
-        let context = self.track.context();
-        if let Some(train) = self.trains.get_mut(&train) {
-            train.set_end_of_authority(context, now, end);
-        }
-        self.update_line_requests(now);
-    }
-
-    /// The end of a train's movement authority.
-    #[must_use]
-    pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
-        self.trains.get(&train)?.end_of_authority
-    }
-
     /// An order number for a sequence of orders; no single order gets it.
     pub(in crate::control) const fn number(&mut self) -> OrderId {
         let id = OrderId(self.orders);
@@ -125,8 +106,8 @@ impl Driver {
         if found.way > from.way {
             return Some(found);
         }
-        let round = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
-        Some(WayPoint { way: found.way + round, ..found })
+        let lap = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
+        Some(WayPoint { way: found.way + lap, ..found })
     }
 
     /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
@@ -150,33 +131,58 @@ impl Driver {
         let way = way_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
         Some(WayPoint { node: from, way })
     }
-}
 
-impl DrivenTrain {
-    /// Sets the end of authority, or removes it.
-    pub(super) fn set_end_of_authority(
-        &mut self,
-        context: TrackContext<'_>,
-        now: Timestamp,
-        end: Option<WayPoint>,
-    ) {
-        self.end_of_authority = end;
-        self.update_authority_stop(context, now);
+    /// Gives up the position of a train that was found to be wrong.
+    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
+        self.association.forget(train);
+        let context = self.track.context();
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.locator.lose();
+            train.passages.forget();
+            train.clear_missed();
+            train.expect_next(context, now);
+        }
+        self.update_line_requests(now);
     }
 
-    /// Ends the authority where the train is: it was placed or reversed, and the authority no longer applies.
-    pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
-        if self.end_of_authority.is_some() {
-            self.end_of_authority = self.located(context, now).map(|located| located.at);
-        }
+    /// The layout, turnouts and lengths as estimators use them.
+    pub(crate) const fn context(&self) -> TrackContext<'_> {
+        self.track.context()
     }
 
-    /// Measures the end of authority from a sensor that the train has passed. If no path leads there from this
-    /// sensor, the train has left its route, and its authority ends here.
-    pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
-        if let Some(end) = self.end_of_authority {
-            let counted = recount_from(context, &self.model, end, node);
-            self.end_of_authority = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
+    /// The next sensor ahead of a train, with the turnouts as they are, whether or not the train moves.
+    #[must_use]
+    pub fn contact_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+        let located = self.locate(train, now)?;
+        let context = self.track.context();
+        let model = self.model(train)?;
+        let mut way = Length::ZERO;
+        let hops = context.hops_ahead(located.at.node).take(context.layout.nodes().len());
+        for hop in hops {
+            way += model.length(context.sections, &hop)[0];
+            if way > located.at.way {
+                return hop.sensor;
+            }
         }
+        None
+    }
+
+    /// The path length of a train from one node to the next sensor's node; `None` if `to` is not that node.
+    #[must_use]
+    pub fn felt_hop(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
+        let context = self.track.context();
+        let hop = context.hop_from(from).filter(|hop| hop.to == to)?;
+        Some(self.model(train)?.length(context.sections, &hop)[0])
+    }
+
+    /// The node of the sensor that a train passed.
+    #[must_use]
+    pub fn node_passed(&self, passed: &PassedContact) -> Option<NodeId> {
+        self.track.layout.sensor_node(passed.sensor)
+    }
+
+    /// Repeats the fit of a train's motion; see [`MotionFit::refit`].
+    pub(crate) fn refit(&self, fit: &mut MotionFit) {
+        fit.refit(&self.track.sections);
     }
 }
