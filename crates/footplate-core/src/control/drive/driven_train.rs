@@ -131,8 +131,8 @@ impl DrivenTrain {
     /// Whether it is estimated to be at rest. A train of unknown position counts as at rest once its stop command has
     /// been sent, unless a task waits for its standstill.
     pub(super) fn is_at_rest(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
-        let told_to = self.commanded == SpeedStep::STAND && self.unsent.is_none();
-        told_to
+        let is_stop_sent = self.commanded == SpeedStep::STAND && self.unsent.is_none();
+        is_stop_sent
             && self.located(context, now).map_or_else(
                 || self.task.is_none() || matches!(self.goal(), Some(Goal::Run)),
                 |located| located.at_rest,

@@ -91,13 +91,13 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_that_closes_again_and_again_is_stuck_until_it_has_behaved() {
+    fn a_sensor_with_repeated_unexplained_detections_is_stuck_for_a_while() {
         let mut faults = SensorFaults::default();
         assert!(!faults.note_unexplained(SENSOR, at(1.0)));
         assert!(!faults.note_unexplained(SENSOR, at(9.0)));
         assert!(faults.note_unexplained(SENSOR, at(20.0)), "the third within half a minute");
         assert!(faults.is_stuck(SENSOR));
-        assert!(!faults.note_unexplained(SENSOR, at(21.0)), "said once");
+        assert!(!faults.note_unexplained(SENSOR, at(21.0)), "reported once");
         assert_eq!(faults.next_restored(at(60.0)), None);
         assert_eq!(faults.next_restored(at(240.0)), Some(SENSOR));
         assert_eq!(faults.next_restored(at(240.0)), None);
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn closing_when_trains_come_by_makes_up_for_strange_closures() {
+    fn explained_detections_restore_a_stuck_sensor() {
         let mut faults = SensorFaults::default();
         let usual = faults.log_rate(SENSOR, at(0.0));
         for seconds in [1.0, 2.0, 3.0] {

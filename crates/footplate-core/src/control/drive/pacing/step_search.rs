@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_commands_in_a_row_have_to_last_for_two_seconds() {
+    fn three_commands_in_a_row_use_up_the_budget_of_two_seconds() {
         let mut budget = CommandBudget::UNUSED;
         assert!(budget.free() < 0.0);
         for sent in [10.0, 10.2] {

@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_too_short_to_get_faster_in_is_run_through_as_slowly() {
+    fn a_gap_too_short_to_accelerate_in_is_run_at_the_lower_limit() {
         let next = SlowPart { from: 3.3, to: 4.0, speed: 0.15 };
         let transit = transit(24.0, &[HALL, next]).expect("time enough");
         let between = transit.time_at(Length::from_m(3.1)).expect("on the distance");
