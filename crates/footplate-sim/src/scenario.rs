@@ -49,7 +49,7 @@ const SCENARIOS: [Scenario; 11] = [
     Scenario::new("gates", "already running past two light gates on a clock of their own", Kind::Gates),
     Scenario::new("warm-up", "half an hour at one step, from cold", Kind::WarmUp),
     Scenario::new("stalls", "low steps, at which some starts fail and dirt stops the train", Kind::Stalls),
-    Scenario::new("faults", "steady runs with missed, stuck and spurious contacts", Kind::Faults),
+    Scenario::new("faults", "steady runs with missed, stuck and spurious detections", Kind::Faults),
     Scenario::new(
         "driving",
         "ten minutes of speed changes, stops and starts at random reports",
