@@ -189,7 +189,7 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
@@ -367,7 +367,7 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
         // It may have been somebody else, or nobody.
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);
