@@ -169,7 +169,7 @@ impl Driver {
 
     /// The path length of a train from one node to the next sensor's node; `None` if `to` is not that node.
     #[must_use]
-    pub fn felt_hop(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
+    pub fn hop_length(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
         let context = self.track.context();
         let hop = context.hop_from(from).filter(|hop| hop.to == to)?;
         Some(self.model(train)?.length(context.sections, &hop)[0])
