@@ -217,7 +217,7 @@ fn power_is_switched_off_when_a_train_does_not_stop() {
     watched.go(FIRST, 0);
     watched.run(6.0);
     // It should be at rest, and the sensor ahead of it reports.
-    let ahead = watched.dog.driver().contact_ahead(FIRST, watched.world.now).expect("a sensor");
+    let ahead = watched.dog.driver().sensor_ahead(FIRST, watched.world.now).expect("a sensor");
     watched.world.close(ahead);
     watched.run(0.2);
     assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));

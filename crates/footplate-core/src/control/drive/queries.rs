@@ -152,7 +152,7 @@ impl Driver {
 
     /// The next sensor ahead of a train, with the turnouts as they are, whether or not the train moves.
     #[must_use]
-    pub fn contact_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+    pub fn sensor_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let located = self.locate(train, now)?;
         let context = self.track.context();
         let model = self.model(train)?;
