@@ -105,7 +105,7 @@ impl Dispatcher {
         }
         let mut held = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             held.add(layout, &train.held);
         }
         // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:

@@ -1,6 +1,6 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
-use crate::control::drive::THERE;
+use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -152,7 +152,7 @@ impl Dispatcher {
             let stop = run.way.place(run.stop)?;
             let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
             // The way may go round to a place at which it stands already.
-            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
@@ -189,7 +189,7 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
@@ -367,7 +367,7 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
         // It may have been somebody else, or nobody.
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);

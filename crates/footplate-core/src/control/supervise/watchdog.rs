@@ -349,7 +349,7 @@ impl Watchdog {
             Notice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_stand(*train, now)
-                        && self.driver.contact_ahead(*train, now) == Some(*sensor)
+                        && self.driver.sensor_ahead(*train, now) == Some(*sensor)
                 };
                 let stray = self.driver.trains().find(stray);
                 if let Some(train) = stray {

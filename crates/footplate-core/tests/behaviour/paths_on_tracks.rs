@@ -1,4 +1,4 @@
-//! On any track that can be laid, hops, routes and positions are what a plain search over its rails finds.
+//! On any track, hops, routes and positions are those of a plain search over its rails.
 #![expect(clippy::indexing_slicing, clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +11,7 @@ use proptest::collection::vec;
 use proptest::prelude::{Just, Strategy, any, prop_assert, prop_assert_eq, proptest};
 use proptest::sample::{Index, select};
 
-/// Lengths that add up without rounding, among them none at all.
+/// Lengths that add up without rounding, zero among them.
 const LENGTHS_MM: [f64; 6] = [0.0, 0.0, 64.0, 128.0, 512.0, 1024.0];
 
 /// A track with these many places, whose rail ends are joined in an arbitrary order.
@@ -80,7 +80,7 @@ fn rail_ends_of(place: &Place) -> Vec<RailEnd> {
     }
 }
 
-/// What leads where, from the plan alone: by node, the leg by which it is left, the next node and the way in mm.
+/// The connections of the plan alone: by node, the leg by which it is left, the next node and the distance in mm.
 type Leads = BTreeMap<String, Vec<(Option<Leg>, String, f64)>>;
 
 fn leads(plan: &LayoutPlan) -> Leads {
@@ -102,10 +102,10 @@ fn leads(plan: &LayoutPlan) -> Leads {
 /// A hop in words: the nodes it passes with the legs it leaves them by, and its length in mm.
 type FoundReach = (Vec<(String, Option<Leg>)>, i64);
 
-/// All ways from a node to the next sensor or track end that pass no node twice.
+/// All paths from a node to the next sensor or track end that pass no node twice.
 fn search(
     leads: &Leads,
-    way: &mut Vec<(String, Option<Leg>)>,
+    path: &mut Vec<(String, Option<Leg>)>,
     at: &str,
     mm: f64,
     found: &mut BTreeSet<FoundReach>,
@@ -113,15 +113,15 @@ fn search(
     let mut leads_on = leads.get(at).cloned().unwrap_or_default();
     leads_on.sort_by_key(|(leg, ..)| *leg);
     for (leg, to, length) in leads_on {
-        way.push((at.to_owned(), leg));
+        path.push((at.to_owned(), leg));
         if to.starts_with(['S', 's', 'e']) {
-            let mut commanded = way.clone();
+            let mut commanded = path.clone();
             commanded.push((to, None));
             found.insert((commanded, (mm + length) as i64));
-        } else if way.iter().all(|(passed, _)| *passed != to) {
-            search(leads, way, &to, mm + length, found);
+        } else if path.iter().all(|(passed, _)| *passed != to) {
+            search(leads, path, &to, mm + length, found);
         }
-        way.pop();
+        path.pop();
     }
 }
 
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn open_hops_are_those_whose_facing_turnouts_may_lie_right((_, layout) in any_layout(), states in any_states()) {
+    fn open_hops_are_those_that_facing_turnouts_allow((_, layout) in any_layout(), states in any_states()) {
         for (id, _) in layout.nodes() {
             let allowed = layout.hops_from(id).filter(|hop| {
                 let edges = hop.edges.iter().filter_map(|edge| layout.edge(*edge));
@@ -191,12 +191,12 @@ proptest! {
     }
 
     #[test]
-    fn a_train_under_way_reaches_what_its_last_node_does(
+    fn a_moving_train_reaches_what_its_last_node_does(
         (_, layout) in any_layout(), states in any_states(), edge in any::<Index>(), part in 0.0..=1.0_f64,
     ) {
         let position = position(&layout, edge, part);
         let edge = layout.edge(position.edge).unwrap();
-        // The turnout that led onto the edge is asked no more.
+        // The turnout at the start of the edge no longer matters.
         let mut decided = states.clone();
         if let (NodeKind::Branch(turnout), Some(leg)) = (layout.node(edge.from).unwrap().kind, edge.leg) {
             decided.set(turnout, leg);
@@ -212,7 +212,7 @@ proptest! {
     }
 
     #[test]
-    fn routes_are_the_shortest_and_as_long_the_other_way((plan, layout) in any_layout()) {
+    fn routes_are_the_shortest_and_as_long_in_the_other_direction((plan, layout) in any_layout()) {
         let (leads, free) = (leads(&plan), TurnoutStates::unknown());
         for (from, node) in layout.nodes() {
             let shortest = distances(&leads, &node.name);
@@ -253,7 +253,7 @@ proptest! {
     }
 
     #[test]
-    fn two_ways_in_a_row_are_one_way(
+    fn consecutive_paths_join(
         (_, layout) in any_layout(), states in any_states(), edge in any::<Index>(), part in 0.0..=1.0_f64,
         one in 0.0..4_000.0_f64, other in 0.0..4_000.0_f64,
     ) {
@@ -268,7 +268,7 @@ proptest! {
     }
 
     #[test]
-    fn any_numbers_are_no_panic(
+    fn no_numbers_panic(
         (_, layout) in any_layout(), states in any_states(), ids in any::<[u16; 4]>(), mm in any::<[f64; 3]>(), text in "\\PC{0,12}",
     ) {
         let [one, two, three] = mm.map(Length::from_mm);
@@ -305,7 +305,7 @@ fn in_a_row(
     }
 }
 
-/// The shortest ways from a node in mm: every way is made shorter until none can be (Bellman and Ford, 1956).
+/// The shortest distances from a node in mm: relaxed until nothing changes (Bellman and Ford, 1956).
 fn distances(leads: &Leads, from: &str) -> BTreeMap<String, f64> {
     let mut shortest = BTreeMap::from([(from.to_owned(), 0.0)]);
     loop {

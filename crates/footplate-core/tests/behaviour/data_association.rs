@@ -1,5 +1,5 @@
-//! Closures of contacts are laid to the trains that made them, past silent contacts and turnouts that did not move, and
-//! to nobody where nobody was; a train that cannot be told from another is waited for, and one that is lost is said to be.
+//! Each detection is assigned to the train that caused it, despite missed detections and failed turnouts, and to none
+//! if it is spurious; ambiguous detections change no estimate, and a lost train is reported.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Driver, Notice, Order};
@@ -10,14 +10,14 @@ use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
 const FIRST: TrainId = TrainId(24);
 const SECOND: TrainId = TrainId(58);
-/// How long trains run of which anything may be asked (s).
+/// How long trains run in tests of random orders (s).
 const RUNS_FOR: f64 = 26.0;
 
 fn run(driver: &mut Driver, world: &ToyRailway, train: TrainId, step: SpeedStep) {
     driver.order(world.now, Order::Speed { train, step }).expect("a train and a step");
 }
 
-/// Two trains on the oval, the one 24 behind the one 58.
+/// Two trains on the oval, train 24 behind train 58.
 fn two_trains() -> (ToyRailway, Driver) {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     world.put(58, "B1", 100.0);
@@ -26,17 +26,16 @@ fn two_trains() -> (ToyRailway, Driver) {
     (world, driver)
 }
 
-/// Closures that were laid to a train: that did close the contact, and that did not.
-fn laid(world: &ToyRailway) -> [usize; 2] {
+/// Detections assigned to a train that caused them, and to one that did not.
+fn assigned(world: &ToyRailway) -> [usize; 2] {
     let mut counted = [0; 2];
     for notice in &world.notices {
         let Notice::Passed { train, passed, .. } = notice else { continue };
         let slack = TimeSpan::from_ms(2);
         let (from, until) = (passed.window.after - slack, passed.window.until + slack);
-        let really = world
-            .passes
-            .iter()
-            .any(|(at, sensor, who)| sensor == &passed.sensor && who == train && (from..=until).contains(at));
+        let really = world.passes.iter().any(|(at, sensor, passer)| {
+            sensor == &passed.sensor && passer == train && (from..=until).contains(at)
+        });
         counted[usize::from(!really)] += 1;
     }
     counted
@@ -45,21 +44,21 @@ fn laid(world: &ToyRailway) -> [usize; 2] {
 fn error_mm(world: &ToyRailway, driver: &Driver, train: TrainId) -> f64 {
     let Some(located) = driver.locate(train, world.now) else { return f64::INFINITY };
     let at = driver.landmark(train, located.at).expect("a place");
-    let believed = world.layout.locate(at, &world.turnouts).expect("a place");
+    let estimated_place = world.layout.locate(at, &world.turnouts).expect("a place");
     let true_place = world.trains.iter().find(|toy| toy.id == train).expect("a train").at;
-    let way = |from, to| {
+    let distance = |from, to| {
         world.layout.distance_ahead(from, to, &world.turnouts).map_or(f64::INFINITY, Length::as_mm)
     };
-    way(believed, true_place).min(way(true_place, believed))
+    distance(estimated_place, true_place).min(distance(true_place, estimated_place))
 }
 
 #[test]
-fn two_trains_that_follow_each_other_are_told_apart() {
+fn two_trains_in_a_row_are_distinguished() {
     let (mut world, mut driver) = two_trains();
     run(&mut driver, &world, FIRST, step(9));
     run(&mut driver, &world, SECOND, step(8));
     world.run(&mut driver, 30.0);
-    let [right, wrong] = laid(&world);
+    let [right, wrong] = assigned(&world);
     assert!(wrong == 0 && right >= 20, "{right} right, {wrong} wrong");
     for train in [FIRST, SECOND] {
         assert!(error_mm(&world, &driver, train) < 25.0, "{train}: {} mm", error_mm(&world, &driver, train));
@@ -67,79 +66,80 @@ fn two_trains_that_follow_each_other_are_told_apart() {
 }
 
 #[test]
-fn a_silent_contact_and_a_turnout_that_did_not_move_at_once_are_looked_past() {
+fn a_missed_detection_and_a_failed_turnout_together_are_recognised() {
     let (mut world, mut driver) = two_trains();
-    // Given a turnout that does not move when it is told to, and a contact before it that stays silent,
+    // Given a turnout that does not move when commanded, and a silent sensor before it,
     world.stuck.insert(TurnoutId(1));
-    world.dead.insert(world.layout.sensor_named("A1").expect("a contact"));
+    world.dead.insert(world.layout.sensor_named("A1").expect("a sensor"));
     driver.order(world.now, Order::Turnout { turnout: TurnoutId(1), curved: true }).expect("free");
     world.run(&mut driver, 0.5);
     run(&mut driver, &world, FIRST, step(8));
-    // when a train comes by both,
+    // when a train passes both,
     world.run(&mut driver, 9.0);
-    // then it is believed once the contact after that says so, and the turnout with it.
-    let lies = |notice: &Notice| {
+    // then the train and the turnout are known once the next sensor reports.
+    let has_failed = |notice: &Notice| {
         matches!(notice, Notice::TurnoutMismatch { turnout: TurnoutId(1), curved: false, train: FIRST })
     };
-    assert!(world.notices.iter().any(lies), "{:#?}", world.notices);
-    assert_eq!(laid(&world)[1], 0);
+    assert!(world.notices.iter().any(has_failed), "{:#?}", world.notices);
+    assert_eq!(assigned(&world)[1], 0);
     assert!(error_mm(&world, &driver, FIRST) < 25.0);
 }
 
 #[test]
-fn a_contact_that_closes_by_itself_moves_nobody_and_is_not_believed_until_it_behaves() {
+fn a_spurious_sensor_moves_no_train_and_is_ignored_until_it_recovers() {
     let (mut world, mut driver) = two_trains();
-    let contact = world.layout.sensor_named("F2").expect("a contact");
+    let spurious = world.layout.sensor_named("F2").expect("a sensor");
     run(&mut driver, &world, FIRST, step(8));
     for _ in 0..4 {
-        world.close(contact);
+        world.close(spurious);
         world.run(&mut driver, 8.0);
     }
-    let said = |is: fn(&Notice) -> bool| world.notices.iter().filter(|notice| is(notice)).count();
-    assert_eq!(said(|notice| matches!(notice, Notice::Unexplained { .. })), 2);
-    assert_eq!(said(|notice| matches!(notice, Notice::SensorStuck { .. })), 1);
-    assert_eq!(laid(&world)[1], 0);
+    let count = |is: fn(&Notice) -> bool| world.notices.iter().filter(|notice| is(notice)).count();
+    assert_eq!(count(|notice| matches!(notice, Notice::Unexplained { .. })), 2);
+    assert_eq!(count(|notice| matches!(notice, Notice::SensorStuck { .. })), 1);
+    assert_eq!(assigned(&world)[1], 0);
     world.run(&mut driver, 200.0);
-    let behaves = |notice: &Notice| matches!(notice, Notice::SensorRestored { sensor } if *sensor == contact);
-    assert!(world.notices.iter().any(behaves));
+    let recovers =
+        |notice: &Notice| matches!(notice, Notice::SensorRestored { sensor } if *sensor == spurious);
+    assert!(world.notices.iter().any(recovers));
 }
 
 #[test]
-fn a_train_that_one_contact_missed_is_not_moved_by_another_that_closes_by_itself() {
+fn a_missed_train_is_not_moved_by_a_spurious_detection() {
     let (mut world, mut driver) = two_trains();
-    // Given a train that a contact did not see,
-    world.dead.insert(world.layout.sensor_named("A1").expect("a contact"));
+    // Given a train that a sensor missed,
+    world.dead.insert(world.layout.sensor_named("A1").expect("a sensor"));
     run(&mut driver, &world, FIRST, step(8));
     run(&mut driver, &world, SECOND, step(8));
     let unseen = |world: &ToyRailway| {
         world.notices.iter().any(|notice| matches!(notice, Notice::Overdue { train: FIRST, .. }))
     };
     assert!(world.run_until(&mut driver, 10.0, unseen), "{:#?}", world.notices);
-    // when one closes that it cannot have come to, and another train passes the next,
-    world.close(world.layout.sensor_named("F2").expect("a contact"));
+    // when a sensor that it cannot have reached reports, and another train passes the next,
+    world.close(world.layout.sensor_named("F2").expect("a sensor"));
     world.run(&mut driver, 10.0);
-    // then it is where it was.
-    assert_eq!(laid(&world)[1], 0, "{:#?}", world.notices);
+    // then its position is unchanged.
+    assert_eq!(assigned(&world)[1], 0, "{:#?}", world.notices);
     assert!(error_mm(&world, &driver, FIRST) < 25.0);
 }
 
 #[test]
-fn a_train_that_stands_closes_nothing() {
+fn a_train_at_rest_causes_no_detection() {
     let (mut world, mut driver) = two_trains();
     world.run(&mut driver, 2.0);
-    // The next contact ahead of either.
+    // The next sensor ahead of each.
     for name in ["A1", "D1"] {
-        world.close(world.layout.sensor_named(name).expect("a contact"));
+        world.close(world.layout.sensor_named(name).expect("a sensor"));
         world.run(&mut driver, 1.0);
     }
-    assert_eq!(laid(&world), [0, 0]);
+    assert_eq!(assigned(&world), [0, 0]);
     assert_eq!(world.notices.len(), 2, "{:#?}", world.notices);
     assert!(world.notices.iter().all(|notice| matches!(notice, Notice::Unexplained { .. })));
 }
 
 #[test]
-fn of_two_lost_trains_neither_takes_a_contact_that_may_be_the_other_s() {
-    // Given two trains that run and nobody knows where,
+fn of_two_lost_trains_neither_gets_an_ambiguous_detection() {
+    // Given two moving trains of unknown position,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     world.put(58, "B1", 100.0);
     let mut driver = driver_of(&world, "D1", 300.0);
@@ -148,20 +148,20 @@ fn of_two_lost_trains_neither_takes_a_contact_that_may_be_the_other_s() {
     add_train(&mut driver, &world, 58, None);
     run(&mut driver, &world, FIRST, step(8));
     run(&mut driver, &world, SECOND, step(8));
-    // when contacts close,
+    // when sensors report,
     world.run(&mut driver, 8.0);
-    // then that is said, and nobody is taken for the other.
+    // then the detections are reported as ambiguous, and neither train is taken for the other.
     let ambiguous = |notice: &Notice| matches!(notice, Notice::Ambiguous { or: Some(_), .. });
     assert!(world.notices.iter().any(ambiguous), "{:#?}", world.notices);
-    assert_eq!(laid(&world)[1], 0);
-    // With one of them at rest the other is found at its next contact.
+    assert_eq!(assigned(&world)[1], 0);
+    // With one of them at rest, the other is located at its next sensor.
     run(&mut driver, &world, SECOND, step(0));
     world.run(&mut driver, 14.0);
     assert!(error_mm(&world, &driver, FIRST) < 40.0);
 }
 
 #[test]
-fn a_train_is_lost_when_two_contacts_in_a_row_have_been_silent() {
+fn a_train_is_lost_after_two_missed_detections_in_a_row() {
     let (mut world, mut driver) = two_trains();
     run(&mut driver, &world, FIRST, step(8));
     world.run(&mut driver, 1.0);
@@ -180,7 +180,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn nobody_is_taken_for_another_whatever_stays_silent_or_closes_by_itself(
+    fn no_train_is_taken_for_another_despite_missed_and_spurious_detections(
         pace in 5_u8..12,
         faster in 0_u8..3,
         silent in 0_u16..12,
@@ -194,9 +194,9 @@ proptest! {
         world.dead.insert(SensorId(silent));
         let (mut closes, by_themselves) = (closes.clone(), closes.len());
         closes.sort_by(|(_, one), (_, other)| one.total_cmp(other));
-        // Toy trains run through each other: not so fast, and not so long, that one catches up with the other; but long
-        // enough for three passages when one of two slow trains is lost, to a contact that closed half a second before
-        // it came there and a silent one after that.
+        // Toy trains do not collide: their speed and the duration are too small for one to catch up with the other,
+        // but long enough for three passages if one of two slow trains is lost, after a spurious detection half a
+        // second before its sensor and a missed detection.
         run(&mut driver, &world, FIRST, step(pace));
         run(&mut driver, &world, SECOND, step(pace + faster - 1));
         for (sensor, at) in closes.into_iter().chain([(0, RUNS_FOR)]) {
@@ -206,8 +206,8 @@ proptest! {
                 world.close(SensorId(sensor));
             }
         }
-        // A contact that closes by itself just when a train is due there is the train's, as far as anybody can tell.
-        let [right, wrong] = laid(&world);
+        // A spurious detection just when a train is due cannot be distinguished from the train's own.
+        let [right, wrong] = assigned(&world);
         prop_assert!(wrong <= by_themselves && right >= 3, "{right} right, {wrong} wrong: {:#?}", world.notices);
     }
 }
