@@ -314,7 +314,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{Desk, WrittenLayout, archive_routes, odometry_routes, slide_routes};
+    use crate::commands::{AnswerQueue, WrittenLayout, archive_routes, odometry_routes, slide_routes};
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
@@ -322,8 +322,8 @@ mod tests {
         let shared =
             Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
         let layout = WrittenLayout::named("track-a").expect("built in");
-        let desk = Desk::new();
-        let of_files = archive_routes(None, &layout, &desk).and(odometry_routes(&desk));
+        let answer_queue = AnswerQueue::new();
+        let of_files = archive_routes(None, &layout, &answer_queue).and(odometry_routes(&answer_queue));
         let routes = own_routes(shared).and(of_files).and(slide_routes());
         let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");

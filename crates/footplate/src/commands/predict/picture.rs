@@ -54,7 +54,7 @@ fn panel(phase: &str, hits: &[&ScoredHit]) -> Panel {
     Panel {
         x: format!("{phase}: error at most (mm)"),
         y: "reports (%)".to_owned(),
-        from_nought: true,
+        from_zero: true,
         layers,
         ..Panel::default()
     }
