@@ -22,7 +22,7 @@ use super::Outcome;
 use super::serve::open_dashboard;
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
-use crate::dashboard::{ServedAt, Showing};
+use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::Speed;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
 pub(crate) use beginning::TourBeginning;
@@ -101,9 +101,10 @@ impl Arguments {
         let mut recorder = record.clone();
         let railway = Railway::new(layout, self.seed, &TRAINS, speed, &mut recorder)?;
         record.0.borrow_mut().journal = self.journal(layout, railway.now())?;
-        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, railway.now()));
+        let dashboard_view =
+            dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, railway.now()));
         let mut demo = Demo::new(railway, screen, speed, record, &TRAINS);
-        demo.showing = showing;
+        demo.dashboard_view = dashboard_view;
         self.greet(&mut demo)?;
         let mut dice = Dice::new(self.seed);
         let mut turnouts = TurnoutStates::unknown();

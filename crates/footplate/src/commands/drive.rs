@@ -310,7 +310,7 @@ impl Arguments {
                     let truth = start_odometers.error(runtime.link(), layout, ended);
                     let result = ResultLine::of(layout, ended, truth);
                     if let Some(dashboard) = dashboard {
-                        dashboard.board.tell("ended", &result);
+                        dashboard.board.publish("ended", &result);
                     }
                     if self.json {
                         writeln!(output, "{}", serde_json::to_string(&result)?)?;

@@ -32,7 +32,7 @@ use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{ServedAt, Showing};
+use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
@@ -135,7 +135,8 @@ impl Session<'_> {
         let store = || self.store.map(Path::to_path_buf);
         let dashboard = self.serve.map(|at| open_dashboard(at, on, store())).transpose()?;
         let link = ObservedLink::new(link, dashboard.as_ref().map(|dashboard| Arc::clone(&dashboard.line)));
-        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, link.now()));
+        let showing =
+            dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
         let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
         let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);

@@ -46,18 +46,18 @@ pub(super) fn calibrate(
     while calibrator.machine().ending().is_none() {
         for notice in demo.advance(&mut calibrator)? {
             let now = demo.now();
-            if let Some(showing) = &mut demo.showing {
+            if let Some(dashboard_view) = &mut demo.dashboard_view {
                 let said = match &notice {
-                    CalibrationNotice::Mishap(mishap) => what_happened(layout, mishap),
+                    CalibrationNotice::Mishap(fault) => what_happened(layout, fault),
                     _ => String::new(),
                 };
-                showing.hear(now, train, &notice, &said);
+                dashboard_view.hear(now, train, &notice, &said);
             }
             report(demo, layout, train, budget, &notice)?;
         }
         let now = demo.now();
-        if let Some(showing) = &mut demo.showing {
-            showing.calibrator(calibrator.machine(), now);
+        if let Some(dashboard_view) = &mut demo.dashboard_view {
+            dashboard_view.calibrator(calibrator.machine(), now);
         }
         if demo.is_broken() {
             return Ok(None);
@@ -131,7 +131,7 @@ fn report(
             demo.set_detail(train, &detail, Some(known(&progress.accuracy)));
             Ok(())
         }
-        CalibrationNotice::Mishap(mishap) => demo.screen.fault(train, &what_happened(layout, mishap)),
+        CalibrationNotice::Mishap(fault) => demo.screen.fault(train, &what_happened(layout, fault)),
         CalibrationNotice::Begins { .. }
         | CalibrationNotice::Done(_)
         | CalibrationNotice::Finished { .. } => Ok(()),
@@ -152,9 +152,9 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))
 }
 
-fn what_happened(layout: &Layout, mishap: &Mishap) -> String {
+fn what_happened(layout: &Layout, fault: &Mishap) -> String {
     let sensor = |sensor| layout.sensor_name(sensor);
-    match mishap {
+    match fault {
         Mishap::Stalled { step } => format!("activity not move reliably at step {step}"),
         Mishap::Missed { count, before } => {
             format!(

@@ -143,11 +143,11 @@ impl<'l> Tour<'l> {
                 return Ok(None);
             }
             for notice in demo.advance(&mut self.driver)? {
-                if let (Some(showing), Some(alarm)) =
-                    (&mut demo.showing, Alarm::of_notice(self.layout, &notice))
+                if let (Some(dashboard_view), Some(alarm)) =
+                    (&mut demo.dashboard_view, Alarm::of_notice(self.layout, &notice))
                 {
                     let formatter = NoticeFormatter { driver: self.driver.machine(), began: Timestamp::ZERO };
-                    showing.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
+                    dashboard_view.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
                 }
                 match notice {
                     Notice::Done(done) if done.order == order => finished = Some(done),
@@ -161,8 +161,8 @@ impl<'l> Tour<'l> {
                     }
                     Notice::Planned(planned) => self.planned = Some(planned),
                     Notice::Passed { train, passed, next } => {
-                        if let Some(showing) = &mut demo.showing {
-                            showing.passed(TrainPassed { train, passed, next });
+                        if let Some(dashboard_view) = &mut demo.dashboard_view {
+                            dashboard_view.passed(TrainPassed { train, passed, next });
                         }
                         self.pass(passed, next);
                     }
@@ -186,14 +186,14 @@ impl<'l> Tour<'l> {
                 }
             }
             let now = demo.now();
-            if let Some(showing) = &mut demo.showing {
+            if let Some(dashboard_view) = &mut demo.dashboard_view {
                 let promise = self.planned.map(|planned| planned.promise);
                 let task = TrainTask {
                     text: format!("stop {} at {name} from step {step}", self.train),
                     target: Some(target),
                     promise: promise.map(|promise| [promise.median, promise.low, promise.high]),
                 };
-                showing.driver(self.driver.machine(), &BTreeMap::from([(self.train, task)]), now);
+                dashboard_view.driver(self.driver.machine(), &BTreeMap::from([(self.train, task)]), now);
             }
             let detail = self.detail(demo.now(), &name, step, finished.is_some());
             demo.set_detail(self.train, &detail, None);

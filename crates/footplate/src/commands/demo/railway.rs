@@ -120,7 +120,7 @@ impl<'r, 'l> Railway<'r, 'l> {
 
     /// Puts a train back to where it was.
     pub(super) fn put_down(&mut self, train: TrainId) -> anyhow::Result<()> {
-        let Some(place) = self.lifted.iter().position(|held| held.train == train) else { return Ok(()) };
+        let Some(place) = self.lifted.iter().position(|lifted| lifted.train == train) else { return Ok(()) };
         if let (_, Some((position, leads))) = (train, self.lifted.remove(place).was_at) {
             self.runtime.link_mut().line.station_mut().world_mut().place(train, position, leads)?;
         }

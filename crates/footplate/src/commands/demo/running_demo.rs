@@ -13,7 +13,7 @@ use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
 use crate::clock::{Stopwatch, now};
-use crate::dashboard::Showing;
+use crate::dashboard::ReadOnlyDashboard;
 use crate::link::Speed;
 use crate::session_journal::{Scribe, SessionJournal};
 
@@ -33,7 +33,7 @@ pub(super) struct Demo<'r, 'l, 'o> {
     pub(super) models: Vec<MotionFile>,
     pub(super) stops: Vec<MadeStop>,
     /// The dashboard.
-    pub(super) showing: Option<Showing>,
+    pub(super) dashboard_view: Option<ReadOnlyDashboard>,
 }
 
 /// The answer to commands from the dashboard.
@@ -62,7 +62,7 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
             learnt,
             models: Vec::new(),
             stops,
-            showing: None,
+            dashboard_view: None,
         }
     }
 
@@ -83,7 +83,8 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
     /// Runs one turn of the loop; returns its notices.
     pub(super) fn advance<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
         let notices = self.railway.advance(machine)?;
-        if self.showing.as_ref().is_some_and(|showing| showing.is_halted(DRIVES_ITSELF)) {
+        if self.dashboard_view.as_ref().is_some_and(|dashboard_view| dashboard_view.is_halted(DRIVES_ITSELF))
+        {
             anyhow::bail!("emergency stop from the dashboard: all trains stopped, track power off");
         }
         self.report_faults()?;
@@ -146,8 +147,8 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
 
     /// Prints a line on the dashboard.
     fn publish(&self, text: &str) {
-        if let Some(showing) = &self.showing {
-            showing.say(self.now(), text);
+        if let Some(dashboard_view) = &self.dashboard_view {
+            dashboard_view.say(self.now(), text);
         }
     }
 
@@ -195,16 +196,16 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
 
     fn report_faults(&mut self) -> io::Result<()> {
         let new: Vec<_> = self.railway.world().mishaps().iter().skip(self.faults_reported).copied().collect();
-        for mishap in new {
+        for fault in new {
             self.faults_reported += 1;
             self.broken = true;
-            let what = match mishap.kind {
+            let what = match fault.kind {
                 MishapKind::Collision { with } => format!("ran into train {with}"),
                 MishapKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
                 MishapKind::Overrun => "ran past the end of its track".to_owned(),
                 MishapKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
             };
-            match mishap.train {
+            match fault.train {
                 Some(train) => self.screen.fault(train, &what)?,
                 None => self.screen.mention(&format!("  {what}"))?,
             }

@@ -77,7 +77,7 @@ struct LiveView {
 
 impl LiveView {
     fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
-        while let Some(asked) = self.board.next_asked() {
+        while let Some(asked) = self.board.next_request() {
             let answer = match &asked.request {
                 Request::EmergencyStop => {
                     script_runner.handle_word(now, &Input::EmergencyStop);

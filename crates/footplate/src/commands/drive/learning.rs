@@ -16,7 +16,7 @@ pub(super) struct Learning {
     fits: BTreeMap<TrainId, MotionFit>,
     sections: SectionIndex,
     /// Refits that are being computed, a part at a time.
-    under_way: BTreeMap<TrainId, Refit>,
+    in_progress: BTreeMap<TrainId, Refit>,
     /// Commanded steps of a train since its last standstill.
     changes: BTreeMap<TrainId, usize>,
 }
@@ -31,7 +31,7 @@ impl Learning {
         Self {
             fits,
             sections: SectionIndex::of(layout),
-            under_way: BTreeMap::new(),
+            in_progress: BTreeMap::new(),
             changes: BTreeMap::new(),
         }
     }
@@ -84,7 +84,7 @@ impl Learning {
     /// stored.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.fits.remove(&train);
-        self.under_way.remove(&train);
+        self.in_progress.remove(&train);
     }
 
     /// All fits, with their current runs ended: what the trains do between sessions is unknown.
@@ -100,23 +100,23 @@ impl Learning {
     /// Starts a refit to all events of a train so far.
     pub(super) fn begin_refit(&mut self, train: TrainId) {
         if let Some(fit) = self.fits.get(&train) {
-            self.under_way.insert(train, fit.begin_refit(&self.sections));
+            self.in_progress.insert(train, fit.begin_refit(&self.sections));
         }
     }
 
     /// Whether any refit is being computed.
     pub(super) fn is_refitting(&self) -> bool {
-        !self.under_way.is_empty()
+        !self.in_progress.is_empty()
     }
 
     /// Whether a refit of this train is being computed.
     pub(super) fn is_refitting_to(&self, train: TrainId) -> bool {
-        self.under_way.contains_key(&train)
+        self.in_progress.contains_key(&train)
     }
 
     /// Computes the next part of a refit, which takes milliseconds; returns the model after the last part.
     pub(super) fn advance_refit(&mut self) -> Option<MotionModel> {
-        let mut first = self.under_way.first_entry()?;
+        let mut first = self.in_progress.first_entry()?;
         first.get_mut().go_on();
         if !first.get().is_over() {
             return None;
@@ -129,7 +129,7 @@ impl Learning {
 
     /// The model fitted to all events of a train. Too slow to run between two reports.
     pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
-        self.under_way.remove(&train);
+        self.in_progress.remove(&train);
         let fit = self.fits.get_mut(&train)?;
         fit.refit(&self.sections);
         Some(fit.model().clone())

@@ -295,7 +295,7 @@ impl ScriptRunner {
         }
     }
 
-    /// Everything stands, whatever was said before and waits.
+    /// Stops all trains, switches the track power off, and drops all waiting lines.
     fn halt(&mut self, now: Timestamp) {
         self.steps.clear();
         self.wait = None;

@@ -188,9 +188,9 @@ impl ScriptRunner {
         if is_free && let Some(model) = self.learning.advance_refit() {
             self.refitted.insert(model.train(), model);
         }
-        let stands = |train: &TrainId| self.driver().stands(*train, now);
-        let standing: Vec<TrainId> = self.refitted.keys().copied().filter(stands).collect();
-        for model in standing.iter().filter_map(|train| self.refitted.remove(train)).collect::<Vec<_>>() {
+        let is_at_rest = |train: &TrainId| self.driver().stands(*train, now);
+        let at_rest: Vec<TrainId> = self.refitted.keys().copied().filter(is_at_rest).collect();
+        for model in at_rest.iter().filter_map(|train| self.refitted.remove(train)).collect::<Vec<_>>() {
             self.use_model(model);
         }
     }

@@ -49,14 +49,14 @@ impl ScriptRunner {
     /// brakes or is being recovered.
     pub(super) fn must_wait(&mut self, now: Timestamp, instruction: Instruction) -> bool {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
-        let (train, stands) = match instruction {
+        let (train, is_stop) = match instruction {
             Instruction::Order(order) => {
                 (order.train(), matches!(order, Order::Speed { step: SpeedStep::STAND, .. }))
             }
             Instruction::Go(train, _) => (Some(train), false),
             _ => return false,
         };
-        if train.is_some_and(|train| !stands && self.is_blocked_for_now(now, train)) {
+        if train.is_some_and(|train| !is_stop && self.is_blocked_for_now(now, train)) {
             return true;
         }
         let is_busy = train.is_some_and(|train| self.has_finite_order(train));
@@ -149,7 +149,10 @@ impl ScriptRunner {
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= self.wait_limit {
             self.wait = None;
             self.fell_short = true;
-            self.say(format!("nothing happened within {:.0} s; the script goes on", self.wait_limit.as_s()));
+            self.say(format!(
+                "nothing happened within {:.0} s; the script continues",
+                self.wait_limit.as_s()
+            ));
             return true;
         }
         met

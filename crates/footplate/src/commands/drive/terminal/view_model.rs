@@ -142,7 +142,7 @@ impl TerminalModel {
         if let Ok(picture) = serde_json::from_str(&board.pictures().borrow()) {
             self.picture = picture;
         }
-        let (happened, _) = board.happened_from(self.next);
+        let (happened, _) = board.events_from(self.next);
         for happening in happened {
             self.next = happening.number + 1;
             match happening.kind {
