@@ -19,7 +19,7 @@ use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
-use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};
+use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -232,7 +232,7 @@ impl Session<'_> {
             replay.runs, self.train
         );
         let mut fit = replay.fit;
-        if let KeptModel::Model(model) = KeptModel::of_store(layout, &store, self.train, now())? {
+        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())? {
             // Which steps do not move it follows from what was tried, not from the events alone.
             let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
             for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {

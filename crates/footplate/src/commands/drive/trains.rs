@@ -9,7 +9,7 @@ use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId};
-use footplate_store::{KeptModel, MotionFile, MotionReplay, Store};
+use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
 use crate::clock::now;
 
@@ -96,14 +96,14 @@ impl KnownTrains {
         is_named: bool,
     ) -> anyhow::Result<()> {
         let at = now();
-        match KeptModel::of_store(layout, store, train, at)? {
-            KeptModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
-            KeptModel::OfOtherFormulas => eprintln!(
+        match StoredModel::of_store(layout, store, train, at)? {
+            StoredModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
+            StoredModel::Outdated => eprintln!(
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
-            KeptModel::Nothing if is_named => {}
-            KeptModel::Nothing => return Ok(()),
+            StoredModel::Nothing if is_named => {}
+            StoredModel::Nothing => return Ok(()),
         }
         let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
         if replay.is_empty() {
