@@ -137,7 +137,7 @@ impl BoardFigures {
         let panel = Panel {
             x: "at most (ms)".to_owned(),
             y: "share (%)".to_owned(),
-            from_nought: true,
+            from_zero: true,
             layers: layers.into_iter().collect(),
             ..Panel::default()
         };

@@ -1,4 +1,4 @@
-//! Where everything happens: the railway, the clock, the journal and the screen, turn by turn.
+//! The running demo: railway, clock, journal and display.
 
 use std::io;
 use std::time::Duration;
@@ -13,33 +13,33 @@ use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
 use crate::clock::{Stopwatch, now};
-use crate::dashboard::Showing;
+use crate::dashboard::ReadOnlyDashboard;
 use crate::link::Speed;
 use crate::session_journal::{Scribe, SessionJournal};
 
-/// The railway, the clock, the journal and the screen.
-pub(super) struct Stage<'r, 'l, 'o> {
+/// The running demo.
+pub(super) struct Demo<'r, 'l, 'o> {
     pub(super) railway: Railway<'r, 'l>,
     pub(super) screen: Screen<'o>,
     stopwatch: Stopwatch,
     speed: Speed,
     record: SharedRecord,
     pictures: Vec<TrainPicture>,
-    /// Mishaps that were told.
-    told: usize,
+    /// Faults that have been reported.
+    faults_reported: usize,
     broken: bool,
     pub(super) learnt: Vec<Learnt>,
-    /// Models to be kept with the session.
+    /// Models to store with the session.
     pub(super) models: Vec<MotionFile>,
     pub(super) stops: Vec<MadeStop>,
-    /// Those who watch in a browser.
-    pub(super) showing: Option<Showing>,
+    /// The dashboard.
+    pub(super) dashboard_view: Option<ReadOnlyDashboard>,
 }
 
-/// What a browser is told that wants to drive.
+/// The answer to commands from the dashboard.
 const DRIVES_ITSELF: &str = "the demonstration runs by itself: use `footplate serve` to command trains";
 
-impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
+impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
     pub(super) fn new(
         railway: Railway<'r, 'l>,
         screen: Screen<'o>,
@@ -57,12 +57,12 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
             speed,
             record,
             pictures,
-            told: 0,
+            faults_reported: 0,
             broken: false,
             learnt,
             models: Vec::new(),
             stops,
-            showing: None,
+            dashboard_view: None,
         }
     }
 
@@ -70,23 +70,24 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         self.railway.now()
     }
 
-    /// The time on the wall since the beginning.
+    /// Real time since the start.
     pub(super) fn wall(&self) -> Duration {
         self.stopwatch.elapsed()
     }
 
-    /// Whether something happened that a person would have to set right.
+    /// Whether a fault occurred that only an operator could correct.
     pub(super) const fn is_broken(&self) -> bool {
         self.broken
     }
 
-    /// One turn; returns what was said.
-    pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
-        let notices = self.railway.go_on(machine)?;
-        if self.showing.as_ref().is_some_and(|showing| showing.is_halted(DRIVES_ITSELF)) {
+    /// Runs one turn of the loop; returns its notices.
+    pub(super) fn advance<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
+        let notices = self.railway.advance(machine)?;
+        if self.dashboard_view.as_ref().is_some_and(|dashboard_view| dashboard_view.is_halted(DRIVES_ITSELF))
+        {
             anyhow::bail!("emergency stop from the dashboard: all trains stopped, track power off");
         }
-        self.look_for_mishaps()?;
+        self.report_faults()?;
         let acknowledged = self.record.0.borrow().journal.as_ref().map(SessionJournal::acknowledged);
         if let Some(acknowledged) = acknowledged {
             self.screen.acknowledged(acknowledged)?;
@@ -97,28 +98,28 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         Ok(notices)
     }
 
-    /// A train is the one at work, and what it is about.
-    pub(super) fn works(&mut self, train: TrainId, does: &str, detail: &str) {
+    /// Makes a train the active one.
+    pub(super) fn set_active(&mut self, train: TrainId, activity: &str, detail: &str) {
         for picture in &mut self.pictures {
-            picture.is_at_work = picture.train == train;
+            picture.is_active = picture.train == train;
             if picture.train == train {
-                picture.does = does.to_owned();
+                picture.activity = activity.to_owned();
                 picture.detail = detail.to_owned();
             }
         }
     }
 
-    /// A train is out of the way.
-    pub(super) fn rests(&mut self, train: TrainId, does: &str) {
+    /// Makes a train inactive.
+    pub(super) fn set_idle(&mut self, train: TrainId, activity: &str) {
         if let Some(picture) = self.picture_of(train) {
-            picture.is_at_work = false;
-            picture.does = does.to_owned();
+            picture.is_active = false;
+            picture.activity = activity.to_owned();
             picture.detail = String::new();
         }
     }
 
-    /// What a train is about now, and what is known of it.
-    pub(super) fn shows(&mut self, train: TrainId, detail: &str, steps: Option<Vec<LearntStep>>) {
+    /// Updates the display of a train.
+    pub(super) fn set_detail(&mut self, train: TrainId, detail: &str, steps: Option<Vec<LearntStep>>) {
         if let Some(picture) = self.picture_of(train) {
             picture.detail = detail.to_owned();
             if let Some(steps) = steps {
@@ -127,38 +128,38 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         }
     }
 
-    /// A train is calibrated.
+    /// Reports a calibration.
     pub(super) fn learnt(&mut self, learnt: Learnt) -> io::Result<()> {
-        self.shows(learnt.train, "", Some(learnt.steps.clone()));
-        self.tell(&learnt.sentence());
+        self.set_detail(learnt.train, "", Some(learnt.steps.clone()));
+        self.publish(&learnt.sentence());
         self.screen.learnt(&learnt)?;
         self.learnt.push(learnt);
         Ok(())
     }
 
-    /// A train stands where it was commanded to stop.
+    /// Reports a stop.
     pub(super) fn stopped(&mut self, stop: MadeStop) -> io::Result<()> {
-        self.tell(&stop.sentence());
+        self.publish(&stop.sentence());
         self.screen.stopped(&stop)?;
         self.stops.push(stop);
         Ok(())
     }
 
-    /// Says something to those who watch in a browser.
-    fn tell(&self, text: &str) {
-        if let Some(showing) = &self.showing {
-            showing.say(self.now(), text);
+    /// Prints a line on the dashboard.
+    fn publish(&self, text: &str) {
+        if let Some(dashboard_view) = &self.dashboard_view {
+            dashboard_view.say(self.now(), text);
         }
     }
 
-    /// This train takes part from here on, and no other: a run of the journal of its own.
+    /// Begins a run of the journal in which only this train takes part.
     pub(super) fn begin_run(&mut self, train: TrainId) {
         if let Some(journal) = &mut self.record.0.borrow_mut().journal {
             journal.begin_run(&[TrainAtStart { train, step: SpeedStep::STAND }]);
         }
     }
 
-    /// A machine begins to decide: what writes down of it, if the session is kept.
+    /// Begins recording a machine; `None` without a store.
     pub(super) fn begin_machine(
         &mut self,
         kind: &'static str,
@@ -169,7 +170,7 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         Ok(journal.begin_machine(kind, serde_json::to_string(beginning)?))
     }
 
-    /// Ends the session: everything is written down.
+    /// Ends the session and writes the journal out.
     pub(super) fn end(&mut self) -> anyhow::Result<()> {
         self.screen.clear()?;
         self.railway.close();
@@ -193,19 +194,19 @@ impl<'r, 'l, 'o> Stage<'r, 'l, 'o> {
         self.pictures.iter_mut().find(|picture| picture.train == train)
     }
 
-    fn look_for_mishaps(&mut self) -> io::Result<()> {
-        let new: Vec<_> = self.railway.world().mishaps().iter().skip(self.told).copied().collect();
-        for mishap in new {
-            self.told += 1;
+    fn report_faults(&mut self) -> io::Result<()> {
+        let new: Vec<_> = self.railway.world().mishaps().iter().skip(self.faults_reported).copied().collect();
+        for fault in new {
+            self.faults_reported += 1;
             self.broken = true;
-            let what = match mishap.kind {
+            let what = match fault.kind {
                 MishapKind::Collision { with } => format!("ran into train {with}"),
                 MishapKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
                 MishapKind::Overrun => "ran past the end of its track".to_owned(),
                 MishapKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
             };
-            match mishap.train {
-                Some(train) => self.screen.mishap(train, &what)?,
+            match fault.train {
+                Some(train) => self.screen.fault(train, &what)?,
                 None => self.screen.mention(&format!("  {what}"))?,
             }
         }

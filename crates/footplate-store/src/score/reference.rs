@@ -1,34 +1,39 @@
-//! Those whose forecasts stand beside ours.
+//! The forecasters that our estimator is compared with.
 
 use core::fmt;
 
-/// Another way to forecast the same report.
+/// A reference forecaster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Rival {
-    /// Our own estimator again, naming the poll that will report instead of the mean time.
+pub enum ReferenceForecaster {
+    /// Our own estimator, forecasting the poll that will report instead of the mean time.
     AtPoll,
-    /// Our own estimator, told beforehand what the whole recording says.
+    /// Our own estimator with the results of the whole recording in advance.
     Oracle,
-    /// A table of lengths and speeds, run by run, made from the whole recording beforehand.
+    /// A table of lengths and speeds for each run, made from the whole recording in advance.
     HindsightTable,
-    /// The speed of a step is measured over the first lap at it and never again.
+    /// The speed of a step is measured over its first lap and never again.
     ConstantTable,
-    /// A running average of the speed of a step that takes 1/256 of every hop, in integers.
+    /// A running average of the speed of a step with α = 1/256 per hop, in integers.
     SlowAverage,
-    /// The same with a tenth.
+    /// The same with α = 0.1.
     MiddleAverage,
-    /// The same with half.
+    /// The same with α = 0.5.
     FastAverage,
-    /// The hop takes as long as it took last time at this step.
+    /// The hop takes as long as last time at this step.
     LastLap,
 }
 
-/// What courses and clubs use: all that learn as they go.
-pub const BASELINES: [Rival; 5] =
-    [Rival::ConstantTable, Rival::SlowAverage, Rival::MiddleAverage, Rival::FastAverage, Rival::LastLap];
+/// The methods of courses and clubs, which learn while the train runs.
+pub const BASELINES: [ReferenceForecaster; 5] = [
+    ReferenceForecaster::ConstantTable,
+    ReferenceForecaster::SlowAverage,
+    ReferenceForecaster::MiddleAverage,
+    ReferenceForecaster::FastAverage,
+    ReferenceForecaster::LastLap,
+];
 
-impl Rival {
-    /// All of them, in the order of their declaration.
+impl ReferenceForecaster {
+    /// All references, in the order of their declaration.
     pub const ALL: [Self; 8] = [
         Self::AtPoll,
         Self::Oracle,
@@ -57,7 +62,7 @@ impl Rival {
 }
 
 /// Its name for people.
-impl fmt::Display for Rival {
+impl fmt::Display for ReferenceForecaster {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::AtPoll => "ours, at a poll",

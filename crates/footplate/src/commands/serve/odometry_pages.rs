@@ -1,7 +1,7 @@
-//! Recordings of tachometers that are dropped on the dashboard: walked by the same code as `footplate odometry`.
+//! Tachometer recordings dropped on the dashboard, computed by the same code as `footplate odometry`.
 //!
 //! ```text
-//! POST /api/odometry/run.csv       the bytes of a recording; answers where its page is
+//! POST /api/odometry/run.csv       the bytes of a recording; answers with the address of its page
 //! GET  /api/odometry/pages/0       the page: charts of speed and bounds, slips, shares and score
 //! ```
 
@@ -17,16 +17,16 @@ use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::desk::{Desk, Wished};
+use super::answer_queue::{AnswerForm, AnswerQueue};
 use crate::commands::clerk::Question;
 use crate::dashboard::Routes;
 
-/// The largest recording that is taken: an hour of two tachometers at 20 Hz is four megabytes as text.
+/// The largest recording: an hour of two tachometers at 20 Hz is 4 MB of text.
 const LARGEST: usize = 64 << 20;
-/// Pages that are kept; some megabytes each.
+/// Pages kept; a few megabytes each.
 const PAGES_KEPT: usize = 4;
 
-/// What a browser may do for a page: show it, and nothing that leaves it. It is framed without an origin of its own.
+/// The content security policy of a page: it shows its own data and loads nothing. It is framed without an origin.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; \
      sandbox allow-scripts; frame-ancestors 'self'";
 
@@ -37,18 +37,18 @@ struct Pages {
 }
 
 #[derive(Clone)]
-struct OdometryDesk {
+struct OdometryPages {
     pages: Arc<Mutex<Pages>>,
-    desk: Desk,
+    answer_queue: AnswerQueue,
 }
 
 /// The routes.
-pub(crate) fn odometry_routes(desk: &Desk) -> Routes {
-    let desk = OdometryDesk { pages: Arc::default(), desk: desk.clone() };
-    Routes::new(desk, [("/api/odometry/{name}", post(walk)), ("/api/odometry/pages/{number}", get(page))])
+pub(crate) fn odometry_routes(answer_queue: &AnswerQueue) -> Routes {
+    let state = OdometryPages { pages: Arc::default(), answer_queue: answer_queue.clone() };
+    Routes::new(state, [("/api/odometry/{name}", post(compute)), ("/api/odometry/pages/{number}", get(page))])
 }
 
-/// The train that a recording is of.
+/// The train of a recording.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct OfTrain {
@@ -56,19 +56,19 @@ struct OfTrain {
     vehicle: Option<String>,
 }
 
-async fn walk(
-    State(desk): State<OdometryDesk>,
+async fn compute(
+    State(state): State<OdometryPages>,
     Path(name): Path<String>,
-    Query(wished): Query<Wished>,
+    Query(form): Query<AnswerForm>,
     Query(of_train): Query<OfTrain>,
     body: Body,
 ) -> Response {
-    let question = Question::Recording { name, vehicle: of_train.vehicle, language: wished.into_name() };
-    let page = match desk.desk.ask(question, body, LARGEST).await {
+    let question = Question::Recording { name, vehicle: of_train.vehicle, language: form.into_name() };
+    let page = match state.answer_queue.ask(question, body, LARGEST).await {
         Ok(page) => page,
-        Err(refusal) => return refusal.into_response(),
+        Err(rejection) => return rejection.into_response(),
     };
-    let mut pages = desk.pages.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut pages = state.pages.lock().unwrap_or_else(PoisonError::into_inner);
     let number = pages.next;
     pages.next += 1;
     pages.kept.push_back((number, page.into()));
@@ -78,8 +78,8 @@ async fn walk(
     Json(json!({ "page": format!("/api/odometry/pages/{number}") })).into_response()
 }
 
-async fn page(State(desk): State<OdometryDesk>, Path(number): Path<String>) -> Response {
-    let pages = desk.pages.lock().unwrap_or_else(PoisonError::into_inner);
+async fn page(State(state): State<OdometryPages>, Path(number): Path<String>) -> Response {
+    let pages = state.pages.lock().unwrap_or_else(PoisonError::into_inner);
     let found = pages.kept.iter().find(|(kept, _)| number.parse() == Ok(*kept));
     match found {
         Some((_, page)) => {
@@ -90,8 +90,8 @@ async fn page(State(desk): State<OdometryDesk>, Path(number): Path<String>) -> R
             (headers, page.to_string()).into_response()
         }
         None => {
-            let says = "this page is not kept any more: send the recording again";
-            (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response()
+            let why = "this page has been dropped: send the recording again";
+            (StatusCode::NOT_FOUND, Json(json!({ "error": why }))).into_response()
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Between the one who drives and the people in front of it: what they write goes in, what is said comes out.
+//! Connects a script runner to its operators: lines of standard input and requests of browsers go in, messages come
+//! out.
 
 use std::io::{BufRead, IsTerminal, Read, Write};
 use std::sync::Arc;
@@ -17,18 +18,18 @@ use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
 use crate::runtime::{Attendant, Wish};
 use crate::witness::{Input, Witnessed};
 
-/// No screen shows more often than this that a train has moved: fifty pictures a second.
-const BETWEEN_PICTURES: Duration = Duration::from_millis(20);
+/// The interval between two pictures of the dashboard: 50 a second.
+const PICTURE_INTERVAL: Duration = Duration::from_millis(20);
 
-/// The longest line that a person writes ...
+/// The longest line of input, in bytes.
 const LONGEST_LINE: u64 = 4_096;
-/// ... and how many wait to be carried out before no more are read.
+/// Lines that wait to be carried out; reading pauses beyond it.
 const LINES_WAITING: usize = 1_000;
 
-/// Lines that a person writes, as they come. Whatever is written, the memory of the program does not grow.
+/// Reads standard input in a thread. Memory stays bounded whatever the input is.
 pub(super) fn lines_of_stdin() -> Receiver<String> {
     let (said, lines) = sync_channel(LINES_WAITING);
-    // It ends with the input or with the program, whichever is first.
+    // The thread ends with the input or with the program.
     thread::spawn(move || {
         let mut input = std::io::stdin().lock();
         let mut line = Vec::new();
@@ -54,29 +55,29 @@ pub(super) fn lines_of_stdin() -> Receiver<String> {
     lines
 }
 
-/// Who watches a session of driving.
-pub(super) struct Stage {
+/// The operators of a driving session.
+pub(super) struct Console {
     lines: Option<Receiver<String>>,
     screen: Screen,
-    watched: Option<Watched>,
-    /// What was heard of the line since the script runner was commanded last.
+    live_view: Option<LiveView>,
+    /// News of the link since the script runner was last called.
     news: Vec<LinkNews>,
-    /// What whoever knows the truth should look at before anything moves on.
-    pub(super) for_referee: Vec<Spoken>,
+    /// Messages that are scored against the simulated truth before time moves on.
+    pub(super) for_scoring: Vec<Spoken>,
     pub(super) is_over: bool,
 }
 
-/// Those who watch in a browser.
-struct Watched {
+/// The dashboard and the terminal view.
+struct LiveView {
     board: Arc<Board>,
     painter: Painter,
     stopwatch: Stopwatch,
     painted: Duration,
 }
 
-impl Watched {
+impl LiveView {
     fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
-        while let Some(asked) = self.board.next_asked() {
+        while let Some(asked) = self.board.next_request() {
             let answer = match &asked.request {
                 Request::EmergencyStop => {
                     script_runner.handle_word(now, &Input::EmergencyStop);
@@ -93,28 +94,28 @@ impl Watched {
             asked.answer(answer);
         }
         let elapsed = self.stopwatch.elapsed();
-        if elapsed >= self.painted + BETWEEN_PICTURES {
-            // Counted from when it was due: a look that came late does not make all others late.
-            self.painted = (self.painted + BETWEEN_PICTURES).max(elapsed.saturating_sub(BETWEEN_PICTURES));
+        if elapsed >= self.painted + PICTURE_INTERVAL {
+            // Counted from when the picture was due, so that a late one does not delay all others.
+            self.painted = (self.painted + PICTURE_INTERVAL).max(elapsed.saturating_sub(PICTURE_INTERVAL));
             script_runner.machine().show(&mut self.painter, now);
         }
     }
 }
 
-/// Where lines for people go.
+/// Where lines for operators are printed.
 struct Screen {
-    to_errors: bool,
+    to_stderr: bool,
     prompts: bool,
-    /// Something else is drawn where they would go.
+    /// Whether the terminal view shows the lines instead.
     is_silent: bool,
 }
 
 impl Screen {
     fn say(&self, text: &str, status: &str) {
-        // Whoever closed the output has seen enough; trains are driven all the same.
+        // A closed output does not stop the trains.
         let _ = if self.is_silent {
             Ok(())
-        } else if self.to_errors {
+        } else if self.to_stderr {
             writeln!(std::io::stderr(), "{text}")
         } else if self.prompts {
             let mut output = std::io::stdout();
@@ -125,10 +126,10 @@ impl Screen {
     }
 }
 
-impl Stage {
-    /// `lines`: what a person writes. `json`: the output is for results, and people look at standard error.
+impl Console {
+    /// `lines`: the operator's input. `json`: standard output carries results, so that lines go to standard error.
     pub(super) fn new(lines: Option<Receiver<String>>, json: bool, board: Option<&Arc<Board>>) -> Self {
-        let watched = board.map(|board| Watched {
+        let live_view = board.map(|board| LiveView {
             board: Arc::clone(board),
             painter: Painter::new(board),
             stopwatch: Stopwatch::start(),
@@ -136,44 +137,43 @@ impl Stage {
         });
         let prompts =
             lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
-        let screen = Screen { to_errors: json, prompts, is_silent: false };
-        Self { lines, screen, watched, news: Vec::new(), for_referee: Vec::new(), is_over: false }
+        let screen = Screen { to_stderr: json, prompts, is_silent: false };
+        Self { lines, screen, live_view, news: Vec::new(), for_scoring: Vec::new(), is_over: false }
     }
 
     pub(super) fn say(&self, text: &str, status: &str) {
         self.screen.say(text, status);
     }
 
-    /// From now on something else is drawn where lines would go.
-    pub(super) const fn be_silent(&mut self) {
+    /// Stops printing: the terminal view shows the lines from now on.
+    pub(super) const fn silence(&mut self) {
         self.screen.is_silent = true;
     }
 
-    /// Says what is not as it should be.
     fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
-        if let Some(watched) = &mut self.watched {
-            watched.painter.alarm(now, alarm);
+        if let Some(live_view) = &mut self.live_view {
+            live_view.painter.alarm(now, alarm);
         }
     }
 }
 
-impl Attendant<Witnessed<ScriptRunner>> for Stage {
+impl Attendant<Witnessed<ScriptRunner>> for Console {
     fn hear(&mut self, now: Timestamp, notice: Spoken) {
         match notice {
             Spoken::Line { text, status } => {
-                if let Some(watched) = &self.watched {
-                    watched.board.say((now - Timestamp::ZERO).as_s(), &text);
+                if let Some(live_view) = &self.live_view {
+                    live_view.board.say((now - Timestamp::ZERO).as_s(), &text);
                 }
                 self.screen.say(&text, &status);
             }
             Spoken::Passed(passed) => {
-                if let Some(watched) = &mut self.watched {
-                    watched.painter.passed(passed);
+                if let Some(live_view) = &mut self.live_view {
+                    live_view.painter.passed(passed);
                 }
             }
             Spoken::Alarm(alarm) => self.alarm(now, &alarm),
             Spoken::Over => self.is_over = true,
-            begun_or_ended => self.for_referee.push(begun_or_ended),
+            begun_or_ended => self.for_scoring.push(begun_or_ended),
         }
     }
 
@@ -208,14 +208,14 @@ impl Attendant<Witnessed<ScriptRunner>> for Stage {
                 }
             }
         }
-        if let Some(watched) = &mut self.watched {
-            watched.attend(now, script_runner);
+        if let Some(live_view) = &mut self.live_view {
+            live_view.attend(now, script_runner);
         }
-        if self.is_over || !self.for_referee.is_empty() { Wish::Finish } else { Wish::GoOn }
+        if self.is_over || !self.for_scoring.is_empty() { Wish::Finish } else { Wish::GoOn }
     }
 }
 
-/// What of an ended order is said to the one who counts.
+/// The ended order in a message, if it is one.
 pub(super) fn ended(spoken: &Spoken) -> Option<&Ended> {
     match spoken {
         Spoken::Ended(ended) => Some(ended),

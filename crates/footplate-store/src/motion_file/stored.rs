@@ -1,4 +1,4 @@
-//! The motion model that a store holds of a train, if this program can use it.
+//! The stored motion model of a train, if this version can use it.
 
 use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
@@ -8,22 +8,22 @@ use super::form::MotionFile;
 use super::read::MotionFileError;
 use crate::store::Store;
 
-/// What a store holds of how a train moves on a layout.
+/// A stored motion model.
 #[derive(Debug, Clone, PartialEq)]
-pub enum KeptModel {
-    /// Nothing.
+pub enum StoredModel {
+    /// There is none.
     Nothing,
-    /// A model.
+    /// A usable model.
     Model(Box<MotionModel>),
-    /// A model whose formulas were others. The events it was learnt from are there, so it can be learnt anew.
-    OfOtherFormulas,
+    /// A model of another version of the formulas. It can be fitted again from the stored events.
+    Outdated,
 }
 
-impl KeptModel {
-    /// The model of a train on a layout that was in force at a date.
+impl StoredModel {
+    /// The model of a train on a layout as of a date.
     ///
     /// # Errors
-    /// The store cannot be read, or what it holds is no model at all.
+    /// The store cannot be read, or its content is not a model.
     pub fn of_store(
         layout: &Layout,
         store: &Store,
@@ -32,14 +32,14 @@ impl KeptModel {
     ) -> Result<Self, MotionFileError> {
         let file = match MotionFile::of_store(store, train, at) {
             Ok(file) => file.filter(|file| file.layout == layout.name()),
-            Err(MotionFileError::OtherModel { .. }) => return Ok(Self::OfOtherFormulas),
+            Err(MotionFileError::OtherModel { .. }) => return Ok(Self::Outdated),
             Err(error) => return Err(error),
         };
         Ok(match file.map(|file| file.model(layout)) {
             None => Self::Nothing,
             Some(Ok(model)) => Self::Model(Box::new(model)),
-            // Numbers that make no model of today made one of their own day.
-            Some(Err(_)) => Self::OfOtherFormulas,
+            // Numbers that are not a model today may have been one in their own version.
+            Some(Err(_)) => Self::Outdated,
         })
     }
 }

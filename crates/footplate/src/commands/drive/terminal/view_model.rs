@@ -1,4 +1,4 @@
-//! What the board shows, as far as a terminal has room for it.
+//! What the terminal view shows, collected from the board.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -6,22 +6,22 @@ use serde::Deserialize;
 
 use crate::dashboard::{Board, LayoutPicture};
 
-/// Lines that can be scrolled back to.
+/// Messages kept for scrolling.
 const LINES_KEPT: usize = 1_000;
 
-/// Everything to draw.
-pub(super) struct Seen {
+/// Everything that is drawn.
+pub(super) struct TerminalModel {
     pub(super) layout: String,
-    /// Rails by the number of their edge: both ends, and how long they are.
+    /// Drawn edges by their number.
     pub(super) rails: BTreeMap<u16, Rail>,
-    pub(super) contacts: Vec<(f64, f64)>,
+    pub(super) sensors: Vec<(f64, f64)>,
     pub(super) picture: Picture,
-    /// By train, the contact that was passed last.
+    /// The last detection of each train.
     pub(super) passed: BTreeMap<u16, Passed>,
     pub(super) lines: VecDeque<String>,
-    /// How many lines back the last one stands that is shown.
+    /// How many messages the view is scrolled back by.
     pub(super) back: usize,
-    /// The number of the next happening.
+    /// The number of the next happening to read.
     next: u64,
 }
 
@@ -63,7 +63,8 @@ pub(super) struct Span {
 #[derive(Debug, Deserialize)]
 pub(super) struct Passed {
     train: u16,
-    pub(super) contact: String,
+    #[serde(rename = "contact")]
+    pub(super) sensor: String,
     pub(super) late_ms: Option<f64>,
     pub(super) short_mm: Option<f64>,
     pub(super) next: Option<Due>,
@@ -71,7 +72,8 @@ pub(super) struct Passed {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Due {
-    pub(super) contact: String,
+    #[serde(rename = "contact")]
+    pub(super) sensor: String,
     pub(super) t_s: f64,
     pub(super) half_ms: f64,
 }
@@ -84,7 +86,7 @@ struct Line {
 #[derive(Deserialize)]
 struct Alarm {
     text: String,
-    /// There is a line of it.
+    /// Whether a line of text says the same.
     is_said: bool,
 }
 
@@ -110,9 +112,9 @@ struct Edge {
     length_mm: f64,
 }
 
-impl Seen {
+impl TerminalModel {
     /// # Errors
-    /// The layout cannot be read as browsers read it: a mistake of ours.
+    /// The layout picture has another shape than browsers expect: a bug.
     pub(super) fn of(layout: &LayoutPicture) -> anyhow::Result<Self> {
         let Drawn { name, nodes, edges } = serde_json::from_value(serde_json::to_value(layout)?)?;
         let points: BTreeMap<u16, [f64; 2]> =
@@ -121,11 +123,11 @@ impl Seen {
             let (from, to) = (*points.get(&edge.from)?, *points.get(&edge.to)?);
             Some((edge.id, Rail { from, to, length_mm: edge.length_mm }))
         };
-        let contacts = nodes.iter().filter(|node| node.kind == "contact").filter_map(|node| node.point);
+        let sensors = nodes.iter().filter(|node| node.kind == "contact").filter_map(|node| node.point);
         Ok(Self {
             layout: name,
             rails: edges.iter().filter_map(rail).collect(),
-            contacts: contacts.map(|[x, y]| (x, y)).collect(),
+            sensors: sensors.map(|[x, y]| (x, y)).collect(),
             picture: Picture::default(),
             passed: BTreeMap::new(),
             lines: VecDeque::new(),
@@ -134,13 +136,13 @@ impl Seen {
         })
     }
 
-    /// Takes in what is new.
+    /// Reads the news of the board.
     pub(super) fn look(&mut self, board: &Board) {
-        // Before the first picture there is none.
+        // There is no picture before the first one is painted.
         if let Ok(picture) = serde_json::from_str(&board.pictures().borrow()) {
             self.picture = picture;
         }
-        let (happened, _) = board.happened_from(self.next);
+        let (happened, _) = board.events_from(self.next);
         for happening in happened {
             self.next = happening.number + 1;
             match happening.kind {
@@ -164,26 +166,26 @@ impl Seen {
         }
     }
 
-    /// One more line.
+    /// Appends a message.
     pub(super) fn say(&mut self, line: String) {
         self.lines.push_back(line);
         if self.lines.len() > LINES_KEPT {
             self.lines.pop_front();
         }
-        // Who has scrolled back goes on looking at the same lines.
+        // A view that is scrolled back keeps showing the same messages.
         if self.back > 0 {
             self.scroll(0);
             self.back = (self.back + 1).min(self.lines.len());
         }
     }
 
-    /// Scrolls some lines back, or on.
+    /// Scrolls back by pages; negative towards the newest message.
     pub(super) fn scroll(&mut self, pages: isize) {
         const PAGE: isize = 5;
         self.back = self.back.saturating_add_signed(pages * PAGE).min(self.lines.len().saturating_sub(1));
     }
 
-    /// The ends of a part of a rail.
+    /// The ends of a part of an edge, as drawn.
     pub(super) fn ends(&self, span: Span) -> Option<[[f64; 2]; 2]> {
         let rail = self.rails.get(&span.edge)?;
         let at = |mm: f64| {
