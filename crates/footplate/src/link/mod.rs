@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  a station on Märklin's CAN bus
+//! can_address  loconet_address  a station on Märklin's CAN bus; a LocoNet server
 //! z21_address  datagrams  a Z21: its address, and the line to it over UDP
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
@@ -22,6 +22,7 @@ mod board_address;
 mod can_address;
 mod datagrams;
 mod line;
+mod loconet_address;
 mod observed;
 mod open;
 mod port;

@@ -119,7 +119,11 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
                 let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
                 let opened = store.as_ref().map(stop).transpose()?.flatten();

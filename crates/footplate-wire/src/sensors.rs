@@ -1,14 +1,14 @@
-//! Which sensors are occupied, and what a message about one of them means.
+//! Which sensors are occupied, where the line loses and repeats no messages, and what a message about one of them means.
 
 use alloc::vec::Vec;
 
-/// The sensors that the board has spoken of, in the order of their numbers there.
+/// The sensors that the station has reported, in the order of their numbers there.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Sensors(Vec<(u16, bool)>);
+pub(crate) struct Sensors(Vec<(u16, bool)>);
 
 /// What a message means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Change {
+pub(crate) enum Change {
     /// It has become occupied.
     Occupied,
     /// It is occupied, and was before it was first asked for.
@@ -20,7 +20,7 @@ pub(super) enum Change {
 impl Sensors {
     /// A sensor is occupied or free. `listing`: the states are being asked for, so that the first word about a sensor is no
     /// change.
-    pub(super) fn heard(&mut self, id: u16, active: bool, listing: bool) -> Change {
+    pub(crate) fn heard(&mut self, id: u16, active: bool, listing: bool) -> Change {
         let before = match self.0.binary_search_by_key(&id, |(id, _)| *id) {
             Ok(at) => self.0.get_mut(at).map(|(_, state)| core::mem::replace(state, active)),
             Err(at) => {
