@@ -1,7 +1,7 @@
 //! The line that a guardian holds: opened when its child asks, and again for ever when trains have to be stopped.
 
 use std::io::Write;
-use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -31,12 +31,14 @@ pub(super) struct HeldLine {
     cts: Arc<AtomicU8>,
     /// Which opening it is: what is heard of an earlier one is of no interest. An even number: the line is gone.
     opening: Arc<AtomicU32>,
+    /// Whether the station has said anything since this was cleared.
+    has_heard: Arc<AtomicBool>,
 }
 
 impl HeldLine {
     pub(super) fn new(cable: Cable, ear: Ear) -> Self {
         let cts = Arc::new(AtomicU8::new(cts_byte(None)));
-        Self { cable, ear, writer: None, cts, opening: Arc::default() }
+        Self { cable, ear, writer: None, cts, opening: Arc::default(), has_heard: Arc::default() }
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -53,7 +55,7 @@ impl HeldLine {
         let this = (self.opening.load(Ordering::Acquire) + 1) | 1;
         self.opening.store(this, Ordering::Release);
         let (opening, ear, cts) = (Arc::clone(&self.opening), Arc::clone(&self.ear), Arc::clone(&self.cts));
-        let name = self.cable.to_string();
+        let (name, has_heard) = (self.cable.to_string(), Arc::clone(&self.has_heard));
         let end = self.cable.open(move |arrival| {
             if opening.load(Ordering::Acquire) != this {
                 return false;
@@ -64,7 +66,10 @@ impl HeldLine {
                 let _ = ear.as_mut().map(|child| child.send(kind, bytes));
             };
             match arrival {
-                Arrival::Bytes(bytes) => told(Kind::Heard, bytes),
+                Arrival::Bytes(bytes) => {
+                    has_heard.store(true, Ordering::Release);
+                    told(Kind::Heard, bytes);
+                }
                 Arrival::Cts(up) => {
                     cts.store(cts_byte(Some(up)), Ordering::Release);
                     told(Kind::Cts, &[up.into()]);
@@ -139,6 +144,7 @@ impl HeldLine {
     }
 
     fn try_to_carry_out(&mut self, will: &[u8]) -> Result<(), Lost> {
+        self.has_heard.store(false, Ordering::Release);
         let mut rest = will;
         while let [a, b, c, d, low, high, more @ ..] = rest {
             let pause = u32::from_le_bytes([*a, *b, *c, *d]);
@@ -151,7 +157,14 @@ impl HeldLine {
         }
         // A line that went during the last bytes did not carry them.
         std::thread::sleep(REOPEN_EVERY);
-        if self.is_open() { Ok(()) } else { Err(Lost(format!("`{}` is gone", self.cable))) }
+        if !self.is_open() {
+            return Err(Lost(format!("`{}` is gone", self.cable)));
+        }
+        // Datagrams vanish without notice. A station that exchanges them answers each command.
+        if self.cable.has_datagrams() && !self.has_heard.load(Ordering::Acquire) {
+            return Err(Lost(format!("{} does not answer", self.cable)));
+        }
+        Ok(())
     }
 
     /// Waits until the station takes the next byte, where its hand-shake line can be read.

@@ -216,7 +216,7 @@ mod tests {
 
     use super::*;
     use crate::guardian::ward_link::WardLink;
-    use crate::link::{Address, Heard, Link, StreamLink};
+    use crate::link::{Address, CableLink, Heard, Link};
 
     /// Bytes that are answered.
     const TURNS: usize = 20_000;
@@ -285,7 +285,7 @@ mod tests {
     #[ignore = "measures: cargo nextest run -p footplate -E 'test(what_a_guardian_costs)' --run-ignored all --no-capture"]
     fn what_a_guardian_costs() {
         let cable = echo();
-        let direct = turns(&mut StreamLink::open(cable.clone()).expect("a line"));
+        let direct = turns(&mut CableLink::open(cable.clone()).expect("a line"));
         let held = turns(&mut guarded(&cable));
         for (name, share) in [("median", 0.5), ("p99", 0.99), ("p99.9", 0.999)] {
             let of = |turns: &[f64]| turns[(share * (TURNS - 1) as f64) as usize];

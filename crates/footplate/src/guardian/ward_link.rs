@@ -10,7 +10,7 @@ use footplate_core::{TimeSpan, Timestamp};
 use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
 use super::ward::connection;
 use crate::clock::Stopwatch;
-use crate::link::{Bequest, Cable, Guardian, Heard, Link, Lost, PERSON_MS, StreamLink};
+use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
 use crate::runtime::StopFlag;
 
 /// How often a guardian is told that its child lives: five times as often as it has to.
@@ -30,7 +30,7 @@ pub(crate) struct WardLink {
     runs: bool,
     is_orphan: bool,
     /// The line, held by this process after the guardian's death.
-    own: Option<StreamLink>,
+    own: Option<CableLink>,
 }
 
 impl WardLink {
@@ -105,6 +105,9 @@ impl WardLink {
     fn hear(&mut self, within: Duration) -> IoResult<Heard> {
         Ok(match self.frames.next(Some(within))? {
             Some((Kind::Heard, bytes)) => {
+                if self.cable.has_datagrams() {
+                    return Ok(Heard::Datagram(bytes.to_vec()));
+                }
                 self.bytes.extend(bytes);
                 self.bytes.pop_front().map_or(Heard::Nothing, Heard::Byte)
             }
@@ -174,7 +177,7 @@ impl Link for WardLink {
             return self.have_opened();
         }
         // Without a guardian no train runs: the line is opened to stop them.
-        self.own = Some(StreamLink::open(self.cable.clone())?);
+        self.own = Some(CableLink::open(self.cable.clone())?);
         StopFlag::raise();
         eprintln!("without a guardian all trains are stopped, and the program ends");
         Ok(())
