@@ -11,7 +11,7 @@ use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
 use super::ward::connection;
 use crate::clock::Stopwatch;
 use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
-use crate::runtime::StopFlag;
+use crate::runtime::{StopFlag, written};
 
 /// How often a guardian is told that its child lives: five times as often as it has to.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
@@ -169,6 +169,10 @@ impl Link for WardLink {
         TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed())
     }
 
+    fn real_time(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
     fn reopen(&mut self) -> Result<(), Lost> {
         if let Some(own) = &mut self.own {
             return own.reopen();
@@ -190,14 +194,7 @@ impl Link for WardLink {
 
 impl Guardian for WardLink {
     fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
-        let mut bytes = Vec::new();
-        for Bequest { after, bytes: part } in will {
-            let pause_us = (after.as_s() * 1e6 / self.cable.speed()).clamp(0.0, f64::from(u32::MAX));
-            bytes.extend((pause_us as u32).to_le_bytes());
-            bytes.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
-            bytes.extend(part);
-        }
-        self.tell(Kind::Will, &bytes)
+        self.tell(Kind::Will, &written(will, self.cable.speed()))
     }
 
     fn note_running(&mut self, runs: bool) -> Result<(), Lost> {

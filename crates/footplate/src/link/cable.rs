@@ -220,6 +220,10 @@ impl Link for CableLink {
         TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed)
     }
 
+    fn real_time(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
     fn reopen(&mut self) -> Result<(), Lost> {
         self.line = None;
         self.line = Some(open(&self.cable)?);

@@ -45,6 +45,6 @@ pub(crate) use open::{module_count, open, open_session, open_simulated, station}
 pub(crate) use rhythm::Rhythm;
 pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
-pub(crate) use simulated_station::SimulatedStation;
+pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
 pub(crate) use station_session::StationSession;
 pub(crate) use tapped::{Passed, TappedLink};
