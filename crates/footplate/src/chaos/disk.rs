@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use anyhow::{Context, bail, ensure};
-use footplate_core::{Event, TimeSpan, Timestamp};
+use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
 use footplate_eval::choice::Choice;
 use footplate_store::{Journal, JournalEntry, NewMachine, Side, Store, Traced};
 
@@ -58,6 +58,7 @@ impl FaultyDisk {
     /// Begins a session in the store at `path`.
     pub(super) fn begin(
         path: &Path,
+        trains: &[TrainId],
         life: Rc<Life>,
         troubles: &[Planned],
         if_unkept: IfUnkept,
@@ -66,7 +67,9 @@ impl FaultyDisk {
     ) -> anyhow::Result<Self> {
         let store = Store::open_or_create(path)?;
         let mut journal = Journal::begin(store, "chaos", "track-a", None, &[], calendar)?;
-        journal.begin_machine(NewMachine { kind: "drive", program: "chaos", body: "{}" }, calendar)?;
+        let trains: Vec<_> = trains.iter().map(|train| serde_json::json!({ "train": train.0 })).collect();
+        let body = serde_json::json!({ "trains": trains }).to_string();
+        journal.begin_machine(NewMachine { kind: "drive", program: "chaos", body: &body }, calendar)?;
         Ok(Self {
             journal,
             path: path.to_owned(),

@@ -8,7 +8,7 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_eval::choice::Choice;
 
-use super::life::{Death, Life};
+use super::life::{Death, Life, Spell};
 use super::plan::{Planned, Trouble};
 use crate::link::{Bequest, FromSimulated, Guardian, Heard, Link, Lost, SimulatedStation};
 use crate::runtime::{WillLine, written};
@@ -113,6 +113,13 @@ impl<'l> FaultyLine<'l> {
 
     pub(super) fn is_cut(&self) -> bool {
         self.now_in(|trouble| (trouble == Trouble::Cut).then_some(())).is_some()
+    }
+
+    /// The spells, in the world's time, in which no command reaches the station.
+    pub(super) fn unreachable(&self) -> Vec<Spell> {
+        let cuts = self.troubles.iter().filter(|planned| planned.trouble == Trouble::Cut);
+        let at = |time: Timestamp| self.began + (time - Timestamp::ZERO);
+        cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
     }
 
     pub(super) fn is_orphan(&self) -> bool {
@@ -311,6 +318,9 @@ impl Link for FaultyLine<'_> {
                 && let Some((_, heard)) = self.arrivals.pop_front()
             {
                 return heard;
+            }
+            if !self.is_open && !self.has_datagrams {
+                return Heard::Lost(Lost("the line is gone".to_owned()));
             }
             if now >= until {
                 return Heard::Nothing;

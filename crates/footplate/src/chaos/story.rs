@@ -20,7 +20,7 @@ use footplate_sim::{
 use footplate_store::Store;
 
 use super::disk::FaultyDisk;
-use super::life::{Death, Life};
+use super::life::{Death, Life, Spell};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
@@ -41,6 +41,8 @@ const TRIES: usize = 1_000;
 const STOPPED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 /// From a byte on the line until a decoder has heard it: the refresh of the slowest station, with a margin.
 const HEARD_WITHIN: TimeSpan = TimeSpan::from_ms(500);
+/// Until trains that are commanded to stop have stopped.
+const BRAKES_WITHIN: TimeSpan = TimeSpan::from_ms(4_000);
 /// The calendar of the computer when a story begins; any other would do.
 const CALENDAR: Timestamp = Timestamp::from_s(1.7e9);
 
@@ -82,6 +84,8 @@ pub(crate) struct Fate {
     pub(crate) alarms: u32,
     pub(crate) grants: u32,
     pub(crate) intrusions: u32,
+    /// Mishaps while no command could reach the station.
+    pub(crate) out_of_reach: u32,
     /// From each death until all trains were stopped, in ms.
     pub(crate) stopped_ms: Vec<f64>,
     /// What must not be.
@@ -260,6 +264,7 @@ impl<'l> Teller<'_, 'l> {
         let calendar = self.calendar();
         let disk = FaultyDisk::begin(
             self.store,
+            &TRAINS,
             Rc::clone(&life),
             &planned.troubles,
             planned.if_unkept,
@@ -304,7 +309,8 @@ impl<'l> Teller<'_, 'l> {
         if let Some(trouble) = trouble {
             self.fail(format!("the journal failed: {trouble}"));
         }
-        self.check_mishaps(mishaps);
+        let unreachable = line.unreachable();
+        self.check_mishaps(mishaps, &unreachable);
         self.bury(death, began, &mut line, disk)
     }
 
@@ -319,9 +325,18 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    fn check_mishaps(&mut self, before: usize) {
+    /// What trains have come to. While no command reaches the station, and until trains have stopped after that, nobody could
+    /// have done anything about it.
+    fn check_mishaps(&mut self, before: usize, unreachable: &[Spell]) {
         let mishaps: Vec<_> = self.station.borrow().world().mishaps().iter().skip(before).copied().collect();
         for mishap in mishaps {
+            let is_helpless =
+                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(mishap.at);
+            if unreachable.iter().any(is_helpless) {
+                self.note(format!("out of reach: {:?} of {:?}", mishap.kind, mishap.train));
+                self.fate.out_of_reach += 1;
+                continue;
+            }
             self.fail(format!("{:?} of {:?} at {:.2} s", mishap.kind, mishap.train, mishap.at.as_s()));
         }
     }

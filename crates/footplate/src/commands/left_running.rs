@@ -51,6 +51,8 @@ pub(crate) fn stop_all(
 fn said(unfinished: &UnfinishedSession) -> String {
     let UnfinishedSession { name, trains } = unfinished;
     let trains = trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let which = if trains.is_empty() { String::new() } else { format!("; commanded to run in it: {trains}") };
-    format!("the session `{name}` has not ended, so its trains may be running: all are stopped first{which}")
+    let which = if trains.is_empty() { String::new() } else { format!(": {trains}") };
+    format!(
+        "the session `{name}` has not ended: every known train may be running and is stopped first{which}"
+    )
 }

@@ -86,6 +86,7 @@ fn write(fates: &[Fate], output: &mut dyn Write) -> std::io::Result<()> {
         )?;
     }
     writeln!(output, "{} arrivals, {} alarms", sum(|fate| fate.arrivals), sum(|fate| fate.alarms))?;
+    writeln!(output, "{} mishaps while no command could reach the station", sum(|fate| fate.out_of_reach))?;
     let (entered, set) = (sum(|fate| fate.intrusions) as usize, sum(|fate| fate.grants) as usize);
     let [low, high] = binomial_interval(entered, set).map(|part| 100.0 * part);
     writeln!(
