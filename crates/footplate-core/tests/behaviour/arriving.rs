@@ -1,7 +1,7 @@
 //! A train stands where it was ordered to when it was ordered to, or says at once which times it could keep.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Order, Refusal};
+use footplate_core::control::{Driver, Notice, Order, Refusal};
 use footplate_core::{TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, driver_of_both_ways as driver_of, step};
@@ -62,7 +62,7 @@ fn a_train_at_rest_with_time_to_spare_waits_before_it_starts() {
     world.run(&mut driver, 60.0);
     assert_eq!(world.train().travelled_mm, 0.0, "it waits");
     let starts = world.notices.iter().find_map(|notice| match notice {
-        DriveNotice::Arrives(plan) => plan.starts,
+        Notice::Arrives(plan) => plan.starts,
         _ => None,
     });
     let (starts, _) = starts.expect("a start");

@@ -2,7 +2,7 @@
 //! to nobody where nobody was; a train that cannot be told from another is waited for, and one that is lost is said to be.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Order};
+use footplate_core::control::{Driver, Notice, Order};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -30,7 +30,7 @@ fn two_trains() -> (ToyRailway, Driver) {
 fn laid(world: &ToyRailway) -> [usize; 2] {
     let mut counted = [0; 2];
     for notice in &world.notices {
-        let DriveNotice::Passed { train, passed, .. } = notice else { continue };
+        let Notice::Passed { train, passed, .. } = notice else { continue };
         let slack = TimeSpan::from_ms(2);
         let (from, until) = (passed.window.after - slack, passed.window.until + slack);
         let really = world
@@ -78,11 +78,8 @@ fn a_silent_contact_and_a_turnout_that_did_not_move_at_once_are_looked_past() {
     // when a train comes by both,
     world.run(&mut driver, 9.0);
     // then it is believed once the contact after that says so, and the turnout with it.
-    let lies = |notice: &DriveNotice| {
-        matches!(
-            notice,
-            DriveNotice::TurnoutLiesOtherwise { turnout: TurnoutId(1), curved: false, train: FIRST }
-        )
+    let lies = |notice: &Notice| {
+        matches!(notice, Notice::TurnoutMismatch { turnout: TurnoutId(1), curved: false, train: FIRST })
     };
     assert!(world.notices.iter().any(lies), "{:#?}", world.notices);
     assert_eq!(laid(&world)[1], 0);
@@ -98,13 +95,12 @@ fn a_contact_that_closes_by_itself_moves_nobody_and_is_not_believed_until_it_beh
         world.close(contact);
         world.run(&mut driver, 8.0);
     }
-    let said = |is: fn(&DriveNotice) -> bool| world.notices.iter().filter(|notice| is(notice)).count();
-    assert_eq!(said(|notice| matches!(notice, DriveNotice::Unexplained { .. })), 2);
-    assert_eq!(said(|notice| matches!(notice, DriveNotice::ContactStuck { .. })), 1);
+    let said = |is: fn(&Notice) -> bool| world.notices.iter().filter(|notice| is(notice)).count();
+    assert_eq!(said(|notice| matches!(notice, Notice::Unexplained { .. })), 2);
+    assert_eq!(said(|notice| matches!(notice, Notice::SensorStuck { .. })), 1);
     assert_eq!(laid(&world)[1], 0);
     world.run(&mut driver, 200.0);
-    let behaves =
-        |notice: &DriveNotice| matches!(notice, DriveNotice::ContactBehaves { sensor } if *sensor == contact);
+    let behaves = |notice: &Notice| matches!(notice, Notice::SensorRestored { sensor } if *sensor == contact);
     assert!(world.notices.iter().any(behaves));
 }
 
@@ -116,7 +112,7 @@ fn a_train_that_one_contact_missed_is_not_moved_by_another_that_closes_by_itself
     run(&mut driver, &world, FIRST, step(8));
     run(&mut driver, &world, SECOND, step(8));
     let unseen = |world: &ToyRailway| {
-        world.notices.iter().any(|notice| matches!(notice, DriveNotice::Overdue { train: FIRST, .. }))
+        world.notices.iter().any(|notice| matches!(notice, Notice::Overdue { train: FIRST, .. }))
     };
     assert!(world.run_until(&mut driver, 10.0, unseen), "{:#?}", world.notices);
     // when one closes that it cannot have come to, and another train passes the next,
@@ -138,7 +134,7 @@ fn a_train_that_stands_closes_nothing() {
     }
     assert_eq!(laid(&world), [0, 0]);
     assert_eq!(world.notices.len(), 2, "{:#?}", world.notices);
-    assert!(world.notices.iter().all(|notice| matches!(notice, DriveNotice::Unexplained { .. })));
+    assert!(world.notices.iter().all(|notice| matches!(notice, Notice::Unexplained { .. })));
 }
 
 #[test]
@@ -155,7 +151,7 @@ fn of_two_lost_trains_neither_takes_a_contact_that_may_be_the_other_s() {
     // when contacts close,
     world.run(&mut driver, 8.0);
     // then that is said, and nobody is taken for the other.
-    let ambiguous = |notice: &DriveNotice| matches!(notice, DriveNotice::Ambiguous { or: Some(_), .. });
+    let ambiguous = |notice: &Notice| matches!(notice, Notice::Ambiguous { or: Some(_), .. });
     assert!(world.notices.iter().any(ambiguous), "{:#?}", world.notices);
     assert_eq!(laid(&world)[1], 0);
     // With one of them at rest the other is found at its next contact.
@@ -172,7 +168,7 @@ fn a_train_is_lost_when_two_contacts_in_a_row_have_been_silent() {
     world.trains.retain(|toy| toy.id != FIRST);
     let lifted: Timestamp = world.now;
     let lost = |world: &ToyRailway| {
-        world.notices.iter().any(|notice| matches!(notice, DriveNotice::Lost { train: FIRST }))
+        world.notices.iter().any(|notice| matches!(notice, Notice::Lost { train: FIRST }))
     };
     assert!(world.run_until(&mut driver, 60.0, lost), "{:#?}", world.notices);
     // A1 is 600 mm ahead of where it was and B1 700 mm further, at 256 mm/s.

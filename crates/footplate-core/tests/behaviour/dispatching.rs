@@ -4,8 +4,7 @@
 use std::sync::OnceLock;
 
 use footplate_core::control::{
-    DispatchNotice, Dispatcher, Driver, Journey, LinkNews, Machine, Order, Output, Refusal, Reservation,
-    TrainLengths, WatchdogNotice,
+    Dispatcher, Driver, Journey, LinkNews, Machine, Notice, Order, Output, Refusal, Reservation, TrainLengths,
 };
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position};
@@ -38,7 +37,7 @@ fn model(train: TrainId) -> MotionModel {
 pub(crate) struct Traffic {
     pub(crate) world: ToyRailway,
     pub(crate) dispatcher: Dispatcher,
-    pub(crate) notices: Vec<DispatchNotice>,
+    pub(crate) notices: Vec<Notice>,
     bodies: [ToyBody; 2],
     /// What went wrong, if anything did.
     pub(crate) wrongs: Vec<String>,
@@ -148,7 +147,8 @@ impl Traffic {
     }
 
     fn arrivals(&self, train: TrainId) -> usize {
-        let here = |notice: &&DispatchNotice| matches!(notice, DispatchNotice::Arrived { train: arrived, .. } if *arrived == train);
+        let here =
+            |notice: &&Notice| matches!(notice, Notice::Arrived { train: arrived, .. } if *arrived == train);
         self.notices.iter().filter(here).count()
     }
 }
@@ -174,7 +174,7 @@ fn a_train_goes_where_it_is_sent_and_another_makes_room() {
     traffic.run(120.0);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
     assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
-    let aside = |notice: &DispatchNotice| matches!(notice, DispatchNotice::StepsAside { .. });
+    let aside = |notice: &Notice| matches!(notice, Notice::StepsAside { .. });
     assert!(traffic.notices.iter().any(aside), "{:#?}", traffic.notices);
 }
 
@@ -204,7 +204,7 @@ fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() 
     traffic.run(60.0);
     // then it comes there, and nobody has to say where it stands.
     assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
-    let lost = |notice: &DispatchNotice| matches!(notice, DispatchNotice::HeldAsUnknown { .. });
+    let lost = |notice: &Notice| matches!(notice, Notice::ReservedAsUnknown { .. });
     assert!(!traffic.notices.iter().any(lost), "{:#?}", traffic.notices);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
 }
@@ -265,14 +265,11 @@ fn a_journey_that_a_silent_station_interrupted_is_ended_once_the_train_has_been_
     assert!(traffic.world.trains[0].speed_mm_per_s < 1.0);
     traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Answers);
     traffic.run(200.0);
-    let watched = |wanted: fn(&WatchdogNotice) -> bool| {
-        let found =
-            |notice: &&DispatchNotice| matches!(notice, DispatchNotice::Watch(notice) if wanted(notice));
-        traffic.notices.iter().filter(found).count()
-    };
-    assert_eq!(watched(|notice| matches!(notice, WatchdogNotice::Danger { .. })), 1);
+    let watched =
+        |wanted: fn(&Notice) -> bool| traffic.notices.iter().filter(|notice| wanted(notice)).count();
+    assert_eq!(watched(|notice| matches!(notice, Notice::Danger { .. })), 1);
     assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
-    assert_eq!(watched(|notice| matches!(notice, WatchdogNotice::Recovered { .. })), 1);
+    assert_eq!(watched(|notice| matches!(notice, Notice::Recovered { .. })), 1);
     assert_eq!(traffic.arrivals(TRAINS[0]), 1);
 }
 

@@ -2,7 +2,7 @@
 //! report that may not come.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Aim, DriveNotice, Driver, Order, Refusal, StopOrder};
+use footplate_core::control::{Aim, Driver, Notice, Order, Refusal, StopOrder};
 use footplate_core::link::TimeModel;
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Command, Length, Ratio, SensorId, TimeSpan, TrainId, TurnoutId};
@@ -165,8 +165,8 @@ fn a_train_that_has_vanished_is_given_up_and_told_to_stop() {
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
     world.dead = (0..12).map(SensorId).collect();
     world.run(&mut driver, 60.0);
-    assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::Overdue { train: TRAIN, .. })));
-    assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::Lost { train: TRAIN })));
+    assert!(world.notices.iter().any(|notice| matches!(notice, Notice::Overdue { train: TRAIN, .. })));
+    assert!(world.notices.iter().any(|notice| matches!(notice, Notice::Lost { train: TRAIN })));
     assert!(world.train().speed_mm_per_s < 1.0);
     let lost = driver.order(world.now, Order::Move { train: TRAIN, distance: Length::from_mm(50.0) });
     assert_eq!(lost, Err(Refusal::Lost { train: TRAIN }));
@@ -200,7 +200,7 @@ fn a_train_never_runs_off_the_end_of_the_track() {
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
         world.run(&mut driver, 40.0);
         assert!(!world.train().is_off_the_track && world.train().speed_mm_per_s < 1.0);
-        assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::TrackEnds { .. })));
+        assert!(world.notices.iter().any(|notice| matches!(notice, Notice::TrackEnds { .. })));
     }
 }
 
@@ -218,7 +218,7 @@ fn a_train_stays_within_its_limit_whatever_it_was_ordered_and_whatever_is_report
         world.run(&mut driver, 40.0);
         let beyond = world.beyond_mm("D1+2000mm");
         assert!((-400.0..0.0).contains(&beyond) && world.train().speed_mm_per_s < 1.0, "{beyond} mm");
-        assert!(world.notices.iter().any(|notice| matches!(notice, DriveNotice::AtLimit { .. })));
+        assert!(world.notices.iter().any(|notice| matches!(notice, Notice::AuthorityEnds { .. })));
         // Where it was turned around nobody allowed it to go.
         driver.order(world.now, Order::Reverse { train: TRAIN, then: step(throttle) }).expect("a train");
         let before = world.train().travelled_mm;
@@ -243,9 +243,8 @@ fn a_stop_beyond_the_limit_ends_at_the_limit() {
     );
     driver.order(world.now, Order::Stop(stop)).expect("a way leads there");
     world.run(&mut driver, 20.0);
-    let given_up = |notice: &DriveNotice| {
-        matches!(notice, DriveNotice::GivenUp { why: Refusal::AtLimit { train: TRAIN }, .. })
-    };
+    let given_up =
+        |notice: &Notice| matches!(notice, Notice::GivenUp { why: Refusal::AtLimit { train: TRAIN }, .. });
     assert!(world.notices.iter().any(given_up), "{:#?}", world.notices);
     assert!((-200.0..0.0).contains(&world.beyond_mm("A1+200mm")), "{} mm", world.beyond_mm("A1+200mm"));
 }
@@ -272,8 +271,8 @@ fn a_turnout_that_did_not_move_is_found_out_by_where_the_train_went() {
     world.run(&mut driver, 0.5);
     driver.order(world.now, Order::Stop(stop_at(&driver, "D1+200mm"))).expect("round over C");
     assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
-    let otherwise = |notice: &DriveNotice| {
-        matches!(notice, DriveNotice::TurnoutLiesOtherwise { turnout: TurnoutId(1), curved: false, .. })
+    let otherwise = |notice: &Notice| {
+        matches!(notice, Notice::TurnoutMismatch { turnout: TurnoutId(1), curved: false, .. })
     };
     assert!(world.notices.iter().any(otherwise), "{:#?}", world.notices);
     assert!(world.beyond_mm("D1+200mm").abs() < 30.0, "{} mm", world.beyond_mm("D1+200mm"));

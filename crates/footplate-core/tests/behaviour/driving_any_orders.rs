@@ -3,7 +3,7 @@
 
 use std::sync::OnceLock;
 
-use footplate_core::control::{Aim, DriveNotice, Driver, Machine, Order, Output, Refusal, StopOrder};
+use footplate_core::control::{Aim, Driver, Machine, Notice, Order, Output, Refusal, StopOrder};
 use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::tracking::WayPoint;
@@ -154,7 +154,7 @@ proptest! {
                 match output {
                     Output::Command(command) => waiting.push(command),
                     // By its own forecast a stop never ends beyond the target in the middle of what may be.
-                    Output::Notice(DriveNotice::Planned(plan)) => {
+                    Output::Notice(Notice::Planned(plan)) => {
                         prop_assert!(plan.promise.median <= Length::from_mm(1.0), "{plan:?}");
                     }
                     _ => {}
@@ -180,8 +180,8 @@ proptest! {
             refused @ Err(_) => prop_assert!(false, "{refused:?}"),
             Ok(order) => {
                 let ended = |world: &ToyRailway| world.notices.iter().any(|notice| match notice {
-                    DriveNotice::Done(finished) => finished.order == order,
-                    DriveNotice::GivenUp { order: given_up, .. } => *given_up == order,
+                    Notice::Done(finished) => finished.order == order,
+                    Notice::GivenUp { order: given_up, .. } => *given_up == order,
                     _ => false,
                 });
                 prop_assert!(world.run_until(&mut driver, 90.0, ended), "{:#?}", world.notices);

@@ -1,7 +1,7 @@
 //! A train keeps its gap to the one ahead, never comes too near to it, and refuses what could not be safe.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Gap, Order, Refusal};
+use footplate_core::control::{Driver, Gap, Notice, Order, Refusal};
 use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -105,7 +105,7 @@ fn a_contact_that_fails_under_the_leader_alone_neither_stops_its_follower_nor_se
         world.run(&mut driver, 0.1);
     }
     assert!(failed > 3, "once a round");
-    let held_back = |notice: &DriveNotice| matches!(notice, DriveNotice::HeldBack { .. });
+    let held_back = |notice: &Notice| matches!(notice, Notice::HeldBack { .. });
     assert!(!world.notices[notices..].iter().any(held_back));
     let gaps = gaps(&world, since);
     let off = gaps.iter().map(|gap| (gap - 3.0).abs()).fold(0.0, f64::max);
@@ -128,7 +128,7 @@ fn a_follower_slows_down_behind_a_slower_leader_and_is_not_stopped() {
         run_leader(&world, &mut driver, at);
         world.run(&mut driver, 15.0);
     }
-    let held_back = |notice: &DriveNotice| matches!(notice, DriveNotice::HeldBack { .. });
+    let held_back = |notice: &Notice| matches!(notice, Notice::HeldBack { .. });
     assert!(!world.notices[notices..].iter().any(held_back));
 }
 

@@ -1,7 +1,7 @@
 //! A train runs at any speed between its slowest and its fastest step, as exactly as contacts tell, and with few commands.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Order, PacedLine, Refusal};
+use footplate_core::control::{Driver, Notice, Order, PacedLine, Refusal};
 use footplate_core::{Command, Speed, TimeSpan, Timestamp, TrainId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -15,7 +15,7 @@ fn hold(mm_per_s: f64) -> Order {
 
 fn line(world: &ToyRailway) -> Option<PacedLine> {
     world.notices.iter().find_map(|notice| match notice {
-        DriveNotice::Paced(line) => Some(*line),
+        Notice::Paced(line) => Some(*line),
         _ => None,
     })
 }

@@ -2,7 +2,7 @@
 //! fast as it was told to be everywhere else.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{DriveNotice, Driver, Gap, Machine, Order, Refusal, StopOrder};
+use footplate_core::control::{Driver, Gap, Machine, Notice, Order, Refusal, StopOrder};
 use footplate_core::track::Zone;
 use footplate_core::{Command, EdgeId, Length, Speed, SpeedStep, TimeSpan, TrainId};
 
@@ -59,7 +59,7 @@ fn too_fast(world: &mut ToyRailway, driver: &mut Driver, seconds: f64) -> f64 {
 }
 
 fn restraints(world: &ToyRailway) -> usize {
-    let is_one = |notice: &&DriveNotice| matches!(notice, DriveNotice::Restrained { .. });
+    let is_one = |notice: &&Notice| matches!(notice, Notice::SpeedLimited { .. });
     world.notices.iter().filter(is_one).count()
 }
 
@@ -210,7 +210,7 @@ fn a_train_that_nobody_can_place_runs_no_faster_than_the_slowest_zone_allows() {
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(13) }).expect("a step");
     // The next contact tells where it is, and then it may be faster.
     let is_found =
-        |world: &ToyRailway| world.notices.iter().any(|notice| matches!(notice, DriveNotice::Passed { .. }));
+        |world: &ToyRailway| world.notices.iter().any(|notice| matches!(notice, Notice::Passed { .. }));
     while !is_found(&world) {
         world.run(&mut driver, 0.1);
         assert!(world.train().speed_mm_per_s <= LIMIT);

@@ -10,7 +10,7 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;
 
-use footplate_core::control::{DriveNotice, Driver, Finished, Machine, Output};
+use footplate_core::control::{Driver, Finished, Machine, Notice, Output};
 use footplate_core::model::MotionFit;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
@@ -143,7 +143,7 @@ pub(crate) struct ToyRailway {
     pub(crate) now: Timestamp,
     pub(crate) trains: Vec<ToyTrain>,
     pub(crate) events: Vec<Event>,
-    pub(crate) notices: Vec<DriveNotice>,
+    pub(crate) notices: Vec<Notice>,
     pub(crate) commands: Vec<(Timestamp, Command)>,
     /// Nothing that is told leaves the line.
     pub(crate) is_silent: bool,
@@ -318,8 +318,8 @@ impl ToyRailway {
     }
 
     pub(crate) fn finished(&self) -> Vec<Finished> {
-        let done = |notice: &DriveNotice| match notice {
-            DriveNotice::Done(finished) => Some(*finished),
+        let done = |notice: &Notice| match notice {
+            Notice::Done(finished) => Some(*finished),
             _ => None,
         };
         self.notices.iter().filter_map(done).collect()

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use footplate_core::control::{
-    Alarm, LinkNews, Machine, Order, Outcome, Output, Refusal, StopOrder, Watchdog, WatchdogNotice,
+    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, StopOrder, Watchdog,
 };
 use footplate_core::track::Landmark;
 use footplate_core::{
@@ -24,7 +24,7 @@ const SECOND: TrainId = TrainId(58);
 struct Watched {
     world: ToyRailway,
     dog: Watchdog,
-    said: Vec<WatchdogNotice>,
+    said: Vec<Notice>,
     commanded: Vec<(Timestamp, Command)>,
 }
 
@@ -96,14 +96,14 @@ impl Watched {
 
     fn alarm(&self) -> Option<Alarm> {
         self.said.iter().find_map(|notice| match notice {
-            WatchdogNotice::Danger { why, .. } => Some(*why),
+            Notice::Danger { why, .. } => Some(*why),
             _ => None,
         })
     }
 
     fn recovered(&self) -> Option<Outcome> {
         self.said.iter().find_map(|notice| match notice {
-            WatchdogNotice::Recovered { outcome, .. } => Some(*outcome),
+            Notice::Recovered { outcome, .. } => Some(*outcome),
             _ => None,
         })
     }
@@ -134,7 +134,7 @@ fn dirty_wheels_are_noticed_measured_and_made_up_for() {
     let Some(Outcome::Rescaled { ratio }) = watched.recovered() else { panic!("{:#?}", watched.said) };
     assert!((ratio - 0.8).abs() < 0.02, "{ratio}");
     // goes on with what it was doing,
-    assert!(watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::Resumed { train: FIRST, .. })));
+    assert!(watched.said.iter().any(|notice| matches!(notice, Notice::Resumed { train: FIRST, .. })));
     watched.run(20.0);
     assert!(watched.world.trains[0].speed_mm_per_s > 100.0);
     // and stops where it should.
@@ -188,7 +188,7 @@ fn what_could_meet_a_train_in_danger_is_held_and_goes_on_when_it_is_over() {
     assert!(watched.dog.is_held(SECOND) && !moves(&watched), "{:#?}", watched.said);
     // On a railway as small as this neither finds a way past the other: a person puts it right.
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
     assert!(watched.run_until(200.0, |watched| asks(watched) || watched.recovered().is_some()));
     assert!(!watched.world.trains.iter().any(|train| train.is_off_the_track));
@@ -247,7 +247,7 @@ fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_
     watched.run(4.0);
     watched.world.trains.clear();
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
     assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
     let stop = StopOrder::at(FIRST, Landmark { node: NodeId(0), offset: Length::from_mm(100.0) });
@@ -268,7 +268,7 @@ fn a_train_that_is_alone_and_could_not_be_brought_back_is_found_by_letting_it_ru
     watched.run(4.0);
     watched.world.trains.clear();
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
     assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
     // A hand puts it down somewhere else, and says nothing.
@@ -291,7 +291,7 @@ fn what_waited_for_a_train_that_a_person_put_down_is_said_to_be_dropped() {
     watched.run(4.0);
     watched.world.trains.retain(|train| train.id != FIRST);
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, WatchdogNotice::NeedsPerson { train: FIRST, .. }))
+        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
     assert!(watched.run_until(250.0, asks), "{:#?}", watched.said);
     assert!(watched.dog.is_held(SECOND), "{:#?}", watched.said);
@@ -302,7 +302,7 @@ fn what_waited_for_a_train_that_a_person_put_down_is_said_to_be_dropped() {
     assert!(
         watched.said.iter().skip(from).any(|notice| matches!(
             notice,
-            WatchdogNotice::Dropped { train: SECOND, order: Order::Speed { train: SECOND, .. } }
+            Notice::Cancelled { train: SECOND, order: Order::Speed { train: SECOND, .. } }
         )),
         "{:#?}",
         watched.said
@@ -318,7 +318,7 @@ fn who_is_asked_first_waits_for_the_answer() {
     watched.run(6.0);
     watched.dog.distrust(watched.world.now, FIRST);
     watched.run(30.0);
-    let asked = |notice: &WatchdogNotice| matches!(notice, WatchdogNotice::AsksToCrawl { train: FIRST });
+    let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
     assert_eq!(watched.said.iter().filter(|notice| asked(notice)).count(), 1);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
     watched.dog.permit(watched.world.now, FIRST);
@@ -424,16 +424,15 @@ proptest! {
                         }
                         waiting.push(command);
                     }
-                    Output::Notice(WatchdogNotice::Danger { train, stopped, why, .. }) => {
+                    Output::Notice(Notice::Danger { train, stopped, why, .. }) => {
                         prop_assert!(!why.to_string().is_empty());
                         must_stand.insert(train);
                         must_stand.extend(stopped);
                     }
-                    Output::Notice(WatchdogNotice::Crawls { train, .. }) => {
+                    Output::Notice(Notice::Creeps { train, .. }) => {
                         must_stand.remove(&train);
                     }
-                    Output::Notice(notice @ (WatchdogNotice::Recovered { .. } | WatchdogNotice::Resumed { .. })) => {
-                        prop_assert!(!notice.to_string().is_empty());
+                    Output::Notice(Notice::Recovered { .. } | Notice::Resumed { .. }) => {
                         must_stand.retain(|train| dog.is_held(*train));
                     }
                     _ => {}

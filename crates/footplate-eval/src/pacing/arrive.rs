@@ -1,7 +1,7 @@
 //! Trains commanded to stop at a place in time, beside trains that run there at the step with the mean speed.
 
 use anyhow::Context;
-use footplate_core::control::{DriveNotice, Order, OrderId, Refusal, StopOrder};
+use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -250,8 +250,8 @@ impl Trip<'_, '_> {
         while self.now() < patience {
             let look = patience.min(self.now() + LOOK);
             match self.stage.line.drive(&mut self.counted, look) {
-                Some(DriveNotice::Done(done)) if done.order == order => return Ok(()),
-                Some(DriveNotice::GivenUp { order: given_up, why, .. }) if given_up == order => {
+                Some(Notice::Done(done)) if done.order == order => return Ok(()),
+                Some(Notice::GivenUp { order: given_up, why, .. }) if given_up == order => {
                     return Err(why.to_string());
                 }
                 _ => {}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::control::{DriveNotice, Driver, Machine, Output};
+use footplate_core::control::{Driver, Machine, Notice, Output};
 use footplate_core::{Command, Event, Timestamp, TrainId};
 
 /// Passes everything on, and counts the steps told to each train.
@@ -23,7 +23,7 @@ impl Counted {
 }
 
 impl Machine for Counted {
-    type Notice = DriveNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.driver.handle_event(now, event);
@@ -33,7 +33,7 @@ impl Machine for Counted {
         self.driver.handle_timeout(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<DriveNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         let output = self.driver.poll_output()?;
         if let Output::Command(Command::Speed { train, .. }) = output {
             *self.steps.entry(train).or_default() += 1;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use footplate_core::control::{DriveNotice, Gap, Order, Refusal};
+use footplate_core::control::{Gap, Notice, Order, Refusal};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
@@ -261,15 +261,15 @@ impl<'a, 'l> Row<'a, 'l> {
             }
             let look = until.min(self.now() + LOOK);
             match self.stage.line.drive(&mut self.counted, look) {
-                Some(DriveNotice::HeldBack { train, .. }) => {
+                Some(Notice::HeldBack { train, .. }) => {
                     let held = self.followed.iter_mut().find(|followed| followed.train == train);
                     held.into_iter().for_each(|followed| followed.held_back += 1);
                 }
-                Some(DriveNotice::GivenUp { train, why, .. }) => {
+                Some(Notice::GivenUp { train, why, .. }) => {
                     let of = self.followed.iter_mut().find(|followed| followed.train == train);
                     of.into_iter().for_each(|followed| followed.trouble = Some(why.to_string()));
                 }
-                Some(DriveNotice::Passed { train, passed, .. }) if self.by == By::Steps => {
+                Some(Notice::Passed { train, passed, .. }) if self.by == By::Steps => {
                     self.step_up_or_down(train, passed.sensor, passed.window.middle());
                 }
                 Some(_) => {}

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::bail;
-use footplate_core::control::{
-    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
-};
+use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, TrainLengths};
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
@@ -194,43 +192,41 @@ impl<'l> Session<'l> {
         self.tally
     }
 
-    fn hear(&mut self, notice: &DispatchNotice) {
+    fn hear(&mut self, notice: &Notice) {
         let now = self.rehearsal.line.now();
-        if self.talk && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_))) {
+        if self.talk && !matches!(notice, Notice::Planned(_)) {
             eprintln!("{:9.2} {notice:?}", now.as_s());
         }
         match notice {
-            DispatchNotice::Arrived { train, error, took, .. } => {
+            Notice::Arrived { train, error, took, .. } => {
                 self.tally.arrivals += 1;
                 self.tally.took.push(took.as_s());
                 self.tally.errors.extend(error.map(Length::as_mm));
                 self.came_somewhere(*train, now);
                 self.send(*train);
             }
-            DispatchNotice::Drive(DriveNotice::GivenUp { train, why, .. })
-                if self.dispatcher.journey(*train).is_none() =>
-            {
+            Notice::GivenUp { train, why, .. } if self.dispatcher.journey(*train).is_none() => {
                 *self.tally.refused.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
                 self.send(*train);
             }
-            DispatchNotice::RouteSet { train, turns, .. } => {
+            Notice::RouteSet { train, turns, .. } => {
                 self.tally.routes += 1;
                 self.tally.turns += turns;
                 if let Some(since) = self.waits.remove(train) {
                     self.tally.waits.push((now - since).as_s());
                 }
             }
-            DispatchNotice::Withdrawn { train, why } => {
+            Notice::Withdrawn { train, why } => {
                 if self.talk {
                     self.tell_truth(*train);
                 }
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
-            DispatchNotice::Drive(DriveNotice::Done(finished)) => self.check_belief(finished),
-            DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
-            DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
-            DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
-            DispatchNotice::HeldAsUnknown { train } => {
+            Notice::Done(finished) => self.check_belief(finished),
+            Notice::StepsAside { .. } => self.tally.aside += 1,
+            Notice::Deadlock { .. } => self.tally.deadlocks += 1,
+            Notice::Diverged { .. } => self.tally.diverged += 1,
+            Notice::ReservedAsUnknown { train } => {
                 self.tally.lost += 1;
                 self.lost.insert(*train, now);
             }

@@ -1,7 +1,7 @@
 //! What is not as it should be, with which of the sentences of the pages says it.
 
 use footplate_core::control::learn::Mishap;
-use footplate_core::control::{Alarm as Noticed, DispatchNotice, DriveNotice, WatchdogNotice};
+use footplate_core::control::{Alarm as Noticed, Notice};
 use footplate_core::track::Layout;
 use footplate_core::tracking::Drift;
 use footplate_core::{HALF_95, Length, TrainId};
@@ -121,78 +121,51 @@ impl Alarm {
         Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })
     }
 
-    /// What a dispatcher, its watchdog or its driver says, if it is not as it should be.
-    pub(crate) fn of_dispatch(layout: &Layout, notice: &DispatchNotice) -> Option<Self> {
+    /// The alarm of a notice; `None` if the notice is no alarm.
+    pub(crate) fn of_notice(layout: &Layout, notice: &Notice) -> Option<Self> {
+        let name = |sensor: &footplate_core::SensorId| layout.sensor_name(*sensor).to_owned();
         let none = Vec::new();
-        Some(match notice {
-            DispatchNotice::Drive(notice) => return Self::of_drive(layout, notice),
-            DispatchNotice::Watch(notice) => return Self::of_watch(notice),
-            DispatchNotice::Deadlock { train, moves } => {
-                Self::new(Grade::Warning, "deadlock", *train, vec![listed(moves)])
-            }
-            DispatchNotice::Diverged { train, stopped } if stopped.is_empty() => {
-                Self::new(Grade::Danger, "diverged", *train, none)
-            }
-            DispatchNotice::Diverged { train, stopped } => {
-                Self::new(Grade::Danger, "diverged-and-others", *train, vec![listed(stopped)])
-            }
-            DispatchNotice::HeldAsUnknown { train } => {
-                Self::new(Grade::Warning, "held-as-unknown", *train, none)
-            }
-            _ => return None,
-        })
-    }
-
-    /// What a driver says, if it is not as it should be.
-    pub(crate) fn of_drive(layout: &Layout, notice: &DriveNotice) -> Option<Self> {
-        let name = |sensor| layout.sensor_name(sensor).to_owned();
         let (grade, what, train, blanks) = match notice {
-            DriveNotice::Lost { train } => (Grade::Danger, "lost", Some(*train), Vec::new()),
-            DriveNotice::HeldBack { train, leader, .. } => {
+            Notice::Lost { train } => (Grade::Danger, "lost", Some(*train), none),
+            Notice::HeldBack { train, leader, .. } => {
                 (Grade::Warning, "held-back", Some(*train), vec![leader.to_string()])
             }
-            DriveNotice::Overshoots { train, by, .. } => {
+            Notice::Overshoots { train, by, .. } => {
                 (Grade::Warning, "overshoots", Some(*train), vec![format!("{:.0}", by.as_mm())])
             }
-            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+            Notice::TurnoutMismatch { turnout, curved, train } => {
                 let what = if *curved { "lies-curved" } else { "lies-straight" };
                 (Grade::Warning, what, Some(*train), vec![turnout.to_string()])
             }
-            DriveNotice::Overdue { train, sensor, by } => {
-                let blanks = vec![name(*sensor), format!("{:.1}", by.as_s())];
-                (Grade::Warning, "overdue", Some(*train), blanks)
+            Notice::Overdue { train, sensor, by } => {
+                (Grade::Warning, "overdue", Some(*train), vec![name(sensor), format!("{:.1}", by.as_s())])
             }
-            DriveNotice::TrackEnds { train, end } => {
+            Notice::TrackEnds { train, end } => {
                 (Grade::Warning, "track-ends", Some(*train), vec![layout.node_name(*end).to_owned()])
             }
-            DriveNotice::ContactStuck { sensor } => {
-                (Grade::Warning, "contact-stuck", None, vec![name(*sensor)])
-            }
-            DriveNotice::Unexplained { sensor, .. } => {
-                (Grade::Warning, "unexplained", None, vec![name(*sensor)])
-            }
-            DriveNotice::Unconfirmed { command } => {
+            Notice::SensorStuck { sensor } => (Grade::Warning, "contact-stuck", None, vec![name(sensor)]),
+            Notice::Unexplained { sensor, .. } => (Grade::Warning, "unexplained", None, vec![name(sensor)]),
+            Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
             }
+            Notice::Danger { train, why, .. } => (Grade::Danger, commanded_to_stop(*why), Some(*train), none),
+            Notice::PowerOff { train } => (Grade::Danger, "power-off", Some(*train), none),
+            Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
+            Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
+            Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
+            Notice::Deadlock { train, moves } => {
+                (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])
+            }
+            Notice::Diverged { train, stopped } if stopped.is_empty() => {
+                (Grade::Danger, "diverged", Some(*train), none)
+            }
+            Notice::Diverged { train, stopped } => {
+                (Grade::Danger, "diverged-and-others", Some(*train), vec![listed(stopped)])
+            }
+            Notice::ReservedAsUnknown { train } => (Grade::Warning, "held-as-unknown", Some(*train), none),
             _ => return None,
         };
         Some(Self::new(grade, what, train, blanks))
-    }
-
-    fn of_watch(notice: &WatchdogNotice) -> Option<Self> {
-        let none = Vec::new();
-        Some(match notice {
-            WatchdogNotice::Danger { train, why, .. } => {
-                Self::new(Grade::Danger, commanded_to_stop(*why), *train, none)
-            }
-            WatchdogNotice::PowerOff { train } => Self::new(Grade::Danger, "power-off", *train, none),
-            WatchdogNotice::NeedsPerson { train, .. } => {
-                Self::new(Grade::Danger, "needs-person", *train, none)
-            }
-            WatchdogNotice::Dropped { train, .. } => Self::new(Grade::Warning, "dropped", *train, none),
-            WatchdogNotice::Recovered { train, .. } => Self::new(Grade::Over, "recovered", *train, none),
-            _ => return None,
-        })
     }
 
     /// What goes wrong while a train is calibrated.

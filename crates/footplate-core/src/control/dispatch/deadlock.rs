@@ -16,11 +16,11 @@ use super::dispatcher::Dispatcher;
 use super::granting::Proposal;
 use super::movement_authority::Start;
 use super::movement_authority::{ClearanceEnvelope, standing};
-use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
 use super::parking::{OFF, PARKED};
 use super::reservation::Reservation;
+use crate::control::Notice;
 
 /// How much is tried before a search gives up until something else has changed.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +110,7 @@ impl Dispatcher {
         let Some((moves, place, proposal)) = found else { return false };
         let moves: Vec<TrainId> = moves.into_iter().map(|(train, _)| train).collect();
         if let Some(first) = moves.first().copied() {
-            self.say(DispatchNotice::Deadlock { train: id, moves });
+            self.say(Notice::Deadlock { train: id, moves });
             if let Some(train) = self.trains.get_mut(&id) {
                 train.rooms_made = train.rooms_made.saturating_add(1);
                 if let Some(asked) = train.asked.as_mut().filter(|_| train.rooms_made >= ROOMS_IN_A_ROW) {
@@ -151,7 +151,7 @@ impl Dispatcher {
             let Some(mover) = ready.get(turn).copied() else { continue };
             if let Some((place, proposal)) = self.elsewhere(now, mover) {
                 self.shuffled += nth + 1;
-                self.say(DispatchNotice::Deadlock { train: id, moves: Vec::new() });
+                self.say(Notice::Deadlock { train: id, moves: Vec::new() });
                 self.send_aside(now, mover, id, place, proposal);
                 return;
             }
@@ -184,7 +184,7 @@ impl Dispatcher {
         proposal: Proposal,
     ) {
         let to = Landmark { node: self.node_before(place), offset: place.offset };
-        self.say(DispatchNotice::StepsAside { train: id, makes_room_for, to });
+        self.say(Notice::StepsAside { train: id, makes_room_for, to });
         self.grant(now, id, Purpose::Aside(makes_room_for), proposal);
     }
 

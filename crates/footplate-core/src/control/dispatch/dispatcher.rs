@@ -4,7 +4,7 @@ use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
-use crate::control::supervise::{LinkNews, Watchdog, WatchdogNotice};
+use crate::control::supervise::{LinkNews, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
@@ -18,10 +18,10 @@ use super::blocks::Blocks;
 use super::dispatched_train::{Asked, DispatchedTrain, State};
 use super::journey::{Journey, TrainLengths};
 use super::movement_authority::{ClearanceEnvelope, standing};
-use super::notice::DispatchNotice;
 use super::parking::{PARKED, parking_places};
 use super::reservation::Reservation;
 use super::turnout_command::TurnoutCommand;
+use crate::control::Notice;
 
 /// How often it looks what can be done while something waits to be.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
@@ -43,7 +43,7 @@ pub struct Dispatcher {
     pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
     /// Turnouts that were asked for and not told yet, for whom and since when.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
-    pub(super) outputs: VecDeque<Output<DispatchNotice>>,
+    pub(super) outputs: VecDeque<Output<Notice>>,
     /// Whether anything has changed since trains at rest were last looked at.
     pub(super) is_stirred: bool,
     /// How often trains were moved only to have other places to begin from.
@@ -315,7 +315,7 @@ impl Dispatcher {
         anchors
     }
 
-    pub(super) fn say(&mut self, notice: DispatchNotice) {
+    pub(super) fn say(&mut self, notice: Notice) {
         self.outputs.push_back(Output::Notice(notice));
     }
 
@@ -331,11 +331,12 @@ impl Dispatcher {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                     Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                     Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                    Output::Notice(WatchdogNotice::Drive(notice)) => {
-                        self.say(DispatchNotice::Drive(notice.clone()));
+                    // A journey is resumed by the dispatcher.
+                    Output::Notice(Notice::Cancelled { train, .. }) if self.journey(train).is_some() => {}
+                    Output::Notice(notice) => {
+                        self.say(notice.clone());
                         self.hear(now, &notice);
                     }
-                    Output::Notice(notice) => self.hear_of_danger(now, notice),
                 }
             }
             self.go_on(now);
@@ -384,7 +385,7 @@ impl Dispatcher {
 }
 
 impl Machine for Dispatcher {
-    type Notice = DispatchNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.watchdog.handle_event(now, event);
@@ -396,7 +397,7 @@ impl Machine for Dispatcher {
         self.settle(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<DispatchNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         self.outputs.pop_front()
     }
 

@@ -15,11 +15,11 @@ use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::itinerary::{Itinerary, Pace, Search};
 use super::movement_authority::{MovementAuthority, Start, granted};
-use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
 use super::reservation::Reservation;
 use super::way::Way;
+use crate::control::Notice;
 
 /// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
 /// away, and the other will be gone soon.
@@ -288,7 +288,7 @@ impl Dispatcher {
         train.state = State::Setting { ready: None, since: now };
         train.skipped.clear();
         self.hold(now, id);
-        self.say(DispatchNotice::RouteSet { train: id, takes, turns });
+        self.say(Notice::RouteSet { train: id, takes, turns });
     }
 
     fn waits(&mut self, id: TrainId, wish: &Proposal) {
@@ -297,7 +297,7 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id)
             && !core::mem::replace(&mut train.waits_said, true)
         {
-            self.say(DispatchNotice::Waits { train: id, on });
+            self.say(Notice::Waits { train: id, on });
         }
     }
 

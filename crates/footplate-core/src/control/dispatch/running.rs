@@ -1,7 +1,7 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
 use crate::control::drive::THERE;
-use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
+use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, TurnoutNeed};
@@ -11,9 +11,9 @@ use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::itinerary::SHORTEST_RUN;
 use super::movement_authority::{MovementAuthority, SLACK};
-use super::notice::DispatchNotice;
 use super::reservation::Reservation;
 use super::way::Way;
+use crate::control::Notice;
 
 /// What could not be done is not tried again for so long.
 const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
@@ -56,7 +56,7 @@ impl Dispatcher {
                     if self.is_somewhere(id) && self.watchdog.driver().position(id, now).is_none() =>
                 {
                     self.set_state(id, State::Lost);
-                    self.say(DispatchNotice::HeldAsUnknown { train: id });
+                    self.say(Notice::ReservedAsUnknown { train: id });
                 }
                 _ => {}
             }
@@ -68,7 +68,7 @@ impl Dispatcher {
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
         self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
-        self.say(DispatchNotice::HeldAsUnknown { train: id });
+        self.say(Notice::ReservedAsUnknown { train: id });
     }
 
     /// A train is turned around: nothing has reported it since.
@@ -230,7 +230,7 @@ impl Dispatcher {
         }
         self.watchdog.set_limit(now, id, None);
         if !is_sure {
-            self.say(DispatchNotice::HeldAsUnknown { train: id });
+            self.say(Notice::ReservedAsUnknown { train: id });
         } else if confirmed {
             self.stand(now, id);
         }
@@ -295,7 +295,7 @@ impl Dispatcher {
         }
         self.watchdog.set_limit(now, id, None);
         self.hold_again(now, id);
-        self.say(DispatchNotice::Withdrawn { train: id, why });
+        self.say(Notice::Withdrawn { train: id, why });
         // Whoever asked for it has to know.
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
             self.give_up_journey(id, self.no_way(id));
@@ -307,7 +307,7 @@ impl Dispatcher {
         let Some(train) = self.trains.get_mut(&id) else { return };
         train.withdrawn = 0;
         if let Some(asked) = train.asked.take() {
-            self.say(DispatchNotice::Drive(DriveNotice::GivenUp { order: asked.order, train: id, why }));
+            self.say(Notice::GivenUp { order: asked.order, train: id, why });
         }
     }
 
@@ -330,7 +330,7 @@ impl Dispatcher {
         if let Some(asked) = train.asked.take_if(|asked| Some(asked.order) == granted_for) {
             let took = now - asked.since;
             train.caution = 1.0;
-            self.say(DispatchNotice::Arrived { order: asked.order, train: id, error, took });
+            self.say(Notice::Arrived { order: asked.order, train: id, error, took });
         }
     }
 

@@ -10,7 +10,6 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{DueContact, Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::units::Length;
 
-use super::notice::{Achieved, DriveNotice, Finished, Promise};
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
@@ -18,6 +17,7 @@ use super::path_length::contacts_until;
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Task};
 use super::turning::turned;
+use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Beyond the time to rest that is foreseen, and this part of it: decoders creep at the end, and nothing is in a hurry
 /// then.
@@ -171,7 +171,7 @@ impl DrivenTrain {
     pub(super) fn take(&mut self, task: Task, out: &mut Outputs) {
         self.locator.repeat(false);
         if let Some(before) = self.task.replace(task) {
-            out.say(DriveNotice::Replaced { order: before.order, train: self.id() });
+            out.say(Notice::Replaced { order: before.order, train: self.id() });
         }
     }
 
@@ -335,7 +335,7 @@ impl DrivenTrain {
         self.note_passage(context, node, passed.at);
         self.count_limit_from(context, node);
         self.expect_next(context, now);
-        out.say(DriveNotice::Passed { train: self.id(), passed, next: self.expected.due });
+        out.say(Notice::Passed { train: self.id(), passed, next: self.expected.due });
         self.paced_passed(context, now, node, out);
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
@@ -378,7 +378,7 @@ impl DrivenTrain {
 
     pub(super) fn handle_timeout(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         if let Some((command, _)) = self.unsent.filter(|(_, since)| now - *since >= UNCONFIRMED) {
-            out.say(DriveNotice::Unconfirmed { command });
+            out.say(Notice::Unconfirmed { command });
             self.unsent = None;
             if matches!(command, Command::Speed { step: SpeedStep::STAND, .. }) {
                 self.issue(now, command, out);
@@ -421,7 +421,7 @@ impl DrivenTrain {
     /// Ends what cannot be done, and the run with it.
     pub(super) fn give_up(&mut self, now: Timestamp, why: Refusal, out: &mut Outputs) {
         if let Some(task) = self.task.take() {
-            out.say(DriveNotice::GivenUp { order: task.order, train: self.id(), why });
+            out.say(Notice::GivenUp { order: task.order, train: self.id(), why });
         }
         if self.commanded > SpeedStep::STAND {
             self.issue_stop(now, out);
@@ -477,7 +477,7 @@ impl DrivenTrain {
         }
         self.task = None;
         let unseen = self.expected.unseen;
-        out.say(DriveNotice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
+        out.say(Notice::Done(Finished { order, train: self.id(), time, achieved, promise, unseen }));
     }
 }
 

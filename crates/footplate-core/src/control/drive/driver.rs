@@ -19,12 +19,12 @@ use super::doubt::Branch;
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Closure, Explanation};
 use super::known_track::KnownTrack;
-use super::notice::DriveNotice;
 use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::refusal::Refusal;
 use super::task::Phase;
 use super::turnout_guard::train_on;
+use crate::control::Notice;
 
 /// A contact that is seen closed again within this long was never open: wheels bounce, and no train follows so soon.
 const HELD: TimeSpan = TimeSpan::from_ms(300);
@@ -273,12 +273,12 @@ impl Driver {
         self.throwing.retain(|(asked, order)| {
             if *asked == turnout {
                 is_asked = true;
-                out.say(DriveNotice::Thrown { order: Some(*order), turnout, curved });
+                out.say(Notice::TurnoutThrown { order: Some(*order), turnout, curved });
             }
             *asked != turnout
         });
         if !is_asked {
-            out.say(DriveNotice::Thrown { order: None, turnout, curved });
+            out.say(Notice::TurnoutThrown { order: None, turnout, curved });
         }
         self.ways_changed(now);
     }
@@ -299,24 +299,24 @@ impl Driver {
             return;
         }
         while let Some(sensor) = self.attribution.next_reformed(now) {
-            self.outputs.say(DriveNotice::ContactBehaves { sensor });
+            self.outputs.say(Notice::SensorRestored { sensor });
         }
         let closure = Closure { sensor, window };
         match self.attribution.decide(&self.trains, self.track.context(), now, closure) {
             Some(Decided::Otherwise(branch)) => self.take_back(now, *branch),
             Some(Decided::Nothing(closure)) => {
                 let time = closure.window.until;
-                self.outputs.say(DriveNotice::Unexplained { sensor: closure.sensor, time });
+                self.outputs.say(Notice::Unexplained { sensor: closure.sensor, time });
             }
             None => {}
         }
         match self.attribution.judge(&self.trains, self.track.context(), now, closure) {
             Verdict::Explained(explanation) => self.passed(now, closure, explanation),
             Verdict::Ambiguous { likeliest, or } => {
-                self.outputs.say(DriveNotice::Ambiguous { sensor, time, likeliest, or });
+                self.outputs.say(Notice::Ambiguous { sensor, time, likeliest, or });
             }
-            Verdict::Unexplained => self.outputs.say(DriveNotice::Unexplained { sensor, time }),
-            Verdict::Stuck => self.outputs.say(DriveNotice::ContactStuck { sensor }),
+            Verdict::Unexplained => self.outputs.say(Notice::Unexplained { sensor, time }),
+            Verdict::Stuck => self.outputs.say(Notice::SensorStuck { sensor }),
             Verdict::Ignored => {}
         }
     }
@@ -348,7 +348,7 @@ impl Driver {
         let Branch { closure, did_it, train, passes, lies, locator, unseen, .. } = branch;
         if !did_it {
             let Closure { sensor, window } = closure;
-            self.outputs.say(DriveNotice::Unexplained { sensor, time: window.until });
+            self.outputs.say(Notice::Unexplained { sensor, time: window.until });
         }
         lies.iter().for_each(|(turnout, leg)| self.believe(train, *turnout, *leg));
         let context = self.track.context();
@@ -372,7 +372,7 @@ impl Driver {
     fn believe(&mut self, train: TrainId, turnout: TurnoutId, leg: Leg) {
         self.track.turnouts.set(turnout, leg);
         let curved = leg.is_curved();
-        self.outputs.say(DriveNotice::TurnoutLiesOtherwise { turnout, curved, train });
+        self.outputs.say(Notice::TurnoutMismatch { turnout, curved, train });
     }
 
     /// Says of the line what the plans want of it.
@@ -401,7 +401,7 @@ impl Driver {
 }
 
 impl Machine for Driver {
-    type Notice = DriveNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         let context = self.track.context();
@@ -431,7 +431,7 @@ impl Machine for Driver {
         self.wish(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<DriveNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         self.outputs.next()
     }
 

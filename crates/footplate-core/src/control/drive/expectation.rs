@@ -7,12 +7,12 @@ use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
 use super::driven_train::{DrivenTrain, Expectation};
-use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::path_length::track_end;
 use super::refusal::Refusal;
 use super::task::Phase;
+use crate::control::Notice;
 
 /// A contact is overdue this long after the last of 99.7 % of cases.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
@@ -116,7 +116,7 @@ impl DrivenTrain {
         let is_over = self.expected.lost_by.is_some_and(|by| by <= now);
         match self.expected.due {
             Some(due) if !self.expected.overdue_said && !is_over => {
-                out.say(DriveNotice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+                out.say(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
                 let way = due.time - self.expected.since;
                 self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
                 self.expected.unseen.get_or_insert(due.sensor);
@@ -141,7 +141,7 @@ impl DrivenTrain {
         self.passages.forget();
         self.expected = Expectation { since: now, ..Expectation::default() };
         let train = self.id();
-        out.say(DriveNotice::Lost { train });
+        out.say(Notice::Lost { train });
         self.give_up(now, Refusal::Lost { train }, out);
     }
 
@@ -169,7 +169,7 @@ impl DrivenTrain {
         let train = self.id();
         if self.limit_guard().is_some_and(|at| at <= now) {
             self.expected.limit = None;
-            out.say(DriveNotice::AtLimit { train });
+            out.say(Notice::AuthorityEnds { train });
             self.give_up(now, Refusal::AtLimit { train }, out);
         }
         if let (Some(at), Some((_, end))) = (self.end_guard(), self.expected.end)
@@ -177,7 +177,7 @@ impl DrivenTrain {
         {
             self.expected.end = None;
             let name = context.layout.node_name(end).into();
-            out.say(DriveNotice::TrackEnds { train, end });
+            out.say(Notice::TrackEnds { train, end });
             self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
         }
     }

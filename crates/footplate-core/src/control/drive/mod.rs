@@ -1,6 +1,6 @@
 //! Driving: from an order to a train at rest within millimetres of where it should be.
 //!
-//! A [`Driver`] takes [`Order`]s and says with [`DriveNotice`]s what comes of them. It follows every train between
+//! A [`Driver`] takes [`Order`]s and says with [`Notice`]s what comes of them. It follows every train between
 //! contacts, plans each stop anew at every report, and commands it at the planned time by the clock, whatever is or is
 //! not reported until then.
 
@@ -15,7 +15,6 @@ mod expectation;
 mod hypotheses;
 mod known_track;
 mod limit;
-mod notice;
 mod order;
 mod outputs;
 mod pacing;
@@ -30,7 +29,6 @@ mod turnout_guard;
 mod watched;
 
 pub use driver::Driver;
-pub use notice::{Achieved, DriveNotice, Finished, PacedLine, PlannedArrival, PlannedStop, Promise};
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use pacing::ArrivalProfile;
 pub use refusal::Refusal;

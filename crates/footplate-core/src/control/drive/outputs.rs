@@ -7,12 +7,12 @@ use crate::event::Command;
 use crate::ids::SensorId;
 use crate::time::Timestamp;
 
-use super::notice::DriveNotice;
+use crate::control::Notice;
 
 /// A queue of outputs, which says of the line only what changed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outputs {
-    queue: VecDeque<Output<DriveNotice>>,
+    queue: VecDeque<Output<Notice>>,
     held: Option<Timestamp>,
     watched: Option<SensorId>,
 }
@@ -22,7 +22,7 @@ impl Outputs {
         self.queue.push_back(Output::Command(command));
     }
 
-    pub(super) fn say(&mut self, notice: DriveNotice) {
+    pub(super) fn say(&mut self, notice: Notice) {
         self.queue.push_back(Output::Notice(notice));
     }
 
@@ -40,7 +40,7 @@ impl Outputs {
         }
     }
 
-    pub(super) fn next(&mut self) -> Option<Output<DriveNotice>> {
+    pub(super) fn next(&mut self) -> Option<Output<Notice>> {
         self.queue.pop_front()
     }
 }

@@ -20,11 +20,11 @@ use crate::units::{Length, Ratio, Speed};
 
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
-use super::notice::DriveNotice;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::restricted_stretch::RestrictedStretch;
 use super::task::{Destination, Goal, Phase};
+use crate::control::Notice;
 
 /// How often a train may come to a zone nearer than is believed, and how often it may be faster there: in one case of a
 /// hundred each. A restriction is no end of the track, where ten times as much is asked.
@@ -148,7 +148,7 @@ impl DrivenTrain {
         if self.speed_supervision.said.as_ref() != Some(&zone.name) {
             self.speed_supervision.said = Some(zone.name.clone());
             let (train, name, limit) = (self.id(), zone.name.clone(), zone.limit);
-            out.say(DriveNotice::Restrained { train, step, zone: name, limit });
+            out.say(Notice::SpeedLimited { train, step, zone: name, limit });
         }
     }
 

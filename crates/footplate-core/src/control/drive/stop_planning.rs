@@ -10,12 +10,12 @@ use crate::units::Length;
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::DrivenTrain;
-use super::notice::{DriveNotice, PlannedStop, Promise};
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path_length::{contacts_until, counted_from, lap, unknown_turnout, way_between};
 use super::refusal::Refusal;
 use super::task::{Destination, Goal, Phase, Plan, Task};
+use crate::control::{Notice, PlannedStop, Promise};
 
 /// A plan that moved by less is no news.
 const NEWS: TimeSpan = TimeSpan::from_ms(1);
@@ -306,12 +306,12 @@ impl DrivenTrain {
                     (before.leaves - leaves).abs() >= NEWS || before.triggers[0] != triggers[0]
                 });
                 if is_news {
-                    out.say(DriveNotice::Planned(self.planned(context, task.order, plan)));
+                    out.say(Notice::Planned(self.planned(context, task.order, plan)));
                 }
             }
             CommandTime::TooLate(rest, beyond) => {
                 if beyond > OVERSHOOT {
-                    out.say(DriveNotice::Overshoots { order: task.order, train: self.id(), by: beyond });
+                    out.say(Notice::Overshoots { order: task.order, train: self.id(), by: beyond });
                 }
                 self.stop_now(now, task, self.promise(context, &rest, at), out);
             }

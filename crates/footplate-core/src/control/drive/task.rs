@@ -5,8 +5,8 @@ use crate::time::Timestamp;
 use crate::track::Landmark;
 use crate::tracking::WayPoint;
 
-use super::notice::Promise;
 use super::order::{Aim, OrderId};
+use crate::control::Promise;
 
 /// An order being carried out.
 #[derive(Debug, Clone, Copy)]

@@ -13,9 +13,9 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::meeting::{rails, rails_within};
-use super::notice::WatchdogNotice;
 use super::recovery::{DOUBTED, Recovery};
 use super::watchdog::{Power, Watchdog};
+use crate::control::Notice;
 
 /// Trains stand this long after the power went off; they need a third of a second from top speed.
 const DEAD_AFTER: TimeSpan = TimeSpan::from_s(2.0);
@@ -51,7 +51,7 @@ impl Watchdog {
         self.dangers.insert(train, Recovery::new(now, model, why, interrupted));
         let stopped = self.hold_what_could_meet(now);
         let interrupted = interrupted.map(|(_, order)| order);
-        self.say(WatchdogNotice::Danger { train, why, stopped, interrupted });
+        self.say(Notice::Danger { train, why, stopped, interrupted });
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
@@ -140,7 +140,7 @@ impl Watchdog {
     /// Takes the power from the track: the last thing that stops a train.
     pub(super) fn power_off(&mut self, now: Timestamp, for_train: TrainId) {
         if self.power == Power::On {
-            self.say(WatchdogNotice::PowerOff { train: for_train });
+            self.say(Notice::PowerOff { train: for_train });
             self.cut_power(now);
         }
     }
@@ -174,7 +174,7 @@ impl Watchdog {
         if now - since >= DEAD_AFTER && commanded && !self.is_silent() && !self.is_switched_off {
             self.power = Power::On;
             self.command(Command::PowerOn);
-            self.say(WatchdogNotice::PowerOn);
+            self.say(Notice::PowerOn);
         }
     }
 

@@ -2,9 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::control::{
-    DriveNotice, Driver, Finished, Order, OrderId, PlannedStop, Refusal, StopOrder,
-};
+use footplate_core::control::{Driver, Finished, Notice, Order, OrderId, PlannedStop, Refusal, StopOrder};
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::tracking::{DueContact, PassedContact, TrackContext};
@@ -145,35 +143,35 @@ impl<'l> Tour<'l> {
             }
             for notice in stage.go_on(&mut self.driver)? {
                 if let (Some(showing), Some(alarm)) =
-                    (&mut stage.showing, Alarm::of_drive(self.layout, &notice))
+                    (&mut stage.showing, Alarm::of_notice(self.layout, &notice))
                 {
                     let formatter = NoticeFormatter { driver: self.driver.machine(), began: Timestamp::ZERO };
                     showing.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
                 }
                 match notice {
-                    DriveNotice::Done(done) if done.order == order => finished = Some(done),
-                    DriveNotice::GivenUp { order: of, why, .. } if of == order => {
+                    Notice::Done(done) if done.order == order => finished = Some(done),
+                    Notice::GivenUp { order: of, why, .. } if of == order => {
                         stage.screen.mishap(self.train, &format!("gave up {name}: {why}"))?;
                         return Ok(None);
                     }
-                    DriveNotice::Lost { .. } => {
+                    Notice::Lost { .. } => {
                         stage.screen.mishap(self.train, "is lost")?;
                         return Ok(None);
                     }
-                    DriveNotice::Planned(planned) => self.planned = Some(planned),
-                    DriveNotice::Passed { train, passed, next } => {
+                    Notice::Planned(planned) => self.planned = Some(planned),
+                    Notice::Passed { train, passed, next } => {
                         if let Some(showing) = &mut stage.showing {
                             showing.passed(TrainPassed { train, passed, next });
                         }
                         self.pass(passed, next);
                     }
-                    DriveNotice::Overshoots { by, .. } => {
+                    Notice::Overshoots { by, .. } => {
                         stage.screen.mishap(
                             self.train,
                             &format!("is too late for {name}: {:.0} mm beyond", by.as_mm()),
                         )?;
                     }
-                    DriveNotice::Unexplained { sensor, .. } => {
+                    Notice::Unexplained { sensor, .. } => {
                         let sensor = self.layout.sensor_name(sensor);
                         stage.screen.mishap(
                             self.train,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::bail;
-use footplate_core::control::{CalibrationNotice, Calibrator, DriveNotice, Driver, Output};
+use footplate_core::control::{CalibrationNotice, Calibrator, Driver, Notice, Output};
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_layout};
@@ -39,11 +39,9 @@ fn of_session(notice: Spoken) -> Option<Shown> {
     }
 }
 
-fn of_driver(notice: &DriveNotice) -> Option<Shown> {
+fn of_driver(notice: &Notice) -> Option<Shown> {
     match *notice {
-        DriveNotice::Passed { train, passed, next } => {
-            Some(Shown::Passed(TrainPassed { train, passed, next }))
-        }
+        Notice::Passed { train, passed, next } => Some(Shown::Passed(TrainPassed { train, passed, next })),
         _ => None,
     }
 }

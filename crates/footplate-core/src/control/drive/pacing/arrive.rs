@@ -6,13 +6,13 @@ use alloc::vec::Vec;
 
 use crate::control::drive::command_time::{CommandTime, spread};
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::control::drive::notice::{DriveNotice, PlannedArrival};
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path_length::{counted_from, lap};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
 use crate::control::drive::task::{Destination, Goal, Phase, Task};
+use crate::control::{Notice, PlannedArrival};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::model::MotionModel;
@@ -146,7 +146,7 @@ impl DrivenTrain {
         let train = self.id();
         let starts = arriving.start.map(|step| (arriving.since, step));
         let profile = arriving.plan.map(|plan| ArrivalProfile::new(plan, arriving.begins()));
-        out.say(DriveNotice::Arrives(PlannedArrival { order, train, by, starts, profile }));
+        out.say(Notice::Arrives(PlannedArrival { order, train, by, starts, profile }));
         self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Arrive(Box::new(arriving)), self.usable_steps(), now));
         self.goes_by_plan(context, now, out);

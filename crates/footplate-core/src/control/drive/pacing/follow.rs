@@ -11,10 +11,10 @@
 
 use alloc::collections::BTreeMap;
 
+use crate::control::Notice;
 use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
-use crate::control::drive::notice::DriveNotice;
 use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path_length::way_between;
@@ -334,7 +334,7 @@ impl DrivenTrain {
         if commanded > SpeedStep::STAND {
             if !following.is_held {
                 following.is_held = true;
-                out.say(DriveNotice::HeldBack { order: task.order, train: self.id(), leader });
+                out.say(Notice::HeldBack { order: task.order, train: self.id(), leader });
             }
             self.issue_stop(now, out);
         }

@@ -1,11 +1,11 @@
 //! A train that runs at a speed between those of its steps.
 
 use crate::control::drive::driven_train::DrivenTrain;
-use crate::control::drive::notice::{DriveNotice, PacedLine};
 use crate::control::drive::order::OrderId;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::{Notice, PacedLine};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
@@ -94,7 +94,7 @@ impl DrivenTrain {
         let line = IdealLine { node, way: Length::from_m(way), time: now, speed: holding.speed };
         holding.line = Some(line);
         let IdealLine { way, time, speed, .. } = line;
-        out.say(DriveNotice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+        out.say(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
     }
 
     /// How far it is ahead of its line, as far as is believed; `None` while there is none.

@@ -1,7 +1,7 @@
 //! What comes of instructions: refusals, notices of the driver and the dispatcher, orders that have ended, and what trains taught.
 
 use footplate_core::control::{
-    Achieved, DispatchNotice, DriveNotice, Finished, Machine, Order, Outcome, Output, Refusal, WatchdogNotice,
+    Achieved, Finished, Machine, Notice, Order, OrderId, Outcome, Output, Refusal,
 };
 use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
@@ -58,63 +58,25 @@ impl ScriptRunner {
         }
     }
 
-    /// Says what the dispatcher says, and does what follows.
-    pub(super) fn dispatched(&mut self, now: Timestamp, notice: &DispatchNotice) {
-        if let Some(mut line) = self.formatter().dispatched(notice) {
-            if let DispatchNotice::Drive(DriveNotice::AtLimit { train }) = notice {
+    /// Prints a notice, and does what follows from it.
+    pub(super) fn dispatched(&mut self, now: Timestamp, notice: &Notice) {
+        if let Some(mut line) = self.formatter().line(notice) {
+            if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
                     line += &format!("; it is reserved for {}", trains(&holders));
                 }
             }
-            if let Some(alarm) = Alarm::of_dispatch(self.driver().layout(), notice) {
+            if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
                 self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm.said(&line))));
             }
             self.say(line);
         }
         match notice {
-            DispatchNotice::Drive(notice) => self.driven(now, notice),
-            DispatchNotice::Watch(notice) => self.warned(notice),
-            DispatchNotice::Arrived { order, train, error, .. } => {
-                let Some(step) = self.pending.remove(order) else { return };
-                let rest = self.rests.remove(train);
-                let achieved = match &rest {
-                    Some(rest) => rest.achieved,
-                    None => self.stands_at(now, *train),
-                };
-                let faced = achieved.zip(*error);
-                let faced =
-                    faced.map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
-                let ended = Ended { error: *error, faced, ..self.ended(now, &step) };
-                let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
-                let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
-                let ended = Ended { achieved, ..ended };
-                self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
-            }
-            _ => {}
-        }
-    }
-
-    fn warned(&mut self, notice: &WatchdogNotice) {
-        match notice {
-            WatchdogNotice::Danger { train, .. } => self.learning.interrupt(*train),
-            // What it was measured as is what is learnt from now on; what it taught before was another train's.
-            WatchdogNotice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
-                self.learning.forget(*train);
-                self.taught.remove(train);
-                self.changed.insert(*train);
-            }
-            WatchdogNotice::NeedsPerson { .. } => self.fell_short = true,
-            _ => {}
-        }
-    }
-
-    fn driven(&mut self, now: Timestamp, notice: &DriveNotice) {
-        match notice {
-            DriveNotice::Planned(plan) => {
+            Notice::Planned(plan) => {
                 self.promises.insert(plan.order, plan.promise);
             }
-            DriveNotice::Passed { train, passed, next } => {
+            Notice::Passed { train, passed, next } => {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
                 self.outputs.push_back(Output::Notice(Spoken::Passed(passed_by)));
                 self.learning.passed(*train, self.dispatcher.driver(), passed);
@@ -122,20 +84,20 @@ impl ScriptRunner {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
                 }
             }
-            DriveNotice::Done(finished) => {
+            Notice::Done(finished) => {
                 self.done(finished);
                 self.learn(finished);
             }
-            DriveNotice::Lost { train } | DriveNotice::TurnoutLiesOtherwise { train, .. } => {
+            Notice::Lost { train } | Notice::TurnoutMismatch { train, .. } | Notice::Danger { train, .. } => {
                 self.learning.interrupt(*train);
             }
-            DriveNotice::Thrown { order: Some(order), .. } => {
+            Notice::TurnoutThrown { order: Some(order), .. } => {
                 if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
                     let ended = self.ended(now, &step);
                     self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
                 }
             }
-            DriveNotice::GivenUp { order, train, why } => {
+            Notice::GivenUp { order, train, why } => {
                 self.promises.remove(order);
                 self.rests.remove(train);
                 match self.pending.remove(order) {
@@ -147,12 +109,36 @@ impl ScriptRunner {
                     None => {}
                 }
             }
-            DriveNotice::Replaced { order, .. } => {
+            Notice::Replaced { order, .. } => {
                 self.promises.remove(order);
                 self.pending.remove(order);
             }
+            // It learns from what the recovery measured; what it learnt before was true of another train.
+            Notice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
+                self.learning.forget(*train);
+                self.taught.remove(train);
+                self.changed.insert(*train);
+            }
+            Notice::NeedsOperator { .. } => self.fell_short = true,
+            Notice::Arrived { order, train, error, .. } => self.arrived(now, *order, *train, *error),
             _ => {}
         }
+    }
+
+    /// A journey has ended: its result says where the train came to rest.
+    fn arrived(&mut self, now: Timestamp, order: OrderId, train: TrainId, error: Option<Length>) {
+        let Some(step) = self.pending.remove(&order) else { return };
+        let rest = self.rests.remove(&train);
+        let achieved = match &rest {
+            Some(rest) => rest.achieved,
+            None => self.stands_at(now, train),
+        };
+        let faced = achieved.zip(error);
+        let faced = faced.map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
+        let ended = Ended { error, faced, ..self.ended(now, &step) };
+        let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
+        let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
+        self.outputs.push_back(Output::Notice(Spoken::Ended(Ended { achieved, ..ended })));
     }
 
     fn done(&mut self, finished: &Finished) {
