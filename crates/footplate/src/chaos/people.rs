@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use footplate_core::control::{DispatchNotice, Dispatcher, DriveNotice, Journey, LinkNews, WatchdogNotice};
+use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_eval::choice::Choice;
@@ -158,33 +158,28 @@ impl<'p, 'l> People<'p, 'l> {
 }
 
 impl Attendant<Dispatcher> for People<'_, '_> {
-    fn hear(&mut self, now: Timestamp, notice: DispatchNotice) {
-        if !matches!(
-            notice,
-            DispatchNotice::Drive(DriveNotice::Planned(_) | DriveNotice::Passed { .. })
-                | DispatchNotice::Waits { .. }
-        ) {
+    fn hear(&mut self, now: Timestamp, notice: Notice) {
+        if !matches!(notice, Notice::Planned(_) | Notice::Passed { .. } | Notice::Waits { .. }) {
             self.tell(now, format!("{notice:?}"));
         }
         match notice {
-            DispatchNotice::Arrived { .. } => {
+            Notice::Arrived { .. } => {
                 self.seen.arrivals += 1;
                 self.has_sent = false;
             }
-            DispatchNotice::RouteSet { .. } => self.seen.grants += 1,
-            DispatchNotice::HeldAsUnknown { train }
-            | DispatchNotice::Watch(
-                WatchdogNotice::NeedsPerson { train, .. } | WatchdogNotice::AsksToCrawl { train },
-            )
-            | DispatchNotice::Drive(DriveNotice::Lost { train }) => self.alarm(now, train),
-            DispatchNotice::Watch(WatchdogNotice::PowerOff { .. }) => {
+            Notice::RouteSet { .. } => self.seen.grants += 1,
+            Notice::ReservedAsUnknown { train }
+            | Notice::NeedsOperator { train, .. }
+            | Notice::AsksToCreep { train }
+            | Notice::Lost { train } => self.alarm(now, train),
+            Notice::PowerOff { .. } => {
                 self.seen.alarms += 1;
                 self.without_power.get_or_insert(now);
             }
-            DispatchNotice::Watch(WatchdogNotice::Recovered { train, .. }) => {
+            Notice::Recovered { train, .. } => {
                 self.troubled.remove(&train);
             }
-            DispatchNotice::Drive(DriveNotice::GivenUp { .. }) => self.has_sent = false,
+            Notice::GivenUp { .. } => self.has_sent = false,
             _ => {}
         }
     }
