@@ -1,20 +1,18 @@
 //! Any bytes as a tachometer recording: they are refused with the name of the file, or read alike in one piece and in
 //! many.
-#![no_main]
 
 use std::io::{self, Read};
 
 use footplate_core::odometry::wheels::Period;
 use footplate_store::{TachometerBlock, TachometerReader};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let whole = read(bytes, usize::MAX);
     assert_eq!(whole, read(bytes, 7));
     if let Err(message) = whole {
         assert!(message.starts_with("run.csv"), "{message}");
     }
-});
+}
 
 /// All periods of a recording that comes in pieces of so many bytes, or why there are none.
 fn read(bytes: &[u8], piece: usize) -> Result<Vec<Period>, String> {

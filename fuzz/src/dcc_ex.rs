@@ -1,10 +1,8 @@
 //! Any bytes on the line of a DCC-EX board: none is kept for ever, and what is understood can be written again.
-#![no_main]
 
 use footplate_wire::dcc_ex::{Framing, LONGEST_MESSAGE, Reply, Request};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let mut framing = Framing::default();
     let mut read = 0;
     for byte in bytes {
@@ -19,7 +17,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
     }
     assert!(read + framing.take_unread() <= bytes.len());
-});
+}
 
 /// Reads a message that was written.
 fn again<M>(text: &str, read: impl Fn(&str) -> Option<M>) -> Option<M> {

@@ -1,11 +1,9 @@
 //! Any bytes as a layout file: they are refused with a place in the file, or read, and what was read can be written
 //! and read again as the same.
-#![no_main]
 
 use footplate_store::{draw_layout, parse_layout, write_layout};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     match parse_layout("layout.toml", bytes) {
         Ok(read) => {
             let written = write_layout(&read);
@@ -15,4 +13,4 @@ fuzz_target!(|bytes: &[u8]| {
         }
         Err(error) => assert!(error.to_string().starts_with("layout.toml"), "{error}"),
     }
-});
+}

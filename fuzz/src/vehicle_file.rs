@@ -1,10 +1,8 @@
 //! Any bytes as a vehicle file: they are refused with their place, or read as a vehicle that writes and reads back.
-#![no_main]
 
 use footplate_store::{parse_vehicle, write_vehicle};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     match parse_vehicle("train.toml", bytes) {
         Ok(file) => {
             assert!(file.vehicle.check().is_ok());
@@ -13,4 +11,4 @@ fuzz_target!(|bytes: &[u8]| {
         }
         Err(error) => assert!(error.to_string().starts_with("train.toml")),
     }
-});
+}

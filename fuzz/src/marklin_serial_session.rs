@@ -1,11 +1,9 @@
 //! Any bytes, any commands, any hand-shake in any order on the session's line: it always goes on, never writes while an
 //! answer is due, never powers a second solenoid before the first is released, and comes to its end.
-#![no_main]
 
 use footplate_core::{Command, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Message, Pace, Settings};
 use footplate_wire::{Session, Transmit};
-use libfuzzer_sys::fuzz_target;
 
 /// Longer than any end takes: eighty trains to be told with careful gaps, after a babble of a second.
 const END: TimeSpan = TimeSpan::from_ms(30_000);
@@ -64,10 +62,12 @@ fn command(kind: u8, number: u8) -> Command {
     }
 }
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let [modules, pace, deeds @ ..] = bytes else { return };
     let pace = [Pace::Cts, Pace::FAST, Pace::CAREFUL][usize::from(pace % 3)];
-    let Ok(session) = Interface::new(Timestamp::ZERO, Settings::timed(modules % 31 + 1, pace)) else { return };
+    let Ok(session) = Interface::new(Timestamp::ZERO, Settings::timed(modules % 31 + 1, pace)) else {
+        return;
+    };
     let mut witness =
         Witness { session, now: Timestamp::ZERO, wrote: None, heard: Vec::new(), powered: false };
     witness.session.handle_cts(witness.now, true);
@@ -96,4 +96,4 @@ fuzz_target!(|bytes: &[u8]| {
     witness.wait_until(witness.now + END);
     assert!(witness.session.closing().is_complete(), "{}", witness.session.closing());
     assert!(witness.heard.is_empty() && !witness.powered);
-});
+}

@@ -1,10 +1,8 @@
 //! Any bytes on the 6051's line: every one is used once, and what is understood can be said again as it came.
-#![no_main]
 
 use footplate_wire::marklin_serial::{Message, decode_reply};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let mut ahead = bytes;
     while let Some((message, rest)) = Message::decode(ahead) {
         let heard = &ahead[..ahead.len() - rest.len()];
@@ -20,4 +18,4 @@ fuzz_target!(|bytes: &[u8]| {
         ahead = rest;
     }
     assert!(ahead.len() < 2, "only a first byte may be left waiting for its second");
-});
+}

@@ -1,6 +1,5 @@
 //! Any datagrams and any commands in any order on the session's line with a Z21: it always goes on, keeps its pace, and comes to its
 //! end once the station answers.
-#![no_main]
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::z21::{
@@ -8,7 +7,6 @@ use footplate_wire::z21::{
     Throttle,
 };
 use footplate_wire::{Session, Transmit};
-use libfuzzer_sys::fuzz_target;
 
 /// Longer than any end takes: as many trains as bytes can name, at 50 requests a second.
 const END: TimeSpan = TimeSpan::from_ms(60_000);
@@ -90,7 +88,7 @@ fn command(kind: u8, number: u8) -> Command {
     }
 }
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let [options, deeds @ ..] = bytes else { return };
     let feedback = [Feedback::RBus, Feedback::Can, Feedback::LocoNet][usize::from(options % 3)];
     let steps = [Steps::Fourteen, Steps::TwentyEight, Steps::All][usize::from(options / 3 % 3)];
@@ -121,4 +119,4 @@ fuzz_target!(|bytes: &[u8]| {
     witness.answer();
     witness.wait_until(witness.now + END, true);
     assert!(witness.client.closing().is_complete(), "{}", witness.client.closing());
-});
+}

@@ -1,10 +1,8 @@
 //! Any bytes on the line of a Märklin CAN bus: none is kept for ever, and what is understood can be written again.
-#![no_main]
 
 use footplate_wire::marklin_can::{Frame, Framing, Message, Transport, read_list};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     for transport in [Transport::Network, Transport::Adapter] {
         let mut framing = Framing::new(transport);
         for byte in bytes {
@@ -17,4 +15,4 @@ fuzz_target!(|bytes: &[u8]| {
         assert!(framing.take_unread() <= bytes.len());
     }
     let _ = read_list(bytes);
-});
+}

@@ -1,11 +1,9 @@
 //! Any bytes and any commands in any order on the session's line with a Märklin CAN bus: it always goes on, keeps its pace, and comes
 //! to its end once the station answers.
-#![no_main]
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_can::{Client, Direction, Frame, Framing, Message, Settings, Transport, Uid};
 use footplate_wire::{Session, Transmit};
-use libfuzzer_sys::fuzz_target;
 
 /// Longer than any end takes: as many trains as bytes can name, at 100 frames a second.
 const END: TimeSpan = TimeSpan::from_ms(30_000);
@@ -83,7 +81,7 @@ fn command(kind: u8, number: u8) -> Command {
     }
 }
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let [options, deeds @ ..] = bytes else { return };
     let transport = if options & 1 == 0 { Transport::Network } else { Transport::Adapter };
     let settings = Settings { transport, modules: options >> 1, ..Settings::default() };
@@ -98,7 +96,13 @@ fuzz_target!(|bytes: &[u8]| {
                 let data = [0, 0, 0, first, second, third, first, second];
                 let data = footplate_wire::marklin_can::Payload::of(&data[..usize::from(what >> 3) % 9]);
                 let (command, data) = (third % 0x22, data.unwrap_or_default());
-                witness.hear(Frame { priority: 0, command, is_response: second & 1 != 0, hash: FOREIGN, data });
+                witness.hear(Frame {
+                    priority: 0,
+                    command,
+                    is_response: second & 1 != 0,
+                    hash: FOREIGN,
+                    data,
+                });
             }
             2 => witness.hear(
                 Message::Contact {
@@ -129,4 +133,4 @@ fuzz_target!(|bytes: &[u8]| {
     witness.answer();
     witness.wait_until(witness.now + END, true);
     assert!(witness.client.closing().is_complete(), "{}", witness.client.closing());
-});
+}

@@ -1,11 +1,9 @@
 //! Any bytes and any commands in any order on the session's line with a DCC-EX board: it always goes on, never writes faster than
 //! the board reads, and comes to its end once the board answers.
-#![no_main]
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::dcc_ex::{Client, Framing, Reply, Request, Settings, TurnoutRequests};
 use footplate_wire::{Session, Transmit};
-use libfuzzer_sys::fuzz_target;
 
 /// Longer than any end takes: as many trains as bytes can name, at 20 requests a second.
 const END: TimeSpan = TimeSpan::from_ms(60_000);
@@ -82,7 +80,7 @@ fn command(kind: u8, number: u8) -> Command {
     }
 }
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     let [options, deeds @ ..] = bytes else { return };
     let turnouts = if options & 2 == 0 { TurnoutRequests::Accessory } else { TurnoutRequests::Defined };
     let settings =
@@ -113,4 +111,4 @@ fuzz_target!(|bytes: &[u8]| {
     witness.answer();
     witness.wait_until(witness.now + END, true);
     assert!(witness.client.closing().is_complete(), "{}", witness.client.closing());
-});
+}

@@ -1,10 +1,8 @@
 //! Any bytes in the place of a datagram of a Z21: all are counted, and what is understood can be written again.
-#![no_main]
 
 use footplate_wire::z21::{Datasets, Reply, Request};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|datagram: &[u8]| {
+pub(crate) fn fuzz(datagram: &[u8]) {
     let mut datasets = Datasets::of(datagram);
     let mut read = 0;
     for dataset in datasets.by_ref() {
@@ -21,4 +19,4 @@ fuzz_target!(|datagram: &[u8]| {
         }
     }
     assert_eq!(read + datasets.unread(), datagram.len());
-});
+}

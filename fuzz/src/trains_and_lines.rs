@@ -1,11 +1,9 @@
 //! Any bytes as a train or a line, in each syntax: they are refused with a place in the file, or read, and what was read
 //! can be written and read again as the same.
-#![no_main]
 
 use footplate_store::{Described, parse_described, parse_line, parse_train, write_line, write_train};
-use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+pub(crate) fn fuzz(bytes: &[u8]) {
     for file in ["any.toml", "any.yaml"] {
         match parse_described(file, bytes, None) {
             Ok(Described::Train(read)) => {
@@ -21,4 +19,4 @@ fuzz_target!(|bytes: &[u8]| {
             Err(error) => assert!(error.to_string().starts_with(file), "{error}"),
         }
     }
-});
+}
