@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use anyhow::bail;
 use footplate_core::control::{
-    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
+    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths, WatchdogNotice,
 };
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingSwitches, Mishap};
+use footplate_wire::LinkNotice;
 
 use crate::choice::Choice;
 use crate::rehearsal::Rehearsal;
@@ -74,6 +75,8 @@ pub struct Tally {
     pub diverged: u32,
     /// Trains whose position became unknown.
     pub lost: u32,
+    /// Times that the watchdog stopped a train because it did not run as it should.
+    pub dangers: u32,
     /// Interventions of a person.
     pub hands: u32,
     /// Trains that touched, derailed or ran off the track.
@@ -106,7 +109,8 @@ pub struct Session<'l> {
     /// Since when each train has been on its way to nowhere.
     since: BTreeMap<TrainId, Timestamp>,
     waits: BTreeMap<TrainId, Timestamp>,
-    lost: BTreeMap<TrainId, Timestamp>,
+    /// Since when each train has needed a person.
+    needs_person: BTreeMap<TrainId, Timestamp>,
     talk: bool,
 }
 
@@ -160,7 +164,7 @@ impl<'l> Session<'l> {
             since: trains.iter().map(|train| (*train, began)).collect(),
             trains,
             waits: BTreeMap::new(),
-            lost: BTreeMap::new(),
+            needs_person: BTreeMap::new(),
             talk,
         })
     }
@@ -175,7 +179,12 @@ impl<'l> Session<'l> {
         }
         while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
             let until = end.min(self.rehearsal.line.now() + LOOK);
-            let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
+            let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
+                if let Some(news) = notice.news() {
+                    dispatcher.handle_link(now, news);
+                }
+            };
+            let notice = self.rehearsal.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
             match notice {
                 Some(notice) => self.hear(&notice),
                 None => self.look(),
@@ -230,9 +239,10 @@ impl<'l> Session<'l> {
             DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
             DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
             DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
-            DispatchNotice::HeldAsUnknown { train } => {
-                self.tally.lost += 1;
-                self.lost.insert(*train, now);
+            DispatchNotice::HeldAsUnknown { .. } => self.tally.lost += 1,
+            DispatchNotice::Watch(WatchdogNotice::Danger { .. }) => self.tally.dangers += 1,
+            DispatchNotice::Watch(WatchdogNotice::NeedsPerson { train, .. }) => {
+                self.needs_person.insert(*train, now);
             }
             _ => {}
         }
@@ -276,8 +286,11 @@ impl<'l> Session<'l> {
                     self.tell_truth(train);
                 }
             }
-            if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
+            if self.needs_person.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
                 self.help(train, now);
+            }
+            if self.dispatcher.journey(train).is_none() {
+                self.send(train);
             }
         }
     }
@@ -348,10 +361,7 @@ impl<'l> Session<'l> {
 
     /// A person reads off where a train stands.
     fn help(&mut self, train: TrainId, now: Timestamp) {
-        self.lost.remove(&train);
-        if self.dispatcher.driver().position(train, now).is_some() {
-            return;
-        }
+        self.needs_person.remove(&train);
         let truth = self.rehearsal.world().truth();
         let Some(position) = truth.train(train).and_then(|truth| truth.position) else { return };
         let Some(edge) = self.layout.edge(position.edge) else { return };
@@ -364,7 +374,7 @@ impl<'l> Session<'l> {
 
 fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
-    let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
     if by_blocks {
         dispatcher.reserve_blocks();
     }
