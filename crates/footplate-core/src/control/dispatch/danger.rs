@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::control::supervise::WatchdogNotice;
+use crate::control::supervise::{Alarm, WatchdogNotice};
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;
@@ -19,7 +19,10 @@ impl Dispatcher {
     /// Takes note of what the watchdog says.
     pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: WatchdogNotice) {
         match &notice {
-            WatchdogNotice::Danger { train, stopped, .. } => {
+            WatchdogNotice::Danger { train, stopped, why, .. } => {
+                if matches!(why, Alarm::Lost | Alarm::Elsewhere(_)) {
+                    self.doubt_turnouts();
+                }
                 for stopped in stopped {
                     self.gives_up(*stopped);
                 }
@@ -49,6 +52,12 @@ impl Dispatcher {
         }
         self.is_stirred = true;
         self.say(DispatchNotice::Watch(notice));
+    }
+
+    /// A train was not where it should have been: turnouts may lie otherwise than they were commanded, several at once. Each
+    /// is commanded again before another train relies on it.
+    fn doubt_turnouts(&mut self) {
+        self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
     /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.

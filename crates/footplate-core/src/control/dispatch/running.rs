@@ -51,9 +51,12 @@ impl Dispatcher {
                 State::Lost if self.watchdog.driver().position(id, now).is_some() => {
                     self.found_by_hand(now, id);
                 }
+                State::Lost if self.is_forgotten(now, id) => self.watchdog.lose(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
                 State::Resting
-                    if self.is_somewhere(id) && self.watchdog.driver().position(id, now).is_none() =>
+                    if self.is_somewhere(id)
+                        && self.watchdog.driver().position(id, now).is_none()
+                        && !self.unknown_turnout_ahead(now, id).is_some_and(|unknown| unknown.is_clear) =>
                 {
                     self.set_state(id, State::Lost);
                     self.say(DispatchNotice::HeldAsUnknown { train: id });
@@ -63,8 +66,15 @@ impl Dispatcher {
         }
     }
 
-    /// A train was not seen where it should have been, and there is no way on which it could be found: a person has to say
-    /// where it stands.
+    /// Whether a train is lost and nothing looks for it.
+    fn is_forgotten(&self, now: Timestamp, id: TrainId) -> bool {
+        self.watchdog.is_watching()
+            && !self.watchdog.is_in_danger(id)
+            && self.watchdog.driver().locate(id, now).is_none()
+    }
+
+    /// A sensor did not report a train where it should have, and no path leads to where one could: the watchdog locates it
+    /// again; without one, a person has to say where it is.
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
         self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
@@ -298,7 +308,7 @@ impl Dispatcher {
         self.say(DispatchNotice::Withdrawn { train: id, why });
         // Whoever asked for it has to know.
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
-            self.give_up_journey(id, self.no_way(id));
+            self.give_up_journey(id, self.unreachable(id));
         }
     }
 
