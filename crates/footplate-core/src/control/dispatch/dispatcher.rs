@@ -309,7 +309,7 @@ impl Dispatcher {
             return anchors;
         };
         for _ in 0..layout.edges().len() {
-            let ahead = super::way::edge_from(layout, self.watchdog.driver().turnouts(), node);
+            let ahead = super::path::edge_from(layout, self.watchdog.driver().turnouts(), node);
             let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { break };
             anchors.extend(layout.needs_of(edge).filter(|need| need.facing).map(|need| need.turnout));
             if edge == place.edge {

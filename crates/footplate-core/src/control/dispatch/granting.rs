@@ -18,8 +18,8 @@ use super::movement_authority::{MovementAuthority, Start, granted};
 use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
 
 /// Expected wait for a train at rest and for a running one, in seconds: the first has to be sent away, the second leaves by
 /// itself.
@@ -245,7 +245,7 @@ impl Dispatcher {
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.watchdog.driver().layout();
         let turned = start.turned?;
-        let (way, at) = Way::around(
+        let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
             turned,
@@ -258,7 +258,7 @@ impl Dispatcher {
         };
         // Its place is counted from the node behind it: a turnout there has to lie for it, too.
         let own = layout.needs_of(turned.edge);
-        let needs = way.needs(layout, at - start.room.behind, at);
+        let needs = path.needs(layout, at - start.room.behind, at);
         (!needs.into_iter().chain(own).any(|need| need.facing && lies_otherwise(need))).then_some(turned)
     }
 

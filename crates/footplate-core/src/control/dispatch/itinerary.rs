@@ -10,7 +10,7 @@ use crate::track::{Layout, NodeKind, Position, TurnoutNeed, TurnoutStates};
 use crate::units::{Length, Speed};
 
 use super::obstacles::Obstacles;
-use super::way::edge_from;
+use super::path::edge_from;
 
 /// Shorter moves are hard to make and say nothing of where a train is: it goes round or comes from the other side.
 pub(super) const SHORTEST_RUN: Length = Length::from_mm(200.0);

@@ -11,8 +11,8 @@ use crate::units::Length;
 
 use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
+use super::path::edge_from;
 use super::turnout_command::{SURE, TurnoutCommand};
-use super::way::edge_from;
 
 /// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
 const MOVES: TimeSpan = TimeSpan::from_ms(350);
