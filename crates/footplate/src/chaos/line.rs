@@ -161,6 +161,7 @@ impl<'l> FaultyLine<'l> {
             SimulatedStation::DccEx(board) => board.restart(),
             SimulatedStation::Z21(station) => station.restart(),
             SimulatedStation::Can(station) => station.restart(),
+            SimulatedStation::LocoNet(station) => station.restart(),
         }
     }
 

@@ -14,8 +14,8 @@ use footplate_eval::choice::Choice;
 use footplate_eval::rehearsal::Rehearsal;
 use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
 use footplate_sim::{
-    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, StationSwitches, VirtualBoard,
-    VirtualCentralStation, VirtualStation, VirtualZ21, Z21Switches,
+    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
+    VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
 };
 use footplate_store::Store;
 
@@ -132,6 +132,7 @@ const fn name_of(kind: StationKind) -> &'static str {
         StationKind::DccEx => "dcc-ex",
         StationKind::Z21 => "z21",
         StationKind::MarklinCan => "marklin-can",
+        StationKind::LocoNet => "loconet",
     }
 }
 
@@ -141,6 +142,7 @@ fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> Simulate
         StationKind::DccEx => VirtualBoard::new(world, seed, BoardSwitches::default()).into(),
         StationKind::Z21 => VirtualZ21::new(world, seed, Z21Switches::default()).into(),
         StationKind::MarklinCan => VirtualCentralStation::new(world, seed, CanSwitches::default()).into(),
+        StationKind::LocoNet => VirtualLocoNet::new(world, seed, LocoNetSwitches::default()).into(),
     }
 }
 

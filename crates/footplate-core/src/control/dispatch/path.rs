@@ -14,13 +14,13 @@ const MOST_EDGES: usize = 1_000;
 
 /// Edges in the order of travel.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Way {
+pub(super) struct Path {
     /// Each with where it begins.
     edges: Vec<(EdgeId, Length)>,
     length: Length,
 }
 
-impl Way {
+impl Path {
     /// Goes on over an edge.
     pub(super) fn push(&mut self, layout: &Layout, id: EdgeId) {
         let Some(edge) = layout.edge(id) else { return };
@@ -66,12 +66,12 @@ impl Way {
             before.push(edge);
             left -= layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         }
-        let mut way = Self::default();
-        before.into_iter().rev().for_each(|edge| way.push(layout, edge));
-        let at = way.length + place.offset;
-        way.push(layout, place.edge);
-        way.reach(layout, turnouts, at + ahead);
-        (way, at)
+        let mut path = Self::default();
+        before.into_iter().rev().for_each(|edge| path.push(layout, edge));
+        let at = path.length + place.offset;
+        path.push(layout, place.edge);
+        path.reach(layout, turnouts, at + ahead);
+        (path, at)
     }
 
     /// Goes on as the turnouts lie until it is so long, or the track ends. Where nobody knows how a turnout lies it is
