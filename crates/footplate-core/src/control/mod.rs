@@ -11,13 +11,12 @@ mod dispatch;
 mod drive;
 pub mod learn;
 mod machine;
+mod notice;
 mod supervise;
 
-pub use dispatch::{CLEARANCE, DispatchNotice, Dispatcher, Journey, Reservation, Span, TrainLengths};
-pub use drive::{
-    Achieved, Aim, ArrivalProfile, DriveNotice, Driver, Finished, Gap, Order, OrderId, PacedLine,
-    PlannedArrival, PlannedStop, Promise, Refusal, StopOrder,
-};
+pub use dispatch::{CLEARANCE, Dispatcher, Journey, Reservation, Span, TrainLengths};
+pub use drive::{Aim, ArrivalProfile, Driver, Gap, Order, OrderId, Refusal, StopOrder};
 pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use machine::{Machine, Output};
-pub use supervise::{Alarm, LinkNews, Outcome, Watchdog, WatchdogNotice};
+pub use notice::{Achieved, Finished, Notice, Outcome, PacedLine, PlannedArrival, PlannedStop, Promise};
+pub use supervise::{Alarm, LinkNews, Watchdog};

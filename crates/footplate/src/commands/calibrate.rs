@@ -158,6 +158,7 @@ impl Arguments {
             }
             Some(path) => {
                 let mut store = Store::open_or_create(path)?;
+                store.check()?;
                 self.import(&layout, &logs, &mut store)?;
                 let as_of = self.as_of.map_or_else(now, |moment| moment.0);
                 (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))

@@ -13,10 +13,10 @@ use footplate_sim::{
 };
 
 use super::board_address::BoardAddress;
-use super::can_address::{self, CanAddress, CanPlace};
+use super::cable::Cable;
+use super::can_address::{self, CanAddress};
 use super::loconet_address::{self, LocoNetAddress};
 use super::port::Port;
-use super::stream::Cable;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
@@ -60,17 +60,14 @@ impl Address {
 }
 
 impl Address {
-    /// The cable to a station outside this program; datagrams need none.
+    /// The line to a station outside this program.
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
             Self::Simulated(_) => None,
             Self::Serial(serial) => Some(serial.into()),
             Self::Board(board) => Some(board.into()),
-            Self::Can(can) => match &can.place {
-                CanPlace::Line(port) => Some((port, can.speed).into()),
-                CanPlace::Datagrams { .. } => None,
-            },
-            Self::Z21(_) => None,
+            Self::Z21(z21) => Some(z21.into()),
+            Self::Can(can) => Some(can.into()),
             Self::LocoNet(server) => Some(server.into()),
         }
     }

@@ -7,7 +7,6 @@ use footplate_wire::loconet::Settings;
 
 use super::address::{number, times};
 use super::port::{Port, host_and_port};
-use super::stream::Cable;
 
 const SCHEME: &str = "loconet:";
 /// The port at which servers listen (LbServer).
@@ -68,12 +67,6 @@ impl LocoNetAddress {
             }
         }
         Ok(())
-    }
-}
-
-impl From<&LocoNetAddress> for Cable {
-    fn from(address: &LocoNetAddress) -> Self {
-        (&address.port, address.speed).into()
     }
 }
 

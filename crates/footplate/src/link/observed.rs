@@ -139,6 +139,14 @@ impl<L: Link> Link for ObservedLink<L> {
         self.link.reopen()
     }
 
+    fn real_time(&self) -> Duration {
+        self.link.real_time()
+    }
+
+    fn pause(&mut self, span: Duration) {
+        self.link.pause(span);
+    }
+
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         self.link.guardian()
     }

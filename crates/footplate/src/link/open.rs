@@ -9,8 +9,8 @@ use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Setti
 use footplate_wire::{dcc_ex, loconet, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
-use super::can_address::{CanAddress, CanPlace};
-use super::{Cable, DatagramLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession, StreamLink};
+use super::can_address::CanAddress;
+use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession};
 #[cfg(unix)]
 use crate::guardian::WardLink;
 
@@ -31,11 +31,8 @@ pub(crate) fn open<'l>(
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
         Address::Serial(serial) => open_cable(serial.into())?,
         Address::Board(board) => open_cable(board.into())?,
-        Address::Z21(z21) => Box::new(DatagramLink::open(z21)?),
-        Address::Can(can) => match &can.place {
-            CanPlace::Line(port) => open_cable((port, can.speed).into())?,
-            CanPlace::Datagrams { .. } => Box::new(DatagramLink::open(can)?),
-        },
+        Address::Z21(z21) => open_cable(z21.into())?,
+        Address::Can(can) => open_cable(can.into())?,
         Address::LocoNet(server) => open_cable(server.into())?,
     })
 }
@@ -46,7 +43,7 @@ fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
     if let Some(link) = WardLink::open(&cable)? {
         return Ok(Box::new(link));
     }
-    Ok(Box::new(StreamLink::open(cable)?))
+    Ok(Box::new(CableLink::open(cable)?))
 }
 
 /// The station of an address on its layout, in this process.

@@ -87,7 +87,7 @@ impl Answers {
         let panel = Panel {
             x: "at most (ms)".to_owned(),
             y: "share (%)".to_owned(),
-            from_nought: true,
+            from_zero: true,
             layers: layers.into_iter().collect(),
             ..Panel::default()
         };

@@ -125,7 +125,7 @@ impl Figures {
         let panel = Panel {
             x: "at most (ms)".to_owned(),
             y: "share (%)".to_owned(),
-            from_nought: true,
+            from_zero: true,
             layers: layers.collect(),
             ..Panel::default()
         };
