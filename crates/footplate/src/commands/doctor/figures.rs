@@ -78,6 +78,11 @@ impl Figures {
         }
     }
 
+    /// Whether any poll was answered.
+    pub(super) fn has_replies(&self) -> bool {
+        !self.first_bytes.is_empty() && self.lost < self.asked
+    }
+
     /// The share of requests whose answer was lost.
     pub(super) fn lost_share(&self) -> f64 {
         self.lost as f64 / self.asked.max(1) as f64
