@@ -171,7 +171,7 @@ impl Arguments {
         heard: &Heard<'_>,
         output: &mut dyn Write,
     ) -> anyhow::Result<f64> {
-        // Noise explains best why nothing else was heard.
+        // Noise is the best explanation of a station that was not found.
         figures.check().map_err(|check| {
             heard.ear.noise.clone().map_or_else(|| anyhow!(check), |noise| anyhow!(noise))
         })?;
@@ -205,7 +205,7 @@ impl Arguments {
         Ok(answers.lost_share())
     }
 
-    /// Says what the line changes in the times that trains are driven with.
+    /// Prints how the line changes the time model.
     fn advise(&self, line: Option<&RoundTrips>, output: &mut dyn Write) -> anyhow::Result<()> {
         let Some((line, usual)) = line.zip(self.link.station_kind().usual_line()) else { return Ok(()) };
         let (excess, repeats) = (line.excess(usual), line.repeats());
@@ -270,7 +270,7 @@ struct Ear {
     until: Timestamp,
     noticed: BTreeMap<String, usize>,
     lost: usize,
-    /// What was said of bytes that could not be read.
+    /// The notice about unreadable bytes.
     noise: Option<String>,
 }
 
@@ -288,7 +288,7 @@ impl<M: Machine> Attendant<M> for Ear {
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
-            // Which reads are answered is a line of its own, and finding it out loses some.
+            // The kind of reads has its own line in the report, and finding it out loses some replies.
             LinkNotice::Answers | LinkNotice::Identified { .. } => return,
             LinkNotice::Reads(_) => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
