@@ -14,7 +14,6 @@ pub mod loconet;
 pub mod marklin_can;
 pub mod marklin_serial;
 mod news;
-mod opening;
 mod outstanding;
 mod pacing;
 mod queue;

@@ -1,4 +1,4 @@
-//! What a board and the line to it are like.
+//! Settings of a board and the line to it.
 
 use core::ops::RangeInclusive;
 
@@ -24,7 +24,7 @@ impl TurnoutRequests {
     }
 }
 
-/// What the board is like.
+/// Settings of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
     /// Whether opening the line resets the board, as it does on the serial port of an Arduino. Its banner is awaited then

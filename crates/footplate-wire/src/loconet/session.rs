@@ -14,8 +14,7 @@ use super::outstanding::Awaited;
 use super::request::{HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
 use super::settings::Settings;
 use super::slot::DrivenSlots;
-use crate::dialogue::{Dialogue, Repeat};
-use crate::opening::Opening;
+use crate::dialogue::{Dialogue, Opening, Repeat};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
 use crate::sensors::Sensors;
@@ -29,7 +28,7 @@ const PACING: Pacing = Pacing::new(TimeSpan::from_ms(33), 3, TimeSpan::from_ms(5
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(500);
 
 /// Between two questions for the states of detectors: each may be answered by many of them, at 2.4 ms a report.
-const INTERROGATION_EVERY: TimeSpan = TimeSpan::from_ms(125);
+const INTERROGATION_EVERY: TimeSpan = TimeSpan::from_ms(100);
 
 /// A command station gives a slot away whose locomotive was not commanded for about 200 s: it is commanded again before that.
 const REFRESHED_EVERY: TimeSpan = TimeSpan::from_ms(60_000);
@@ -291,7 +290,7 @@ impl Client {
         }
     }
 
-    /// Everything that has to be known is known.
+    /// Ends the opening: trains may run.
     fn opened(&mut self) {
         self.opening = Opening::Open;
         (self.blind_since, self.polled) = (None, self.dialogue.now);

@@ -1,4 +1,4 @@
-//! What the bus, its detectors and its turnouts are like.
+//! Settings of the bus, its detectors and its turnouts.
 
 use core::ops::RangeInclusive;
 
@@ -7,7 +7,7 @@ use footplate_core::{TimeSpan, TurnoutId};
 use super::request::TURNOUTS;
 use super::time_model::SENSOR_DELAY_LONGEST;
 
-/// What is on the bus.
+/// Settings of the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// The detector's address of the layout's sensor 0.
@@ -16,7 +16,7 @@ pub struct Settings {
     pub first_turnout: u16,
     /// Whether the closed output lays a turnout straight; otherwise the thrown one.
     pub closed_is_straight: bool,
-    /// The longest time from a sensor being occupied until the program hears of it.
+    /// The longest time from a sensor being occupied until the program has the report.
     pub sensor_delay: TimeSpan,
 }
 

@@ -1,4 +1,4 @@
-//! Which contacts are occupied, and what a report about one of them means, whatever the network lost, repeated or reordered.
+//! Sensor states from reports that the network may lose, double or reorder.
 
 use alloc::vec::Vec;
 
@@ -10,18 +10,18 @@ use super::time_model::{NETWORK_LONGEST, Span};
 /// Reports that overtake each other on a network do so within this time.
 const REORDERED_WITHIN: TimeSpan = TimeSpan::from_ms(100);
 
-/// A contact that the station has spoken of.
+/// A contact that the station has reported.
 #[derive(Debug, Clone, Copy)]
 struct Contact {
     number: u16,
     is_occupied: bool,
-    /// When the state was heard of last.
+    /// When its state was last received.
     known: Timestamp,
     /// When the station saw the last change, if it reported it.
     seen: Option<Span>,
-    /// The last report and when it came.
+    /// The last report and its arrival.
     report: Option<(ContactChange, Timestamp)>,
-    /// It became free, and the report of its having become occupied was not heard.
+    /// It became free, and the report that it became occupied was lost.
     is_inferred: bool,
 }
 
@@ -55,7 +55,7 @@ impl Contacts {
             return News::None;
         }
         let window = Span::of_report(now);
-        // A time of 0 is said by stations that do not measure it, too.
+        // Stations that do not measure the time report 0, too.
         let lasted = change.lasted.filter(|ticks| *ticks > 0);
         let before = contact.seen.filter(|_| contact.is_occupied == change.was_occupied);
         let expected = before.zip(lasted).and_then(|(before, ticks)| before.later_by(ticks));

@@ -1,4 +1,4 @@
-//! Finds frames in what arrives, whatever portions it arrives in.
+//! Finds frames in a stream, whatever portions it arrives in.
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ pub const LONGEST_LINE: usize = 1 + 8 + 1 + 2 * MOST_DATA + 4;
 
 /// What an adapter ends its lines with.
 const END_OF_LINE: u8 = b'\r';
-/// What an adapter says when it refuses what it was written.
+/// The answer of an adapter that refuses a line.
 const REFUSED: u8 = 0x07;
 
 /// Cuts what arrives into frames; memory is bounded.
@@ -42,7 +42,7 @@ impl Framing {
         core::mem::replace(&mut self.unread, 0)
     }
 
-    /// How often an adapter has refused what it was written since the last call.
+    /// How often an adapter has refused a line since the last call.
     pub const fn take_refused(&mut self) -> usize {
         core::mem::replace(&mut self.refused, 0)
     }

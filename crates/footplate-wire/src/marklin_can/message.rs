@@ -1,4 +1,4 @@
-//! What a frame says, as data and back. Requests and responses have the same form; the frame says which it is.
+//! Messages of the bus, and their data. Requests and responses have the same form; the frame tells which it is.
 
 use super::frame::{Frame, MOST_DATA, Payload};
 use super::uid::Uid;
@@ -103,21 +103,21 @@ pub enum Message {
         /// Its channel.
         channel: u8,
     },
-    /// How fast a locomotive runs, 0 to 1000; `None` asks.
+    /// The speed of a locomotive, 0 to 1000; `None` asks for it.
     Speed {
         /// The locomotive.
         uid: Uid,
         /// Its speed.
         speed: Option<u16>,
     },
-    /// Which end of a locomotive leads; `None` asks.
+    /// The direction of a locomotive; `None` asks for it.
     Direction {
         /// The locomotive.
         uid: Uid,
         /// The end.
         direction: Option<Direction>,
     },
-    /// A function of a locomotive; `None` asks.
+    /// A function of a locomotive; `None` asks for it.
     Function {
         /// The locomotive.
         uid: Uid,
@@ -175,7 +175,7 @@ pub enum Message {
     },
     /// Start a track box that waits in its loader.
     Start(Uid),
-    /// A file of the station is wanted: its name, padded with zeros.
+    /// A request for a file of the station: its name, padded with zeros.
     File([u8; MOST_DATA]),
     /// A file comes: its length and check sum.
     StreamBegins {

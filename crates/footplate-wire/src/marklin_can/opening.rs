@@ -1,4 +1,4 @@
-//! What the station is asked before trains are driven.
+//! The questions of the opening.
 
 /// A question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -7,7 +7,7 @@ pub(super) enum Question {
     Ping,
     /// The contacts of all modules.
     Modules,
-    /// That the track has power, or has none.
+    /// Sets the track power.
     Power,
     /// The list of locomotives.
     Roster,
@@ -16,6 +16,6 @@ pub(super) enum Question {
 impl Question {
     /// All questions, in the order in which they are asked.
     pub(super) const ALL: [Self; 4] = [Self::Ping, Self::Modules, Self::Power, Self::Roster];
-    /// What is asked when the station was not heard for a while and its list of locomotives is known.
+    /// The questions after a silence, when the list of locomotives is known.
     pub(super) const AGAIN: [Self; 3] = [Self::Ping, Self::Modules, Self::Power];
 }

@@ -29,11 +29,11 @@ pub(super) enum Awaited {
     Roster {
         has_begun: bool,
     },
-    /// How fast a locomotive runs, whatever that is.
+    /// The speed of a locomotive, whatever it is.
     AnySpeed(TrainId, Uid),
     /// That it runs at a step.
     Speed(TrainId, Uid, SpeedStep),
-    /// Which end leads, whichever that is.
+    /// The direction of a locomotive, whatever it is.
     AnyDirection(TrainId, Uid),
     Direction(TrainId, Uid, bool),
     /// That a turnout's coil is powered, or not.

@@ -58,7 +58,7 @@ impl Roster {
         self.length = usize::try_from(length).ok().filter(|length| (1..=LONGEST_STREAM).contains(length));
     }
 
-    /// More of it has come; returns whether that was all and could be read, once.
+    /// Takes more of the stream; returns once whether it is complete and could be read.
     pub(super) fn goes_on(&mut self, bytes: [u8; MOST_DATA]) -> Option<bool> {
         let length = self.length?;
         self.stream.extend(bytes);

@@ -18,8 +18,7 @@ use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
 use super::speed::{HIGHEST_STEP, speed_of};
 use super::uid::Uid;
-use crate::dialogue::Dialogue;
-use crate::opening::Opening;
+use crate::dialogue::{Dialogue, Opening};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
 use crate::session::{Closing, CommandError, Session, Transmit};
@@ -38,7 +37,7 @@ const FRAME_WITHIN: TimeSpan = TimeSpan::from_ms(200);
 /// Opens an adapter: end a half-written line, close, 250 kbit/s, open.
 const OPEN_ADAPTER: &[u8] = b"\r\rC\rS5\rO\r";
 
-/// What a person should check on a network.
+/// What the user should check on a network.
 const NETWORK_CHECKS: Checks = Checks {
     nothing_heard: "check its power and network cable, that CAN is switched on in the station's settings, and that a CS2 sends to this \
                     computer's address",

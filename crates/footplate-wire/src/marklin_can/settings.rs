@@ -1,4 +1,4 @@
-//! What a station and the line to it are like.
+//! Settings of a station and the line to it.
 
 use footplate_core::{TimeSpan, TurnoutId};
 
@@ -15,7 +15,7 @@ pub enum Transport {
     Adapter,
 }
 
-/// What the station is like.
+/// Settings of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// How frames travel.

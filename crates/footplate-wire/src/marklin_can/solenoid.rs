@@ -1,4 +1,4 @@
-//! The one turnout whose coil is powered: current flows as long as the host wants it to.
+//! The turnout whose coil is powered until the host releases it.
 
 use footplate_core::{TimeSpan, Timestamp, TurnoutId};
 

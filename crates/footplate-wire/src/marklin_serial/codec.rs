@@ -1,4 +1,4 @@
-//! What is said to the interface, as bytes and back.
+//! Messages to the interface, and their bytes.
 //!
 //! The virtual station reads requests with the same code. Numbers are decimal in Märklin's
 //! instructions and so they are here.
@@ -10,11 +10,11 @@ use footplate_core::{SpeedStep, TrainId, TurnoutId};
 
 use crate::session::CommandError;
 
-/// Steps 0 to 14; with [`REVERSE`] the first byte of what is said to one locomotive.
+/// Steps 0 to 14; with [`REVERSE`] the first byte of a message to a locomotive.
 const HIGHEST_STEP: u8 = 14;
 /// Turns a locomotive around.
 const REVERSE: u8 = 15;
-/// Added to a step or to [`REVERSE`]: the headlight, or whatever hangs on F0, is on.
+/// Added to a step or to [`REVERSE`]: F0 (the headlight) is on.
 const LIGHT: u8 = 16;
 const SOLENOID_OFF: u8 = 32;
 const TURNOUT_STRAIGHT: u8 = 33;
@@ -37,7 +37,7 @@ const TURNOUTS: RangeInclusive<u16> = 1..=256;
 /// Modules that fit between the reset mode and the next code. The 6051 has one S88 bus of 31.
 const MODULES: RangeInclusive<u8> = 1..=31;
 
-/// One thing that can be said to the interface.
+/// A message to the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Drive a train at a throttle step from 0 to 14.
@@ -46,10 +46,10 @@ pub enum Message {
         train: TrainId,
         /// The step, 0 to 14.
         step: SpeedStep,
-        /// Whether F0 is on; every message to a locomotive says it anew, so `false` switches it off.
+        /// Whether F0 is on; every message to a locomotive sets it, so `false` switches it off.
         light: bool,
     },
-    /// Turn a train around. It can not be read back, and it stops a train dead that is still running.
+    /// Reverse a train. The direction cannot be read back; a moving train stops dead.
     Reverse {
         /// The train, 1 to 80.
         train: TrainId,
@@ -70,13 +70,13 @@ pub enum Message {
         /// `true` for the diverging leg.
         curved: bool,
     },
-    /// Take the power from the solenoid that was switched on last.
+    /// Switch off the solenoid that was switched on last.
     SolenoidOff,
     /// Give power to the track.
     Go,
-    /// Take the power from the whole track.
+    /// Switch the track power off.
     Stop,
-    /// Whether contacts that were read as closed are forgotten by reading them.
+    /// Whether reading a module clears its memory of closed contacts.
     ResetMode {
         /// `true` to forget.
         on: bool,
@@ -91,7 +91,7 @@ pub enum Message {
         /// Which, 1 to 31.
         module: u8,
     },
-    /// Bytes that Märklin's instructions give no meaning. They can be read, not said.
+    /// Bytes without a meaning in Märklin's instructions. They can be read, but not sent.
     Unknown {
         /// The byte that was taken for the first of a message.
         first: u8,
@@ -109,7 +109,7 @@ pub enum Frame {
     Two([u8; 2]),
 }
 
-/// Why a message can not be said to the interface.
+/// Why a message cannot be sent to the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EncodeError {

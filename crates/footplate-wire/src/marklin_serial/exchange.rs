@@ -1,4 +1,4 @@
-//! What is on the line: nothing, a frame on its way out, a reply on its way in, or a silence that is waited for.
+//! The state of the line: idle, sending a frame, receiving a reply, or waiting for silence.
 
 use footplate_core::{Command, TimeSpan, Timestamp};
 
@@ -8,11 +8,11 @@ use super::line::{BYTE_TIME, REPLY_BYTE_SPACING, time_on_line};
 /// Two bytes a module, 31 modules.
 const LONGEST_REPLY: usize = 62;
 
-/// How long the line must be silent before it is spoken to again after a disturbance; srcpd and the course's programs
+/// How long the line must be silent after a disturbance before the next frame; srcpd and the course's programs
 /// wait as long.
 pub(super) const SILENCE: TimeSpan = TimeSpan::from_ms(100);
 
-/// A line that never falls silent is spoken to nevertheless after this time: trains must be stoppable.
+/// A line that never falls silent is used again after this time: trains must be stoppable.
 const LONGEST_SILENCE: TimeSpan = TimeSpan::from_ms(1000);
 
 /// By how much a reply of the 6051 is later than its bytes take at the most; a poll is lost after that.
@@ -29,7 +29,7 @@ const SETTLING: TimeSpan = TimeSpan::from_us(6_000);
 /// Why a frame is sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Purpose {
-    /// To bring the interface back into step.
+    /// Synchronises the interface.
     Recovery,
     /// To release the solenoid.
     Release,
@@ -64,7 +64,7 @@ pub(super) struct Sending {
 }
 
 impl Sending {
-    /// When the byte that was written last has left.
+    /// When the last written byte has left.
     pub(super) fn gone(&self) -> Timestamp {
         self.written + BYTE_TIME
     }
@@ -106,7 +106,7 @@ impl Awaited {
 pub(super) struct Quiet {
     pub(super) until: Timestamp,
     limit: Timestamp,
-    /// Since when the line has been silent.
+    /// Since when the line is silent.
     heard: Timestamp,
     /// Whether the interface may be waiting for a second byte, so that nothing may be said to it but what brings it
     /// back into step.

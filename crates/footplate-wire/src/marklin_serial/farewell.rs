@@ -1,4 +1,4 @@
-//! Who has to be commanded to stop when the session ends, and how far that has come.
+//! The end of a session: which trains must be stopped, and how far that has come.
 
 use alloc::vec::Vec;
 
@@ -6,10 +6,10 @@ use footplate_core::{Command, SpeedStep, TrainId};
 
 use crate::session::{Closing, Confirmation};
 
-/// What there is to do at the end, and what of it was done.
+/// What the end must do, and what it has done.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Farewell {
-    /// Every train that was ever told a step, and whether step 0 was its last and has left.
+    /// Every train that was driven, and whether step 0 was its last command and has left.
     driven: Vec<Driven>,
     pub(super) begun: bool,
     pub(super) released: bool,
@@ -17,7 +17,7 @@ pub(super) struct Farewell {
     power_off: u8,
 }
 
-/// The last word is said twice: the first may be swallowed as the second byte of something.
+/// Power off is written twice: the interface may take the first as the second byte of another message.
 const POWER_OFF_WORDS: u8 = 2;
 
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ impl Farewell {
         }
     }
 
-    /// The commands that stop them all, said or not.
+    /// The commands that stop all of them, sent or not.
     pub(super) fn begin(&mut self) -> impl Iterator<Item = Command> {
         self.begun = true;
         self.driven.iter_mut().map(|driven| {

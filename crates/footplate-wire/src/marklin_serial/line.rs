@@ -1,7 +1,7 @@
-//! How long things take on the serial line of the interface.
+//! Times on the serial line of the interface.
 //!
-//! The line is the narrowest place of the whole railway: every command waits for the poll before it, and every
-//! poll for the command before it.
+//! The line is the bottleneck of the whole railway: each command waits for the poll before it, and each poll for the command before
+//! it.
 
 use footplate_core::TimeSpan;
 use footplate_core::link::TimeModel;
@@ -25,10 +25,10 @@ pub const SOLENOID_HOLD_SHORTEST: TimeSpan = TimeSpan::from_ms(100);
 /// The longest time a solenoid may be powered; forgetting to switch it off burns its coil (same source).
 pub const SOLENOID_HOLD_LONGEST: TimeSpan = TimeSpan::from_ms(500);
 
-/// The times that planners need: those of a polled line of this speed.
+/// The times for planners: those of a polled line of this speed.
 pub const TIME_MODEL: TimeModel = TimeModel::POLLED_2400_BAUD;
 
-/// How long a number of bytes occupies the line when they follow one another without a gap.
+/// How long a number of bytes without gaps occupies the line.
 #[must_use]
 pub const fn time_on_line(bytes: u32) -> TimeSpan {
     TimeSpan::from_ns(BITS_PER_BYTE * NS_PER_S * bytes as i64 / BITS_PER_S)

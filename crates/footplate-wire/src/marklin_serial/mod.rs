@@ -1,7 +1,7 @@
 //! The Märklin 6050 and 6051 interfaces: one or two bytes a message over a 2400 baud serial line.
 //!
-//! Nothing is framed, checked or acknowledged, and the line carries commands and sensor replies in turn. So the
-//! first byte must never be lost: it alone says how many follow.
+//! The protocol has no frames, checksums or acknowledgements, and the line carries commands and sensor replies in turn. The first byte
+//! must never be lost: it alone tells how many follow.
 //!
 //! - [`Message`] and [`ModuleState`] are bytes and their meaning.
 //! - [`Interface`] is the session: it knows what is on the line and what comes next.

@@ -1,4 +1,4 @@
-//! Whether the interface answers reads of one module, or only those of all.
+//! Finds out whether the interface answers reads of one module, or only reads of all.
 
 use core::fmt::{Display, Formatter, Result as FmtResult};
 
@@ -48,7 +48,7 @@ impl ReadsProbe {
         self.found
     }
 
-    /// A whole reply has come. Returns what has been found by it, if that is new.
+    /// Notes a complete reply; returns what it shows, if that is new.
     pub(super) fn answered(&mut self, request: Message) -> Option<ModuleReads> {
         let before = self.found;
         if matches!(request, Message::ReadModule { .. }) {

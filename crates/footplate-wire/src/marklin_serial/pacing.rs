@@ -1,4 +1,4 @@
-//! When the next byte may be written: after CTS has gone down and up again, or after fixed gaps.
+//! The pace of bytes: the next may be written after CTS has gone down and up again, or after fixed gaps.
 
 use footplate_core::{TimeSpan, Timestamp};
 
@@ -9,7 +9,7 @@ use super::line::BYTE_TIME;
 /// published drivers give it 10 ms for.
 const CTS_GUARD: TimeSpan = TimeSpan::from_ms(10);
 
-/// How the program knows when the interface takes the next byte.
+/// How the program knows when the interface accepts the next byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
     /// By its CTS line: after each byte it goes down and up again.

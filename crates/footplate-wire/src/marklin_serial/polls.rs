@@ -1,4 +1,4 @@
-//! Which modules are asked next, and whether there is time for it.
+//! Chooses the next poll, and whether there is time for it.
 
 use footplate_core::{SensorId, TimeSpan, Timestamp};
 
@@ -21,7 +21,7 @@ const HOLD_GRACE: TimeSpan = TimeSpan::from_ms(10);
 /// Bytes of the longest command: the line is kept free for the whole of it, up to its last bit.
 const COMMAND_BYTES: u32 = 2;
 
-/// What is asked for, and when it last was.
+/// The modules, and when each was polled last.
 #[derive(Debug, Clone)]
 pub(super) struct Polls {
     modules: u8,
@@ -64,12 +64,12 @@ impl Polls {
         }
     }
 
-    /// Which reads the interface answers; `None` until that is known.
+    /// Which reads the interface answers; `None` if unknown.
     pub(super) const fn reads(&self) -> Option<ModuleReads> {
         self.reads.found()
     }
 
-    /// The station may be another one.
+    /// Forgets what was learnt: the station may be another one.
     pub(super) fn forget_reads(&mut self) {
         self.reads = ReadsProbe::default();
     }
@@ -97,18 +97,18 @@ impl Polls {
         let lost = reply_time.allowance() + recovery;
         let fits = |request: &Message| {
             free_until.is_none_or(|until| now + longest_poll(*request, reply_time.foreseen()) <= until)
-                // A coil bears no lost reply either.
+                // A coil must be released in time even if the reply is lost.
                 && latest_release.is_none_or(|latest| now + longest_poll(*request, lost) <= latest)
         };
         let all = Message::ReadModules { count: self.modules };
         let all_due = self.asked_all.is_none_or(|asked| now - asked >= ALL_EVERY);
         let one = Message::ReadModule { module: self.watched.unwrap_or_else(|| readings.oldest()) };
-        // One module is as quickly read as all of one.
+        // Reading one module takes as long as reading all of one.
         let reads = if self.modules == 1 { Some(ModuleReads::AllOnly) } else { self.reads.found() };
         let (first, second) = match reads {
             Some(ModuleReads::AllOnly) => (Some(all), None),
             Some(ModuleReads::Single) if self.watched.is_none() => (Some(all), Some(one)),
-            // Whether it answers is tried once all have been read.
+            // Single reads are tried once all modules have been read.
             None | Some(ModuleReads::Single) => (all_due.then_some(all), Some(one)),
         };
         first.into_iter().chain(second).find(fits)

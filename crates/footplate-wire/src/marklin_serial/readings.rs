@@ -1,5 +1,4 @@
-//! What each module showed last, and when it was asked: which contacts have newly closed, and since when at the
-//! earliest.
+//! The last reading of each module and its time: which sensors are newly occupied, and since when at the earliest.
 
 use alloc::vec::Vec;
 
@@ -25,10 +24,10 @@ struct Reading {
     first_two: bool,
 }
 
-/// What one reading of a contact means.
+/// The meaning of one reading of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Read {
-    /// It has closed since the reading before.
+    /// It closed after the previous reading.
     Closed(Event),
     /// It was closed from the start.
     Held(SensorId),
@@ -46,7 +45,7 @@ impl Readings {
             .is_some_and(|known| known.asked.is_some() && !state.since(known.state).is_open())
     }
 
-    /// Takes in what a module showed when it was asked at a time.
+    /// Takes the reading of a module that was polled at a time.
     pub(super) fn take(&mut self, asked: Timestamp, state: ModuleState, mut found: impl FnMut(Read)) {
         let Some(at) = usize::from(state.module).checked_sub(1) else { return };
         let Some(known) = self.modules.get_mut(at) else { return };
@@ -64,7 +63,7 @@ impl Readings {
         known.state = state;
     }
 
-    /// The module that was asked longest ago.
+    /// The module that was polled longest ago.
     pub(super) fn oldest(&self) -> u8 {
         let oldest = self.modules.iter().min_by_key(|reading| reading.asked);
         oldest.map_or(1, |reading| reading.state.module)

@@ -1,16 +1,16 @@
-//! The words that bring the interface back into step after bytes may have been lost.
+//! The messages that synchronise the interface after bytes may have been lost.
 //!
-//! An interface that waits for the second byte of a message takes the next byte for it, whatever that is. One word
-//! about power is therefore enough to bring it into step: it is swallowed or obeyed, and does no harm either way. After
-//! the first lost reply no more is said before the next read, so that sensors are read again soon; a solenoid that the
-//! swallowed word may have powered is released after the reply. When that read is lost, too, or the line has just been
-//! opened, the station may have been restarted: then the power and the reset mode are said as well.
+//! An interface that waits for the second byte of a message takes any next byte for it. One power message is therefore enough to
+//! synchronise it: it is swallowed or obeyed, and harmless either way. After the first lost reply nothing else is sent before the next
+//! read, so that sensors are read again soon; a solenoid that the swallowed message may have powered is released after the reply. If
+//! that read is lost, too, or the line has just been opened, the station may have been restarted: then power and reset mode are set
+//! as well.
 
 use alloc::collections::VecDeque;
 
 use super::codec::Message;
 
-/// What still has to be said, and whether the interface can be out of step.
+/// The messages still to send, and whether the interface may be out of step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Recovery {
     words: VecDeque<Message>,
@@ -20,7 +20,7 @@ pub(super) struct Recovery {
     is_unanswered: bool,
     /// The interface may take the next byte for the second one of a message.
     is_out_of_step: bool,
-    /// The last frame on the line was one of these words.
+    /// The last frame on the line was one of these messages.
     has_just_spoken: bool,
 }
 
@@ -35,7 +35,7 @@ impl Recovery {
         (self.releases_later, self.is_unanswered, self.is_out_of_step) = (true, true, true);
     }
 
-    /// Everything that an interface has to know of which nothing is known.
+    /// All messages that an interface in an unknown state needs.
     pub(super) fn begin_anew(&mut self, power: Message) {
         self.words.clear();
         // The first may be swallowed.
@@ -43,13 +43,13 @@ impl Recovery {
         (self.releases_later, self.is_unanswered, self.is_out_of_step) = (false, true, true);
     }
 
-    /// The next word. A release is left out while a solenoid is powered on purpose.
+    /// The next message. A release is left out while a solenoid is powered on purpose.
     pub(super) fn next(&mut self, solenoid_is_powered: bool) -> Option<Message> {
         let word = self.words.pop_front()?;
         if word == Message::SolenoidOff && solenoid_is_powered { self.words.pop_front() } else { Some(word) }
     }
 
-    /// A frame has left; whether it was a word of these.
+    /// Notes a frame that has left; returns whether it was one of these messages.
     pub(super) fn spoke(&mut self, is_word: bool) {
         self.is_out_of_step &= !is_word;
         self.has_just_spoken = is_word;
@@ -63,7 +63,7 @@ impl Recovery {
         }
     }
 
-    /// The interface was in step all the time.
+    /// Notes that the interface was in step.
     pub(super) fn cancel(&mut self) {
         *self = Self::default();
     }
@@ -72,7 +72,7 @@ impl Recovery {
         self.is_out_of_step
     }
 
-    /// Whether a stop may follow the last word as its next byte would.
+    /// Whether a stop may directly follow the last message.
     pub(super) const fn has_just_spoken(&self) -> bool {
         self.has_just_spoken
     }

@@ -1,4 +1,4 @@
-//! How much later than its bytes take a reply comes, as learnt from the replies that came.
+//! Learns how much later than its bytes need a reply arrives.
 
 use footplate_core::TimeSpan;
 
@@ -38,12 +38,12 @@ impl ReplyTime {
         self.latest = self.latest.map(|latest| latest.max(late.min(LATEST)));
     }
 
-    /// The station may be another one.
+    /// Forgets what was learnt: the station may be another one.
     pub(super) fn forget(&mut self) {
         self.latest = None;
     }
 
-    /// How late a reply usually is; `None` before the first.
+    /// How late replies usually are; `None` before the first.
     pub(super) const fn usual(&self) -> Option<TimeSpan> {
         self.latest
     }

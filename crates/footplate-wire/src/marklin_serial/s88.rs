@@ -1,4 +1,4 @@
-//! What the interface answers: the contacts of its S88 sensor modules.
+//! Replies of the interface: the contacts of its S88 sensor modules.
 //!
 //! Two bytes a module, the first contact in the highest bit of the first byte.
 
@@ -23,7 +23,7 @@ pub struct ModuleState {
     closed: u16,
 }
 
-/// A reply that does not fit what was asked.
+/// A reply that does not fit the request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReplyError {
@@ -64,7 +64,7 @@ impl ModuleState {
         contacts.map(move |at| SensorId(first + at))
     }
 
-    /// A module on which nothing is closed.
+    /// A module without closed contacts.
     pub(super) const fn all_open(module: u8) -> Self {
         Self { module, closed: 0 }
     }
@@ -73,7 +73,7 @@ impl ModuleState {
         self.closed == 0
     }
 
-    /// What is closed and was not in the state before.
+    /// The contacts that are closed now and were not in an earlier state.
     pub(super) const fn since(self, before: Self) -> Self {
         Self { module: self.module, closed: self.closed & !before.closed }
     }

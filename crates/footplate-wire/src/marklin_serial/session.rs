@@ -1,4 +1,4 @@
-//! Speaks with the interface: commands before polls, one poll at a time, and every solenoid released.
+//! The session with the interface: commands before polls, one poll at a time, and every solenoid released.
 
 mod hearing;
 
@@ -22,10 +22,10 @@ use super::solenoid::Solenoid;
 use crate::queue::Queue;
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
-/// How long CTS may be down before a person should know: no message and no reply takes so long.
+/// CTS down for longer than this is reported: no message and no reply takes so long.
 const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 
-/// Commands since the last reply that are said again if the next is lost; older ones were long acted on.
+/// The number of commands since the last reply that are repeated if the next is lost; older ones were obeyed long ago.
 const SAID_AGAIN: usize = 16;
 
 /// The client's session with a 6050 or 6051.
@@ -48,14 +48,14 @@ pub struct Interface {
     recovery: Recovery,
     /// A stop is said before the line has fallen silent; it goes on to wait for that afterwards.
     is_overtaken: bool,
-    /// What was commanded since the last whole reply.
+    /// Commands since the last complete reply.
     unanswered: Vec<Command>,
     farewell: Farewell,
-    /// Whether the track is meant to have power.
+    /// Whether the track should have power.
     power: bool,
-    /// Bytes that nobody asked for, since it was last said.
+    /// Unexpected bytes since the last report of them.
     stray: usize,
-    /// Whether the line has to fall silent before the next poll.
+    /// Whether the line must fall silent before the next poll.
     disturbed: bool,
     said_not_ready: bool,
     /// Whether something was said to it without a time that may let it go on at once.

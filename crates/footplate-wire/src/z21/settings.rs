@@ -1,4 +1,4 @@
-//! What a station, its sensors and its turnouts are like.
+//! Settings of a station, its sensors and its turnouts.
 
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
@@ -11,7 +11,7 @@ use super::request::{Request, TURNOUTS};
 use super::speed::Steps;
 use super::time_model::SENSOR_DELAY_LONGEST;
 
-/// What the station is like.
+/// Settings of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// The steps of the decoders.
@@ -26,7 +26,7 @@ pub struct Settings {
     pub first_turnout: u16,
     /// Which of a turnout's outputs lays it straight: the second (P = 1, RCN-213), or the first.
     pub second_is_straight: bool,
-    /// The longest time from a sensor being occupied until the program hears of it.
+    /// The longest time from a sensor being occupied until the program has the report.
     pub sensor_delay: TimeSpan,
 }
 
@@ -45,7 +45,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What this client has to be told.
+    /// Returns the subscription of this client.
     pub(super) fn broadcasts(&self) -> Broadcasts {
         Broadcasts::STATES | Broadcasts::RAIL_COM | Broadcasts::SYSTEM_STATE | self.feedback.broadcasts()
     }

@@ -17,8 +17,9 @@ struct Server {
     room: u8,
     /// Messages that the server cannot put on the bus, by their count.
     loses: fn(usize) -> bool,
-    /// Whether the station hears anything, and whether the server echoes.
+    /// Whether the server answers, whether the command station has power, and whether the server echoes.
     answers: bool,
+    is_on: bool,
     echoes: bool,
     count: usize,
 }
@@ -98,7 +99,8 @@ impl Station for Server {
         let echo = self.echoes.then_some(message).into_iter();
         let mut answer: String = echo.map(|message| Line::Receive(message).text()).collect();
         answer.push_str("SENT OK\r\n");
-        answer.extend(self.obey(message).into_iter().map(|message| Line::Receive(message).text()));
+        let heard = if self.is_on { self.obey(message) } else { vec![] };
+        answer.extend(heard.into_iter().map(|message| Line::Receive(message).text()));
         (vec![message], vec![answer.into_bytes()])
     }
 }
@@ -114,6 +116,7 @@ impl Desk {
             room: 10,
             loses: |_| false,
             answers: true,
+            is_on: true,
             echoes: true,
             count: 0,
         };
@@ -334,6 +337,14 @@ fn silence_and_noise_are_told_with_what_to_check() {
     desk.station.answers = true;
     desk.run_for(4_000);
     assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers));
+    desk.notices.clear();
+    // A server without a command station behind it returns what it is sent.
+    desk.station.is_on = false;
+    desk.run_for(4_000);
+    let silent = |notice: &&LinkNotice| matches!(notice, LinkNotice::Silent { .. });
+    assert_eq!(desk.notices.iter().filter(silent).count(), 1, "{:?}", desk.notices);
+    desk.station.is_on = true;
+    desk.run_for(4_000);
     desk.notices.clear();
     for _ in 0..20 {
         desk.client.handle_bytes(desk.now, b"HTTP/1.1 400 Bad Request\r\n");

@@ -24,7 +24,9 @@ impl Client {
         self.dialogue.hear_noise(unread);
         match line {
             Some((_, Ok(line))) => {
-                let was_silent = self.dialogue.hear(now);
+                // A server that only returns this client's messages says nothing about the command station.
+                let is_of_bus = matches!(&line, Line::Receive(message) if !self.outbox.is_own(message));
+                let was_silent = is_of_bus && self.dialogue.hear(now);
                 match line {
                     Line::Version(version) => self.identified(version),
                     Line::Receive(message) => self.take(now, message),

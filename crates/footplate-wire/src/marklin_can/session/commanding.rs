@@ -51,7 +51,7 @@ impl Client {
         }
     }
 
-    /// The number of a train on the bus: by the station's list, or by its address.
+    /// Returns the number of a train on the bus, from the station's list or its address.
     pub(super) fn uid(&self, train: TrainId) -> Uid {
         self.roster.uid(train).unwrap_or_else(|| self.settings.locomotives.uid(train.0))
     }
@@ -128,7 +128,7 @@ impl Client {
         Outgoing::commands(command, message, Some(awaited))
     }
 
-    /// A train is commanded to run at a step, reversed or not; returns whether it runs forward then.
+    /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
     fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
         self.suspected.retain(|other| *other != train);
         self.dialogue.commanded(train, step, reverses)

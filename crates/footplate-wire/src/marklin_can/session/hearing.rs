@@ -13,11 +13,11 @@ use super::super::speed::step_of;
 use super::super::time_model::{CONTACTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
-use crate::opening::Opening;
+use crate::dialogue::Opening;
 use crate::queue::train_of;
 use crate::session::LinkNotice;
 
-/// What this program says of itself when it is asked: the version of the protocol that it speaks, and a device without a cable of its
+/// What this program answers to a ping: the version of the protocol that it speaks, and a device without a cable of its
 /// own on the bus.
 const VERSION: (u8, u8) = (2, 0);
 const KIND: u16 = 0xFFE0;
@@ -110,7 +110,7 @@ impl Client {
         }
     }
 
-    /// The train of a number on the bus, if it was ever commanded here.
+    /// Returns the train with a number on the bus, if it was commanded here.
     fn train(&self, uid: Uid) -> Option<TrainId> {
         let known = self.dialogue.locomotives.iter().map(|locomotive| locomotive.train);
         known.chain(self.dialogue.waiting.iter().filter_map(train_of)).find(|train| self.uid(*train) == uid)
@@ -126,13 +126,12 @@ impl Client {
     }
 
     fn hear_of_participant(&mut self, uid: Uid, (major, minor): (u8, u8), kind: u16) {
-        if uid == self.settings.uid || self.participants.contains(&uid) {
+        // A bus has few participants; a flood of made-up ones is neither kept nor reported.
+        let is_full = self.participants.len() >= usize::from(u8::MAX);
+        if uid == self.settings.uid || is_full || self.participants.contains(&uid) {
             return;
         }
-        // A bus has few participants; a flood of made-up ones is not kept.
-        if self.participants.len() < usize::from(u8::MAX) {
-            self.participants.push(uid);
-        }
+        self.participants.push(uid);
         let identity = format!("{}, number {:08X}, version {major}.{minor}", kind_in_words(kind), uid.0);
         self.dialogue.notify(LinkNotice::Identified { identity });
     }
@@ -151,7 +150,7 @@ impl Client {
         self.unverified = queries.collect();
     }
 
-    /// Everything that has to be known is known.
+    /// Ends the opening: trains may run.
     pub(super) fn opened(&mut self) {
         self.opening = Opening::Open;
         self.is_blind = false;

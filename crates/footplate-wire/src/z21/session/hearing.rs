@@ -15,7 +15,7 @@ use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
-use crate::opening::Opening;
+use crate::dialogue::Opening;
 use crate::outstanding::{Awaited as _, Outstanding};
 use crate::session::LinkNotice;
 
