@@ -88,7 +88,7 @@ impl Station for Server {
         let mut lines = Lines::default();
         let read: Vec<Line> =
             bytes.iter().filter_map(|byte| lines.push(*byte).map(|line| Line::read(line).unwrap())).collect();
-        let [Line::Send(message)] = read[..] else { panic!("{read:?}") };
+        let [Line::Send(message)] = read[..] else { unreachable!("{read:?}") };
         self.count += 1;
         if !self.answers {
             return (vec![message], vec![]);
