@@ -1,10 +1,11 @@
-//! What a scorer asks of a train: random, and the same for the same seed.
+//! Random tasks of a score: the same for the same seed.
 
-/// A small generator of the scorer's own, so that what is asked depends on no draw of the world (Steele, 2014).
+/// A random generator of its own, so that tasks do not depend on the draws of the world (SplitMix64; Steele, Lea and
+/// Flood, 2014).
 pub struct Choice(u64);
 
 impl Choice {
-    /// What is asked by this seed.
+    /// The tasks of a seed.
     pub const fn new(seed: u64) -> Self {
         Self(seed ^ 0x9e37_79b9_7f4a_7c15)
     }
@@ -17,12 +18,12 @@ impl Choice {
         z ^ (z >> 31)
     }
 
-    /// Between two numbers.
+    /// A number between two others.
     pub fn between(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
-    /// One of several.
+    /// A random element.
     pub fn of<'a, T>(&mut self, all: &'a [T]) -> Option<&'a T> {
         all.get((self.bits() % all.len().max(1) as u64) as usize)
     }

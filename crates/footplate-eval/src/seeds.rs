@@ -1,4 +1,4 @@
-//! The seeds of runs, as a person gives them or as a commit draws them.
+//! Seeds, as given on the command line or as drawn by a commit.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -7,18 +7,18 @@ use anyhow::{anyhow, bail};
 
 use crate::choice::Choice;
 
-/// More runs of a scenario say nothing new; a slip of the finger does.
+/// The most seeds: more runs of a scenario add nothing, and a typing error should be rejected.
 const MOST_SEEDS: u64 = 100_000;
-/// What stands before the number of seeds that a commit draws.
+/// The prefix of a number of seeds that a commit draws.
 pub const FRESH: &str = "fresh:";
-/// Digits of a commit's hash that its seeds are drawn from.
+/// Digits of a commit's hash that determine its seeds.
 const HASH_DIGITS: usize = 12;
-/// Behind a hash where the files differ from the commit.
+/// The suffix of a hash if files differ from the commit.
 const CHANGED: &str = "+changes";
-/// Fresh seeds lie between these: above every seed that was ever chosen by hand, and short enough to be typed.
+/// The range of fresh seeds: above every seed that was ever chosen by hand, and short enough to type.
 const FRESH_SEEDS: [f64; 2] = [1e6, 1e7];
 
-/// One seed, all from one to another, or as many as are asked for that nobody chose.
+/// One seed, a range of seeds, or fresh seeds that a commit draws.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds {
     all: Vec<u64>,
@@ -26,11 +26,11 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// Reads `7`, `1..100` with both ends, `fresh:64` for seeds that the current commit draws, or `fresh:64@5731edca1f20`
-    /// for those of another one.
+    /// Parses `7`, `1..100` with both ends, `fresh:64` for seeds that the current commit draws, or
+    /// `fresh:64@5731edca1f20` for those of another commit.
     ///
     /// # Errors
-    /// When the text is none of these, with what would be right; and where no commit is found.
+    /// The text is none of these, or no commit is found.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
         match text.trim().strip_prefix(FRESH) {
             Some(fresh) => Self::fresh(fresh),
@@ -85,18 +85,18 @@ impl Seeds {
         Ok(Self { all: drawn.into_iter().collect(), written })
     }
 
-    /// In order.
+    /// All seeds, in order.
     pub fn iter(&self) -> impl Iterator<Item = u64> + Clone + use<> {
         self.all.clone().into_iter()
     }
 
-    /// As it is given on the command line; fresh seeds with the commit that drew them.
+    /// The text for the command line; fresh seeds with the commit that drew them.
     pub fn written(&self) -> &str {
         &self.written
     }
 }
 
-/// The hash of the commit that the files around are of, marked where they differ from it.
+/// The hash of the current commit, marked if files differ from it.
 fn current_commit() -> anyhow::Result<String> {
     let git = |arguments: &[&str]| {
         let said = Command::new("git").args(arguments).output().ok().filter(|said| said.status.success());

@@ -10,7 +10,7 @@ use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingSwitches, Mishap};
 
 use crate::choice::Choice;
-use crate::rehearsal::Rehearsal;
+use crate::testbed::PreparedTrains;
 
 /// How often the truth is compared with what trains hold.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
@@ -95,7 +95,7 @@ pub struct Tally {
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: Rehearsal<'l>,
+    rehearsal: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
@@ -117,7 +117,7 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
@@ -358,7 +358,7 @@ impl<'l> Session<'l> {
     }
 }
 
-fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
+fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
     let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
     if by_blocks {

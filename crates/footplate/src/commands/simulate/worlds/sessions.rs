@@ -17,7 +17,7 @@ use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
 use crate::commands::written_layout::WrittenLayout;
 use crate::witness::Input;
 use footplate_eval::driving::{Plan, TRAIN};
-use footplate_eval::rehearsal::{VirtualLine, calibrate};
+use footplate_eval::testbed::{VirtualLine, calibrate};
 
 /// Stops are asked for from steps whose true speed is at least this, in mm/s (chosen: slower ones may not move at all).
 const SLOWEST_MM_PER_S: f64 = 35.0;
