@@ -7,11 +7,10 @@
 //! traffic  disasters          several trains; faults
 //! survey                      lengths estimated from runs
 //! testbed                     calibrated trains in a simulated world: the start of every score
-//! seeds  choice               seeds and random tasks
+//! seeds                       seeds and random tasks
 //! figures  written_scores     statistics and their output
 //! ```
 
-pub mod choice;
 pub mod disasters;
 pub mod driving;
 pub mod figures;

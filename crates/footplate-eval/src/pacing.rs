@@ -16,7 +16,7 @@ use self::arrive::{Arrived, arrive};
 use self::follow::{Followed, Kept, follow};
 use self::hold::{Held, hold};
 pub use self::page::Page;
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// Three trains, in the order in which they would follow each other.

@@ -11,7 +11,7 @@ use footplate_sim::LivingSwitches;
 
 pub use self::page::Page;
 use self::ride::{Ridden, Told, ride};
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];

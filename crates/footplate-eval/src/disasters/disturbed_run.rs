@@ -7,7 +7,7 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::kind::{Kind, places_along};
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// The disturbed train.

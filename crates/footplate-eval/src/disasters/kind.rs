@@ -4,7 +4,7 @@ use footplate_core::track::Position;
 use footplate_core::{Length, TimeSpan, TrainId};
 use footplate_sim::{End, LawFamily, Train, VirtualStation};
 
-use crate::choice::Choice;
+use crate::seeds::Choice;
 
 /// The time that the station is without power.
 const POWER_CUT: TimeSpan = TimeSpan::from_s(4.0);

@@ -5,7 +5,7 @@ use footplate_core::track::{Landmark, Layout, TurnoutStates};
 use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
 
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{Calibrated, VirtualLine};
 
 /// The train's address.

@@ -8,7 +8,7 @@ use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use super::counted::Counted;
 use super::hold::{speed, steps, told_the_truth};
 use super::tracked::LOOK;
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often each train is asked.

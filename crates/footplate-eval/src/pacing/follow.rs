@@ -10,7 +10,7 @@ use footplate_sim::living::Truth;
 use super::counted::Counted;
 use super::hold::{speed, steps};
 use super::tracked::{LOOK, Odometer};
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// The leader runs at speeds between these (mm/s), each for a time between those (s).

@@ -10,8 +10,8 @@ use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Times
 
 use super::counted::Counted;
 use super::tracked::{LOOK, Odometer, TrueWay};
-use crate::choice::Choice;
 use crate::driving::known;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// Speeds that are asked for (mm/s).

@@ -9,7 +9,7 @@ use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingSwitches, Mishap};
 
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::PreparedTrains;
 
 /// How often the truth is compared with what trains hold.

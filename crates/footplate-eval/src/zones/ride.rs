@@ -7,7 +7,7 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 
 use super::passage::{Passage, Watched};
-use crate::choice::Choice;
+use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often the truth is looked at: a train of 400 mm/s runs 8 mm meanwhile.

@@ -1,6 +1,5 @@
 //! `footplate demo`: calibrates two unknown trains of a simulated layout and stops them at given places.
 
-mod beginning;
 mod calibrating;
 mod driving;
 mod outcome;
@@ -25,8 +24,8 @@ use crate::clock::{local, now};
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::Speed;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
-pub(crate) use beginning::TourBeginning;
 use driving::Tour;
+pub(crate) use driving::TourBeginning;
 use railway::{Railway, SharedRecord};
 use running_demo::Demo;
 use screen::{Manner, Screen};
