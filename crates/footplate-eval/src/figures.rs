@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_those_of_the_school() {
+    fn statistics_match_textbook_values() {
         let values = || [3.0, -4.0, 0.0, 5.0].into_iter();
         assert_eq!(quantile(values(), 0.0), Some(-4.0));
         assert_eq!(quantile(values(), 1.0), Some(5.0));

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{anyhow, bail};
 
 /// The most seeds: more runs of a scenario add nothing, and a typing error should be rejected.
-const MOST_SEEDS: u64 = 100_000;
+const MAX_SEEDS: u64 = 100_000;
 /// The prefix of a number of seeds that a commit draws.
 pub const FRESH: &str = "fresh:";
 /// Digits of a commit's hash that determine its seeds.
@@ -54,8 +54,8 @@ impl Seeds {
         if seeds.is_empty() {
             bail!("the range ends before it begins; it should be {}..{}", seeds.end(), seeds.start());
         }
-        if seeds.end() - seeds.start() >= MOST_SEEDS {
-            bail!("the range should have at most {MOST_SEEDS} seeds");
+        if seeds.end() - seeds.start() >= MAX_SEEDS {
+            bail!("the range should have at most {MAX_SEEDS} seeds");
         }
         let (first, last) = (seeds.start(), seeds.end());
         let written = if first == last { first.to_string() } else { format!("{first}..{last}") };
@@ -67,8 +67,8 @@ impl Seeds {
             Some((count, commit)) => (count, commit.to_owned()),
             None => (text, current_commit()?),
         };
-        let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MOST_SEEDS).contains(count)) else {
-            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MOST_SEEDS}");
+        let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MAX_SEEDS).contains(count)) else {
+            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MAX_SEEDS}");
         };
         let digits = commit.trim_end_matches(CHANGED);
         let Some(hash) = digits.get(..HASH_DIGITS).and_then(|hash| u64::from_str_radix(hash, 16).ok()) else {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_seed_is_said_with_what_would_be_right() {
+    fn invalid_seeds_are_rejected_with_the_correct_form() {
         let refusal = |text| Seeds::parse(text).unwrap_err().to_string();
         assert!(refusal("x..3").starts_with("`x` is no seed"));
         assert_eq!(refusal("9..1"), "the range ends before it begins; it should be 1..9");

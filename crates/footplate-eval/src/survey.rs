@@ -32,22 +32,22 @@ pub fn score(
     let switches = LivingSwitches::well_kept();
     let truth = LivingLayout::draw(layout, seed, &trains, &switches)?;
     let bare = without_lengths(layout, known, &truth)?;
-    let rehearsal = PreparedTrains::prepare_on(layout, &bare, seed, &trains, &switches, budget)?;
+    let prepared = PreparedTrains::prepare_on(layout, &bare, seed, &trains, &switches, budget)?;
     let sections = SectionIndex::of(&bare);
-    let models: Vec<_> = trains.iter().filter_map(|train| rehearsal.models.get(train)).collect();
+    let models: Vec<_> = trains.iter().filter_map(|train| prepared.models.get(train)).collect();
     let survey = TrackSurvey::of(&bare, &sections, &models).ok_or_else(|| anyhow!("no train ran"))?;
     let mut surveyed = Surveyed {
         seed,
         distances: Vec::new(),
         not_run: 0,
         scale: survey.scale(),
-        faults: rehearsal.world().mishaps().len(),
+        faults: prepared.world().mishaps().len(),
     };
     let mut seen = Vec::new();
     let known_hop = layout
         .hops()
         .find(|hop| hop.edges.iter().any(|edge| edge.stretch() == known) && is_between_sensors(layout, hop));
-    let path_length = |hop: &Hop<'_>| path_length_mm(&rehearsal, &trains, layout, hop);
+    let path_length = |hop: &Hop<'_>| path_length_mm(&prepared, &trains, layout, hop);
     // Scales path lengths such that the known edge has its true length, as the survey does.
     let factor = known_hop.and_then(|hop| Some(path_length(&hop)? / true_mm(&truth, &hop))).unwrap_or(1.0);
     for hop in layout.hops().filter(|hop| is_between_sensors(layout, hop)) {
@@ -137,7 +137,7 @@ fn true_mm(world: &LivingLayout<'_>, hop: &Hop<'_>) -> f64 {
 
 /// The mean path length of a hop over all trains and both directions.
 fn path_length_mm(
-    rehearsal: &PreparedTrains<'_>,
+    prepared: &PreparedTrains<'_>,
     trains: &[TrainId],
     layout: &Layout,
     hop: &Hop<'_>,
@@ -146,7 +146,7 @@ fn path_length_mm(
     let sensors =
         [hop.from, hop.to].map(|node| Some([layout.sensor_at(node)?, layout.sensor_at(node.reverse())?]));
     let [Some([from, from_back]), Some([to, to_back])] = sensors else { return None };
-    let truth = rehearsal.world().truth();
+    let truth = prepared.world().truth();
     let path_length = trains.iter().flat_map(|train| {
         [truth.felt(*train, hop.edges, from, to), truth.felt(*train, &back, to_back, from_back)]
     });

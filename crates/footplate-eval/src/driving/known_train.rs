@@ -204,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_oracle_says_of_a_train_is_true() {
+    fn the_oracle_model_matches_the_train() {
         let layout = footplate_store::layout_named("track-a").unwrap().layout;
         let (sections, turnouts) = (SectionIndex::of(&layout), TurnoutStates::unknown());
         let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };

@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_told_apart_from_one_of_another_version() {
+    fn invalid_models_differ_from_models_of_another_version() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         let other = MotionFile { model_version: "0".to_owned(), ..file() };

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_figures_are_those_worked_out_by_hand() {
+    fn scores_match_a_hand_calculation() {
         // Given reports 5 ms early and 10, 20, 30, 60 ms late, and one without a forecast,
         let hits = [Some(-5), Some(10), Some(20), Some(30), Some(60), None].map(hit);
         let score = ForecastScore::of(hits.iter());
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_is_measured_where_we_are_and_at_our_speed() {
+    fn a_reference_is_scored_on_common_detections() {
         let hits = [Some(10), None].map(hit);
         let reference = ForecastScore::of_reference(hits.iter(), ReferenceForecaster::LastLap);
         assert_eq!((reference.hits, reference.scored, reference.coverage), (2, 1, None));

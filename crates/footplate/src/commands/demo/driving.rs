@@ -41,12 +41,12 @@ pub(super) struct Tour<'l> {
 impl<'l> Tour<'l> {
     pub(super) fn new(
         demo: &mut Demo<'_, '_, '_>,
-        on: &'l WrittenLayout,
+        written: &'l WrittenLayout,
         train: TrainId,
         known: &Calibrated,
     ) -> anyhow::Result<Self> {
-        let layout = &on.layout;
-        let beginning = TourBeginning::new(on, known);
+        let layout = &written.layout;
+        let beginning = TourBeginning::new(written, known);
         let scribe = demo.begin_machine(TourBeginning::KIND, &beginning)?;
         let driver = Witnessed::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
@@ -269,10 +269,10 @@ impl TourBeginning {
     /// The kind of this machine in a store.
     pub(crate) const KIND: &'static str = "tour";
 
-    pub(super) fn new(on: &WrittenLayout, known: &Calibrated) -> Self {
+    pub(super) fn new(written: &WrittenLayout, known: &Calibrated) -> Self {
         Self {
-            layout: on.text.clone(),
-            turnouts: on.legs(&known.turnouts),
+            layout: written.text.clone(),
+            turnouts: written.legs(&known.turnouts),
             model: known.fit.model().clone(),
             locator: known.locator.clone(),
         }

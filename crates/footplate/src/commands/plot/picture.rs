@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_of_the_values_lie_below_the_middle_one_and_the_wildest_are_left_out() {
+    fn the_median_halves_the_values_and_outliers_are_cut() {
         let curve = shares((0..=100).rev().map(f64::from).chain([f64::NAN]));
         assert_eq!(curve.first(), Some(&(0.0, 0.0)));
         assert_eq!(curve.last(), Some(&(95.0, 95.0)));
