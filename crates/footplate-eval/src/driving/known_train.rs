@@ -88,13 +88,13 @@ pub(crate) fn known(
     // The residuals of the model's laws, from the train itself.
     let stops = steps(numbers.highest).map(|step| {
         let speed = engine.speeds.speed(step, Approach::Below);
-        let from_truth = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+        let from_truth = speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
         (speed.as_m_per_s(), (from_truth - plain.stop(step, Approach::Below).distance).as_m())
     });
     fill_nodes(&mut numbers.values[STOP_NODES..STOP_NODES + NODES], &stops.collect::<Vec<_>>());
     let starts = steps(numbers.highest).filter_map(|step| {
         let from_truth =
-            engine.way_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
+            engine.distance_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
         let predicted = distance_after_start(context, &plain, step)?;
         (from_truth > Length::ZERO).then(|| {
             (engine.speeds.speed(step, Approach::Below).as_m_per_s(), (from_truth - predicted).as_m())
@@ -218,7 +218,8 @@ mod tests {
                 let found = model.speed(step, Approach::Below).value;
                 // Partly warm: a train deviates at most 2.5 % from its warm speed.
                 assert!((0.97..1.01).contains(&(found / speed)), "{law} {step}: {found:?} for {speed:?}");
-                let from_truth = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+                let from_truth =
+                    speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
                 let said = model.stop(step, Approach::Below).distance;
                 // The stops of a counter decoder jump from step to step by more than the model's nodes can follow.
                 let within_mm = if law == LawFamily::Momentum { 60.0 } else { 10.0 };

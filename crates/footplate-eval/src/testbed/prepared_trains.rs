@@ -177,7 +177,7 @@ mod tests {
             let sensor = layout.sensor_at(node).expect("a sensor");
             let past = prepared.world().truth().felt_past(train, sensor).expect("near");
             assert!((past - located.at.way).abs() < Length::from_mm(30.0), "{past:?}");
-            assert!(driver.stands(train, prepared.line.now()));
+            assert!(driver.is_at_rest(train, prepared.line.now()));
         }
     }
 }

@@ -92,8 +92,8 @@ pub(crate) struct Arguments {
 /// The railway to drive: command station, layout and trains.
 #[derive(Args)]
 pub(crate) struct Railway {
-    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111,
-    /// marklin-can:192.168.0.5, or tcp://host:port in place of a device.
+    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5,
+    /// loconet:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long, value_name = "URL")]
     link: Address,
     /// The layout: the name of a built-in layout, or a layout file; not needed for a simulated link.
@@ -166,7 +166,11 @@ impl Arguments {
                 let link = open_simulated(simulated, &real, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let link = opened.map_or_else(|| open(&self.railway.link, layout, pace), Ok)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }

@@ -29,6 +29,7 @@ mod web_page;
 mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
+pub(crate) use left_running::stop_all;
 #[cfg(test)]
 pub(crate) use serve::{AnswerQueue, archive_routes, odometry_routes, slide_routes};
 #[cfg(test)]

@@ -111,6 +111,7 @@ impl Session<'_> {
         let pace = if self.serve.is_some() { Speed::Times(1.0) } else { Speed::Unpaced };
         match self.link {
             Address::Simulated(simulated) => {
+                self.check_store()?;
                 let mut link = open_simulated(simulated, &real, pace)?;
                 // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
                 for other in simulated.trains.iter().filter(|other| **other != self.train) {
@@ -119,15 +120,26 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
                 let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
                 let opened = store.as_ref().map(stop).transpose()?.flatten();
                 drop(store);
+                self.check_store()?;
                 let link = opened.map_or_else(|| open(self.link, &real, pace), Ok)?;
                 self.drive(&written, link, output)
             }
         }
+    }
+
+    /// Nothing is written to a damaged store: it would bury what can still be salvaged.
+    fn check_store(&self) -> anyhow::Result<()> {
+        let Some(path) = self.store.filter(|path| path.exists()) else { return Ok(()) };
+        Ok(Store::open(path)?.check()?)
     }
 
     fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {

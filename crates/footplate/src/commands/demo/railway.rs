@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::time::Duration;
 
 use footplate_core::control::Machine;
 use footplate_core::track::{Layout, Position};
@@ -63,6 +64,9 @@ impl Link for CountedLink<'_> {
     }
     fn reopen(&mut self) -> Result<(), Lost> {
         self.line.reopen()
+    }
+    fn real_time(&self) -> Duration {
+        self.line.real_time()
     }
 }
 

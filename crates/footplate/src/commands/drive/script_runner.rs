@@ -339,7 +339,7 @@ impl ScriptRunner {
 
     /// Takes in the position of a train at rest from the operator.
     fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
-        if self.driver().stands(train, now) {
+        if self.driver().is_at_rest(train, now) {
             let at = WayPoint { node: at.node, way: at.offset };
             self.dispatcher.place(now, train, at, READ_OFF_BY_HAND);
             self.learning.interrupt(train);

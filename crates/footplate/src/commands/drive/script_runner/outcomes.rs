@@ -188,7 +188,7 @@ impl ScriptRunner {
         if is_free && let Some(model) = self.learning.advance_refit() {
             self.refitted.insert(model.train(), model);
         }
-        let is_at_rest = |train: &TrainId| self.driver().stands(*train, now);
+        let is_at_rest = |train: &TrainId| self.driver().is_at_rest(*train, now);
         let at_rest: Vec<TrainId> = self.refitted.keys().copied().filter(is_at_rest).collect();
         for model in at_rest.iter().filter_map(|train| self.refitted.remove(train)).collect::<Vec<_>>() {
             self.use_model(model);

@@ -71,14 +71,15 @@ impl ScriptRunner {
             Instruction::Go(train, _) => Some(train),
             _ => None,
         };
-        train.is_some_and(|train| self.learning.is_refitting_to(train) && self.driver().stands(train, now))
+        train
+            .is_some_and(|train| self.learning.is_refitting_to(train) && self.driver().is_at_rest(train, now))
     }
 
     /// Whether a train cannot be driven at present but may be soon. Beyond the wait limit the order is tried anyway, so
     /// that its refusal says why.
     fn is_blocked_for_now(&mut self, now: Timestamp, train: TrainId) -> bool {
         let comes_to_rest =
-            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().stands(train, now);
+            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().is_at_rest(train, now);
         if !comes_to_rest && !self.dispatcher.is_interrupted(now, train) {
             self.interrupted = None;
             return false;
@@ -129,7 +130,7 @@ impl ScriptRunner {
         let met = wait.is_met
             || match wait.until {
                 Until::Passed(span) => now - wait.since >= span,
-                Until::AtRest(train) => self.is_idle(train) && self.driver().stands(train, now),
+                Until::AtRest(train) => self.is_idle(train) && self.driver().is_at_rest(train, now),
                 Until::Located(train) => self.driver().locate(train, now).is_some(),
                 Until::At(..) => false,
             };

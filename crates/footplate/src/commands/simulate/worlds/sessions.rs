@@ -162,7 +162,7 @@ impl Driven<'_, '_> {
         let Some((node, offset, step)) = asked else { return };
         if early {
             let by = TimeSpan::from_s(EARLY.as_mm() / self.true_speed(step).max(1.0));
-            self.line.station.world_mut().hasten_next_start(TRAIN, by);
+            self.line.station.world_mut().advance_next_start(TRAIN, by);
         }
         let offset = Length::from_mm(offset.as_mm().round());
         let order = format!(

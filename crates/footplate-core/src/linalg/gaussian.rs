@@ -1,8 +1,0 @@
-//! A normal distribution of one number.
-
-/// A mean and its variance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Gaussian {
-    pub(crate) mean: f64,
-    pub(crate) variance: f64,
-}
