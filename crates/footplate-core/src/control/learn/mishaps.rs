@@ -26,6 +26,10 @@ const LONGEST_DOUBT: TimeSpan = TimeSpan::from_ms(4_000);
 /// A train that was pushed up should get to the next contact within this, at the slowest.
 const PUSHED_SPEED: Speed = Speed::from_mm_per_s(100.0);
 
+/// At a step that is faster than this a train stalls on dirt, not because the step is too low for it: model trains that move
+/// at all stall below some 50 mm/s, and a late report of a faster one says nothing of the step.
+const SLOW_STEP: Speed = Speed::from_mm_per_s(100.0);
+
 /// Pushed up this often without a contact, the train is not on the track any more.
 const MOST_PUSHES: u8 = 2;
 
@@ -119,10 +123,18 @@ impl Calibrator<'_> {
         let Some(step) = self.pushed_from.take() else { return };
         self.pushes = 0;
         if passed.missed == 0 {
-            self.fit.note_use(step, StepUse::Unreliable);
+            if self.may_be_slow(step) {
+                self.fit.note_use(step, StepUse::Unreliable);
+            }
             self.fit.interrupt();
             self.report_mishap(Mishap::Stalled { step });
         }
+    }
+
+    /// Whether a step may be so slow that the train stalls for it: within one standard deviation.
+    fn may_be_slow(&self, step: SpeedStep) -> bool {
+        let speed = self.model().speed(step, Approach::Below);
+        speed.value - speed.uncertainty < SLOW_STEP
     }
 
     /// The step at which the train passed a contact moves it, if it had been told long enough ago.

@@ -43,8 +43,8 @@ impl DriveBeginning {
     /// The name of such a machine in a store.
     pub(crate) const KIND: &'static str = "drive";
 
-    /// A session of a person who has said nothing yet, with trains as they were handed over.
-    pub(crate) fn of_person(
+    /// A session whose script arrives line by line, with trains as an earlier session handed them over.
+    pub(crate) fn line_by_line(
         written: &WrittenLayout,
         turnouts: &TurnoutStates,
         (models, fits): (Vec<MotionModel>, Vec<MotionFit>),
@@ -54,7 +54,7 @@ impl DriveBeginning {
             turnouts: written.legs(turnouts),
             models,
             fits,
-            giver: Giver::Person,
+            giver: Giver::Script,
             script: Vec::new(),
             is_complete: false,
             wait_limit_s: None,
