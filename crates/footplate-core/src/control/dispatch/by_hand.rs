@@ -43,7 +43,7 @@ impl Dispatcher {
     /// A train that was driven by hand and stands, with nothing more to do, holds no more than where it stands; whether it
     /// does.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
-        let is_done = self.watchdog.driver().stands(id, now) && self.watchdog.driver().busy(id).is_none();
+        let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
             self.halted(now, id, true);

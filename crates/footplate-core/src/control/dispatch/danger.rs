@@ -62,7 +62,7 @@ impl Dispatcher {
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
             let moves = |other: &TrainId| {
-                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().is_at_rest(*other, now)
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);

@@ -39,11 +39,11 @@ impl Dispatcher {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed, .. } if self.watchdog.driver().stands(id, now) => {
+                State::Halting { confirmed, .. } if self.watchdog.driver().is_at_rest(id, now) => {
                     self.halted(now, id, confirmed);
                 }
                 State::Lost
-                    if self.watchdog.driver().stands(id, now)
+                    if self.watchdog.driver().is_at_rest(id, now)
                         && self.watchdog.driver().position(id, now).is_some() =>
                 {
                     self.halted(now, id, true);

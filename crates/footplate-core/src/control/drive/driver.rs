@@ -131,7 +131,7 @@ impl Driver {
 
     /// Whether a train is estimated to be at rest.
     #[must_use]
-    pub fn stands(&self, train: TrainId, now: Timestamp) -> bool {
+    pub fn is_at_rest(&self, train: TrainId, now: Timestamp) -> bool {
         self.trains.get(&train).is_some_and(|train| train.is_at_rest(self.track.context(), now))
     }
 

@@ -340,7 +340,7 @@ impl ScriptRunner {
 
     /// A person says where a train stands.
     fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
-        if self.driver().stands(train, now) {
+        if self.driver().is_at_rest(train, now) {
             let at = WayPoint { node: at.node, way: at.offset };
             self.dispatcher.place(now, train, at, SEEN_BY_HAND);
             self.learning.interrupt(train);

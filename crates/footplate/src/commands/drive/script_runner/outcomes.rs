@@ -187,7 +187,7 @@ impl ScriptRunner {
         if is_free && let Some(model) = self.learning.go_on() {
             self.taught.insert(model.train(), model);
         }
-        let stands = |train: &TrainId| self.driver().stands(*train, now);
+        let stands = |train: &TrainId| self.driver().is_at_rest(*train, now);
         let standing: Vec<TrainId> = self.taught.keys().copied().filter(stands).collect();
         for model in standing.iter().filter_map(|train| self.taught.remove(train)).collect::<Vec<_>>() {
             self.use_model(model);

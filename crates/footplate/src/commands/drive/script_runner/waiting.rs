@@ -71,13 +71,13 @@ impl ScriptRunner {
             Instruction::Go(train, _) => Some(train),
             _ => None,
         };
-        train.is_some_and(|train| self.learning.is_fitting_to(train) && self.driver().stands(train, now))
+        train.is_some_and(|train| self.learning.is_fitting_to(train) && self.driver().is_at_rest(train, now))
     }
 
     /// Whether a train cannot be driven now and may be soon; not for ever, so that in the end it is refused and said why.
     fn is_kept_waiting(&mut self, now: Timestamp, train: TrainId) -> bool {
         let comes_to_rest =
-            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().stands(train, now);
+            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().is_at_rest(train, now);
         if !comes_to_rest && !self.dispatcher.is_interrupted(now, train) {
             self.interrupted = None;
             return false;
@@ -128,7 +128,7 @@ impl ScriptRunner {
         let met = wait.is_met
             || match wait.until {
                 Until::Passed(span) => now - wait.since >= span,
-                Until::AtRest(train) => self.is_idle(train) && self.driver().stands(train, now),
+                Until::AtRest(train) => self.is_idle(train) && self.driver().is_at_rest(train, now),
                 Until::Located(train) => self.driver().locate(train, now).is_some(),
                 Until::At(..) => false,
             };
