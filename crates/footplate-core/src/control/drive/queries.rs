@@ -53,7 +53,7 @@ impl Driver {
     /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
     /// its estimate.
     #[must_use]
-    pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+    pub fn missed_sensor(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
