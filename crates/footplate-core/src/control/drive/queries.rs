@@ -60,7 +60,7 @@ impl Driver {
 
     /// Whether the position of a train depends on an ambiguous detection.
     #[must_use]
-    pub fn is_in_doubt(&self, train: TrainId) -> bool {
+    pub fn is_position_ambiguous(&self, train: TrainId) -> bool {
         self.association.is_ambiguous(train)
     }
 
