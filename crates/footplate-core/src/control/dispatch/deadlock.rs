@@ -351,7 +351,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
-        let turned = self.watchdog.driver().turned_place_at(stander.place);
+        let turned = self.watchdog.driver().reversed_position_at(stander.place);
         Some(Start {
             place: stander.place,
             room,

@@ -176,7 +176,7 @@ impl Dispatcher {
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
         let is_sure = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.watchdog.driver().turned_place(id, now).filter(|_| may_turn);
+        let turned = self.watchdog.driver().reversed_position(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         let may_back_away = train.seen_since_turn;
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })

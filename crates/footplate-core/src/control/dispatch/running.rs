@@ -117,7 +117,7 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
     /// stand on another edge than was planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let turned = self.watchdog.driver().reversed_position(id, now)?;
         let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
