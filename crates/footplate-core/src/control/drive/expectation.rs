@@ -40,7 +40,7 @@ impl Driver {
     /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
     /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
     /// set. `None` removes the limit.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
             train.set_end_of_authority(context, now, end);
@@ -50,7 +50,7 @@ impl Driver {
 
     /// The end of a train's movement authority.
     #[must_use]
-    pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
+    pub fn end_of_authority(&self, train: TrainId) -> Option<WayPoint> {
         self.trains.get(&train)?.end_of_authority
     }
 }
