@@ -1,13 +1,11 @@
 //! One train: its position, motion model, last command and task.
 
-use alloc::string::String;
-
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{DueContact, Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
+use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::units::Length;
 
 use super::order::OrderId;
@@ -15,7 +13,7 @@ use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
-use super::task::{Destination, Goal, Phase, Task};
+use super::task::{Destination, Expectation, Goal, Phase, SpeedSupervision, Task};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
@@ -63,36 +61,6 @@ pub(super) struct DrivenTrain {
     pub(super) passages: Passages,
     /// The timing of the link to the station.
     pub(super) link: TimeModel,
-}
-
-/// What should happen to a train next, as of the last report or command.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Expectation {
-    /// The next detection.
-    pub(super) due: Option<DueContact>,
-    pub(super) since: Timestamp,
-    pub(super) overdue_reported: bool,
-    /// How many sensors in a row should have reported the train and did not.
-    pub(super) missed_in_a_row: u8,
-    /// A sensor that should have reported it, if none has reported it since.
-    pub(super) missed_sensor: Option<SensorId>,
-    /// When it counts as lost unless it is reported before; set once a detection is overdue.
-    pub(super) lost_by: Option<Timestamp>,
-    /// When a stop has to be commanded before the end of the track, and which end that is.
-    pub(super) track_end_stop: Option<(Timestamp, NodeId)>,
-    /// When a stop has to be commanded before the end of authority.
-    pub(super) authority_stop: Option<Timestamp>,
-}
-
-/// The state of a train's speed supervision.
-#[derive(Debug, Clone, Default)]
-pub(super) struct SpeedSupervision {
-    /// The ordered step, while a slower one is commanded.
-    pub(super) wanted: Option<SpeedStep>,
-    /// When the zones around the train are checked next.
-    pub(super) next_check: Option<Timestamp>,
-    /// The zone that was reported to slow the train down.
-    pub(super) reported_zone: Option<String>,
 }
 
 impl DrivenTrain {

@@ -6,13 +6,13 @@ use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
-use super::driven_train::{DrivenTrain, Expectation};
+use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::path::{recount_from, track_end};
 use super::refusal::Refusal;
-use super::task::Phase;
+use super::task::{Expectation, Phase};
 use crate::control::Notice;
 
 /// A detection is overdue this long after its 99.7 % bound.
