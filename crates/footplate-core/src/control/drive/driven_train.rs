@@ -13,7 +13,7 @@ use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
-use super::task::{Destination, Expectation, Goal, Phase, SpeedSupervision, Task};
+use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
@@ -182,7 +182,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
-        self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+        self.start_task(Task { order, goal, phase: TaskPhase::Commanding { promise: None } }, out);
         self.command_step(context, now, step, out);
     }
 
@@ -197,10 +197,10 @@ impl DrivenTrain {
     ) {
         let goal = Goal::Reverse(then);
         if self.is_at_rest(context, now) {
-            self.start_task(Task { order, goal, phase: Phase::Turning }, out);
+            self.start_task(Task { order, goal, phase: TaskPhase::Reversing }, out);
             self.send(now, Command::Reverse { train: self.id() }, out);
         } else {
-            self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+            self.start_task(Task { order, goal, phase: TaskPhase::Commanding { promise: None } }, out);
             self.command_stop(now, out);
         }
     }
@@ -240,10 +240,15 @@ impl DrivenTrain {
                 self.passages.forget();
                 self.end_authority_here(context, now);
                 self.expect_next(context, now);
-                if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
+                if let Some(Task { order, goal: Goal::Reverse(then), phase: TaskPhase::Reversing }) =
+                    self.task
+                {
                     if then > SpeedStep::STAND {
-                        self.task =
-                            Some(Task { order, goal: Goal::Run, phase: Phase::Commanding { promise: None } });
+                        self.task = Some(Task {
+                            order,
+                            goal: Goal::Run,
+                            phase: TaskPhase::Commanding { promise: None },
+                        });
                         self.command_step(context, now, then, out);
                     } else {
                         self.finish(context, now, order, None, None, out);
@@ -261,11 +266,11 @@ impl DrivenTrain {
     fn step_left(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         let Some(task) = self.task else { return };
         match (task.phase, task.goal) {
-            (Phase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
+            (TaskPhase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
                 self.finish(context, now, task.order, None, None, out);
             }
             // A stop that is sent after a new step has been commanded belongs to the earlier task.
-            (Phase::Commanding { .. } | Phase::Running { .. }, _)
+            (TaskPhase::Commanding { .. } | TaskPhase::Running { .. }, _)
                 if step == SpeedStep::STAND && self.commanded == SpeedStep::STAND =>
             {
                 let rest = self.locator.rest_if_stopped(context, &self.model, now);
@@ -276,16 +281,16 @@ impl DrivenTrain {
                     _ => None,
                 };
                 let promise = promise.or(match task.phase {
-                    Phase::Commanding { promise } => promise,
+                    TaskPhase::Commanding { promise } => promise,
                     _ => None,
                 });
                 let until = rest.map_or(now + REST_UNFORESEEN, |rest| {
                     let takes = (rest.time - now).max(TimeSpan::ZERO);
                     now + TimeSpan::from_s(takes.as_s() * (1.0 + REST_MARGIN_PART)) + REST_MARGIN
                 });
-                self.task = Some(Task { phase: Phase::Settling { promise, until }, ..task });
+                self.task = Some(Task { phase: TaskPhase::Settling { promise, until }, ..task });
             }
-            (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(context, now, out),
+            (TaskPhase::Running { .. }, Goal::RestAt(_)) => self.plan(context, now, out),
             _ => {}
         }
     }
@@ -308,7 +313,9 @@ impl DrivenTrain {
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
-            (Phase::Finding { .. }, _) => self.resume_to_target(context, now, task.order, destination, out),
+            (TaskPhase::Locating { .. }, _) => {
+                self.resume_to_target(context, now, task.order, destination, out)
+            }
             (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
                 Some(at) => {
                     let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
@@ -335,9 +342,9 @@ impl DrivenTrain {
     /// When it has to be called again without a report.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         let phase = match self.task.map(|task| task.phase) {
-            Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
-            Some(Phase::Settling { until, .. }) => Some(until),
-            Some(Phase::Finding { since }) => Some(since + FIND_LIMIT),
+            Some(TaskPhase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
+            Some(TaskPhase::Settling { until, .. }) => Some(until),
+            Some(TaskPhase::Locating { since }) => Some(since + FIND_LIMIT),
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
@@ -366,14 +373,14 @@ impl DrivenTrain {
 
     fn continue_task(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
-            Phase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
+            TaskPhase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
             }
-            Phase::Finding { since } if now - since >= FIND_LIMIT => {
+            TaskPhase::Locating { since } if now - since >= FIND_LIMIT => {
                 let why = Refusal::NotFound { train: self.id(), within: FIND_LIMIT };
                 self.give_up(now, why, out);
             }
-            Phase::Settling { promise, until } if until <= now => {
+            TaskPhase::Settling { promise, until } if until <= now => {
                 self.handle_rest(context, now, task, promise, out);
             }
             _ => {}
@@ -387,7 +394,7 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        self.task = Some(Task { phase: Phase::Commanding { promise }, ..task });
+        self.task = Some(Task { phase: TaskPhase::Commanding { promise }, ..task });
         self.command_stop(now, out);
     }
 
@@ -415,7 +422,7 @@ impl DrivenTrain {
         }
         match task.goal {
             Goal::Reverse(_) => {
-                self.task = Some(Task { phase: Phase::Turning, ..task });
+                self.task = Some(Task { phase: TaskPhase::Reversing, ..task });
                 self.send(now, Command::Reverse { train: self.id() }, out);
             }
             Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),

@@ -12,7 +12,7 @@ use super::order::Aim;
 use super::outputs::Outputs;
 use super::path::{recount_from, track_end};
 use super::refusal::Refusal;
-use super::task::{Expectation, Phase};
+use super::task::{Expectation, TaskPhase};
 use crate::control::Notice;
 
 /// A detection is overdue this long after its 99.7 % bound.
@@ -184,7 +184,7 @@ impl DrivenTrain {
 
     /// A planned stop already ends before the end of the track.
     fn track_end_stop_time(&self) -> Option<Timestamp> {
-        let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
+        let has_plan = matches!(self.task.map(|task| task.phase), Some(TaskPhase::Running { plan: Some(_) }));
         let (leaves, _) =
             self.expected.track_end_stop.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
         Some(leaves - self.link.command)

@@ -15,7 +15,7 @@ use crate::control::Promise;
 pub(super) struct Task {
     pub(super) order: OrderId,
     pub(super) goal: Goal,
-    pub(super) phase: Phase,
+    pub(super) phase: TaskPhase,
 }
 
 /// The result that the order asks for.
@@ -51,24 +51,24 @@ pub(super) struct Destination {
 
 /// The phase of a task.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Phase {
+pub(super) enum TaskPhase {
     /// The train runs to a sensor to be located.
-    Finding { since: Timestamp },
+    Locating { since: Timestamp },
     /// The train runs; `plan` is the planned stop.
-    Running { plan: Option<Plan> },
+    Running { plan: Option<StopPlan> },
     /// A command, mostly step 0, is waiting to be sent.
     Commanding { promise: Option<Promise> },
     /// Step 0 has been sent; the train comes to rest by this time.
     Settling { promise: Option<Promise>, until: Timestamp },
     /// Reversing has been commanded.
-    Turning,
+    Reversing,
     /// Pacing commands the steps.
     Pacing,
 }
 
 /// A planned stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Plan {
+pub(super) struct StopPlan {
     /// When the last bit of the command shall have been sent.
     pub(super) leaves: Timestamp,
     /// The last two sensors whose reports can still change it, the later one first.
