@@ -7,7 +7,7 @@ use footplate_core::control::{
     Dispatcher, Driver, Journey, LinkNews, Machine, Notice, Order, Output, Refusal, Reservation, TrainLengths,
 };
 use footplate_core::model::MotionModel;
-use footplate_core::track::{Layout, Leg, Position};
+use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
@@ -308,4 +308,37 @@ fn no_train_is_dispatched_while_the_position_of_another_is_unknown() {
     assert_eq!(refused, Err(Refusal::OtherNowhere { train: known, other }));
     let refused = dispatcher.go(traffic.world.now, other, journey);
     assert_eq!(refused, Err(Refusal::Lost { train: other }));
+}
+
+/// The same two trains, where nobody has set any turnout.
+fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
+    Traffic::with(
+        |now, driver| {
+            let mut unknown = Driver::new(driver.layout().clone(), TurnoutStates::unknown());
+            for train in TRAINS {
+                let located = driver.locate(train, now).expect("placed");
+                unknown.add_train(model(train));
+                unknown.place(now, train, located.at, located.uncertainty);
+            }
+            Dispatcher::watched(now, unknown)
+        },
+        starts,
+    )
+}
+
+#[test]
+fn turnouts_that_nobody_has_set_are_set_for_a_journey() {
+    let mut traffic = with_unknown_turnouts([("A1", 50.0), ("B1", 300.0)]);
+    traffic.go(TRAINS[0], "C1+100mm");
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_journey_is_refused_while_a_train_may_be_on_a_turnout_of_unknown_position() {
+    let mut traffic = with_unknown_turnouts([("D1", 500.0), ("A1", 250.0)]);
+    let journey = Journey::to(traffic.world.layout.landmark("C1").expect("a place"));
+    let refused = traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey);
+    assert_eq!(refused, Err(Refusal::TurnoutUnknown { turnout: TurnoutId(1), train: TRAINS[1] }));
 }

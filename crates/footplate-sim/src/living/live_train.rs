@@ -67,7 +67,7 @@ pub(crate) struct LiveTrain {
     /// Orders on their way to the decoder, and when it has them.
     orders: VecDeque<(Timestamp, Order)>,
     /// The step that its decoder heard last.
-    heard: SpeedStep,
+    pub(crate) heard: SpeedStep,
     /// Stopping without its decoder: by how much each second, in mm/s², and how fast the wheels still turn.
     halting: Option<(f64, f64)>,
     pub(crate) speed: f64,

@@ -1,7 +1,7 @@
 //! What really happens on a living layout: for scorers, and for nobody else.
 
 use footplate_core::track::Position;
-use footplate_core::{EdgeId, Length, SensorId, Speed, Timestamp, TrainId};
+use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, Timestamp, TrainId};
 
 use crate::living::body::{Body, after};
 use crate::living::live_train::{End, LiveTrain};
@@ -28,6 +28,8 @@ pub struct TrainTruth {
     pub position: Option<Position>,
     /// How fast it runs.
     pub speed: Speed,
+    /// The step that its decoder heard last.
+    pub commanded: SpeedStep,
     /// Since when it has been standing, while it stands.
     pub at_rest_since: Option<Timestamp>,
     /// All the way it has gone by itself.
@@ -91,6 +93,7 @@ impl<'w, 'l> Truth<'w, 'l> {
         Some(TrainTruth {
             position: place.map(|(edge, offset)| Position { edge, offset: Length::from_mm(offset) }),
             speed: Speed::from_mm_per_s(found.speed),
+            commanded: found.heard,
             at_rest_since: found.stands_since,
             odometer: Length::from_mm(found.odometer),
             leads: found.leads,

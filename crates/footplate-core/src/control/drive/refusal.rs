@@ -106,7 +106,14 @@ pub enum Refusal {
         /// The train of unknown position.
         other: TrainId,
     },
-    /// The train did not arrive within a time.
+    /// The position of a turnout is unknown, and with it on which track a train is that may be on it.
+    TurnoutUnknown {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The train.
+        train: TrainId,
+    },
+    /// It has not come to its destination for so long.
     NotArrived {
         /// The train.
         train: TrainId,
@@ -270,6 +277,11 @@ impl fmt::Display for Refusal {
                 "train {train} cannot be kept clear of train {other}, whose position is unknown: run \
                  that train over a sensor, for example with `speed {other} 6`, or enter its position, \
                  for example `place {other} at C13`"
+            ),
+            Self::TurnoutUnknown { turnout, train } => write!(
+                f,
+                "the position of turnout {turnout} is unknown and train {train} may be on it: enter how it lies, for \
+                 example `turnout {turnout} straight`, or run the train over the next sensor"
             ),
             Self::NotArrived { train, within } => write!(
                 f,
