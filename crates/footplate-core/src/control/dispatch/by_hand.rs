@@ -100,7 +100,7 @@ impl Dispatcher {
         let end = end.max(at);
         if !is_free(end) {
             // Not even where it stands: it keeps what it held, and stays.
-            self.watchdog.set_limit(now, id, Some(located.at));
+            self.watchdog.set_end_of_authority(now, id, Some(located.at));
             return;
         }
         let mut held = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
@@ -116,7 +116,7 @@ impl Dispatcher {
                 .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
             limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
         });
-        self.watchdog.set_limit(now, id, limit);
+        self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

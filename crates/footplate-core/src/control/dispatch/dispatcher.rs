@@ -296,7 +296,8 @@ impl Dispatcher {
     pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
-        if self.watchdog.driver().unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+        if self.watchdog.driver().missed_sensor(id, now).is_none() && self.anchors(now, id, place).len() > own
+        {
             self.watchdog.count_from_behind(now, id);
         }
     }

@@ -87,7 +87,7 @@ impl Dispatcher {
     /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
-        if self.watchdog.driver().unseen(id, now).is_none()
+        if self.watchdog.driver().missed_sensor(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();

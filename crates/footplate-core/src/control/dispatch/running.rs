@@ -127,7 +127,7 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
     /// stand on another edge than was planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let turned = self.watchdog.driver().reversed_position(id, now)?;
         let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
@@ -175,7 +175,7 @@ impl Dispatcher {
         // Where a train only turns around or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round };
-        self.watchdog.set_limit(now, id, Some(limit));
+        self.watchdog.set_end_of_authority(now, id, Some(limit));
         let taken = self.watchdog.order(now, Order::Stop(stop));
         let retried = |_| self.watchdog.order(now, Order::Stop(StopOrder { step: None, ..stop }));
         match if step.is_some() { taken.or_else(retried) } else { taken } {
@@ -211,7 +211,7 @@ impl Dispatcher {
         }
         if train.course.is_empty() {
             train.state = State::Resting;
-            self.watchdog.set_limit(now, id, None);
+            self.watchdog.set_end_of_authority(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
             self.arrived(now, id, error);
         } else {
@@ -238,7 +238,7 @@ impl Dispatcher {
             train.not_before = now + AFTER_HALT;
             train.unobstructed_s = None;
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         if !is_sure {
             self.say(Notice::ReservedAsUnknown { train: id });
         } else if confirmed {
@@ -303,7 +303,7 @@ impl Dispatcher {
             train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         self.hold_again(now, id);
         self.say(Notice::Withdrawn { train: id, why });
         // Whoever asked for it has to know.

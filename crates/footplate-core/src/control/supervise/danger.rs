@@ -135,7 +135,7 @@ impl Watchdog {
             at.way += -(BODY + CLEAR);
             Some(at)
         });
-        self.driver.set_limit(now, train, limit);
+        self.driver.set_end_of_authority(now, train, limit);
     }
 
     /// Takes the power from the track: the last thing that stops a train.

@@ -351,7 +351,7 @@ impl Watchdog {
         recovery.phase = Phase::Turning { step };
         recovery.by = now + STANDS_WITHIN;
         // Behind it is where it came from.
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         self.issue(now, Order::Reverse { train, then: step });
     }
 
@@ -374,7 +374,7 @@ impl Watchdog {
     /// It stands and is known again.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         if let Some(monitor) = self.monitors.get_mut(&train) {
             monitor.place();
         }

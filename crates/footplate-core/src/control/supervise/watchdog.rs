@@ -132,10 +132,10 @@ impl Watchdog {
         }
     }
 
-    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
         if !self.dangers.contains_key(&train) {
-            self.driver.set_limit(now, train, limit);
+            self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
         }
     }
