@@ -125,7 +125,9 @@ impl DistanceBounds {
                 own[1] = Some(bound);
             }
         }
-        for ((anchors, vote), side) in [(&mut self.low, by_low), (&mut self.high, by_high)].into_iter().zip([0, 1]) {
+        for ((anchors, vote), side) in
+            [(&mut self.low, by_low), (&mut self.high, by_high)].into_iter().zip([0, 1])
+        {
             let Some(agreed) = vote.outcome() else { continue };
             for ((anchor, own), wheel) in anchors.iter_mut().zip(&own).zip(wheels) {
                 if let Some(Some(own)) = own.get(side) {

@@ -171,7 +171,14 @@ impl Bank {
     pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
         let [likely, way] = interval(&self.probability, &self.filters, &self.ways, scene, risk, t);
         let wheels = self.compared(scene);
-        let speed = self.reach.widen(likely, scene, &wheels, self.probability.0, (self.since_touch, self.wheels_a), t);
+        let speed = self.reach.widen(
+            likely,
+            scene,
+            &wheels,
+            self.probability.0,
+            (self.since_touch, self.wheels_a),
+            t,
+        );
         let way = Range {
             low: way.low + (speed.low - likely.low) * t,
             high: way.high + (speed.high - likely.high) * t,

@@ -65,7 +65,14 @@ pub(super) struct Reach {
 impl Reach {
     pub(super) const fn new() -> Self {
         let speed = Range { low: 0.0, high: 0.0 };
-        Self { speed, slipped: false, alike_for: 0.0, since: [f64::INFINITY; 2], since_rolling: f64::INFINITY, by: 0.0 }
+        Self {
+            speed,
+            slipped: false,
+            alike_for: 0.0,
+            since: [f64::INFINITY; 2],
+            since_rolling: f64::INFINITY,
+            by: 0.0,
+        }
     }
 
     /// The train has turned round.
@@ -122,7 +129,10 @@ impl Reach {
             if self.slipped {
                 LASTING.0 * moving + LASTING.1
             } else {
-                smaller(unseen * moving, if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY })
+                smaller(
+                    unseen * moving,
+                    if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY },
+                )
             }
         };
         let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_UNTOLD };

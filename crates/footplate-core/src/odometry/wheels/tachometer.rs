@@ -121,13 +121,23 @@ impl Tachometer {
                 self.assumed += expected.pulses;
                 self.unread += periods;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY, late: 0.0 };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
             Increment::Restarted => {
                 self.assumed = 0.0;
                 self.unread = 0.0;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY, late: 0.0 };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
         };
         self.assumed = 0.0;
