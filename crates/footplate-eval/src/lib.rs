@@ -6,6 +6,7 @@
 //! driving  pacing  zones      trains driven to places, speeds and times
 //! traffic  disasters          several trains, and what happens to them
 //! survey                      lengths that driving finds
+//! line                        odometers of full-size trains
 //! rehearsal                   trains calibrated and put down: where every scored drive begins
 //! seeds  choice               who draws, and what is asked
 //! figures  written_scores     what many results come to, and how that is written
@@ -15,6 +16,7 @@ pub mod choice;
 pub mod disasters;
 pub mod driving;
 pub mod figures;
+pub mod line;
 pub mod pacing;
 pub mod rehearsal;
 pub mod seeds;

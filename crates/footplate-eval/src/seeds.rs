@@ -11,6 +11,16 @@ use crate::choice::Choice;
 const MOST_SEEDS: u64 = 100_000;
 /// What stands before the number of seeds that a commit draws.
 pub const FRESH: &str = "fresh:";
+
+const OF_FRESH_SEEDS: &str =
+    "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
+const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
+
+/// Says on a page who chose its seeds.
+#[must_use]
+pub const fn seeds_sentence(are_fresh: bool) -> &'static str {
+    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
+}
 /// Digits of a commit's hash that its seeds are drawn from.
 const HASH_DIGITS: usize = 12;
 /// Behind a hash where the files differ from the commit.
