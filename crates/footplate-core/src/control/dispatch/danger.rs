@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::control::supervise::Alarm;
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;
@@ -18,7 +19,10 @@ impl Dispatcher {
     /// Reacts to a notice of the watchdog.
     pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: &Notice) {
         match notice {
-            Notice::Danger { train, stopped, .. } => {
+            Notice::Danger { train, stopped, why, .. } => {
+                if matches!(why, Alarm::Lost | Alarm::Elsewhere(_)) {
+                    self.doubt_turnouts();
+                }
                 for stopped in stopped {
                     self.gives_up(*stopped);
                 }
@@ -55,6 +59,12 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
+    /// A train was not where it should have been: turnouts may lie otherwise than they were commanded, several at once. Each
+    /// is commanded again before another train relies on it.
+    fn doubt_turnouts(&mut self) {
+        self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
+    }
+
     /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.
     pub(super) fn let_crawl(&mut self, now: Timestamp) -> bool {
         let mut is_let = false;
@@ -62,7 +72,7 @@ impl Dispatcher {
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
             let moves = |other: &TrainId| {
-                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().is_at_rest(*other, now)
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);

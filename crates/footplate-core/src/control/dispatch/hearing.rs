@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -9,8 +10,7 @@ use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::way::Way;
-use crate::control::Notice;
+use super::path::Path;
 
 /// A train that was stopped for its limit is given so many times as much room the next time, up to this many times.
 const MORE_CAUTION: f64 = 1.5;
@@ -87,7 +87,7 @@ impl Dispatcher {
     /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
-        if self.watchdog.driver().unseen(id, now).is_none()
+        if self.watchdog.driver().missed_sensor(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();
@@ -112,9 +112,9 @@ impl Dispatcher {
         let located = self.watchdog.driver().locate(id, now);
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
-        let (way, at) =
-            Way::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
-        let taken = self.reserved(way.reservation(layout, at - room.behind, at + ahead));
+        let (path, at) =
+            Path::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
+        let taken = self.reserved(path.reservation(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut held = taken;

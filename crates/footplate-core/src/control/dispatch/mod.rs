@@ -19,11 +19,11 @@ mod movement_authority;
 mod obstacles;
 mod occupied_path;
 mod parking;
+mod path;
 mod reservation;
 mod route_setting;
 mod running;
 mod turnout_command;
-mod way;
 
 pub use dispatcher::Dispatcher;
 pub use journey::{Journey, TrainLengths};

@@ -60,7 +60,8 @@ impl Watchdog {
         let others: Vec<TrainId> = self.driver.trains().collect();
         let mut stopped = Vec::new();
         for other in others {
-            let moves = !self.driver.stands(other, now) || self.driver.commanded(other) > SpeedStep::STAND;
+            let moves =
+                !self.driver.is_at_rest(other, now) || self.driver.commanded(other) > SpeedStep::STAND;
             let is_known = self.dangers.contains_key(&other) || self.held.contains_key(&other);
             if moves && !is_known && self.could_meet(now, other) {
                 self.hold(now, other);
@@ -134,7 +135,7 @@ impl Watchdog {
             at.way += -(BODY + CLEAR);
             Some(at)
         });
-        self.driver.set_limit(now, train, limit);
+        self.driver.set_end_of_authority(now, train, limit);
     }
 
     /// Takes the power from the track: the last thing that stops a train.
@@ -152,7 +153,7 @@ impl Watchdog {
         // Everything stops, and decoders forget: what is commanded now is what they hear when they have power again.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
-            let moved = !self.driver.stands(train, now);
+            let moved = !self.driver.is_at_rest(train, now);
             let located = self.driver.locate(train, now);
             if moved && !self.dangers.contains_key(&train) && !self.held.contains_key(&train) {
                 let order = self.standing.remove(&train);

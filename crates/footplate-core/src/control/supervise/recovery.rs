@@ -246,7 +246,7 @@ impl Watchdog {
             Phase::Crawling { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
                 // Two contacts that follow each other say which way it runs.
-                if self.driver.felt_hop(train, seen, node).is_some() {
+                if self.driver.hop_length(train, seen, node).is_some() {
                     self.say(Notice::Located { train });
                     self.measure(now, train);
                 } else {
@@ -257,7 +257,7 @@ impl Watchdog {
                 recovery.phase = Phase::Crawling { step, pushed: now, seen: Some(node) };
             }
             Phase::Measuring { mut trial, from } => {
-                let hop = trial.last().and_then(|last| self.driver.felt_hop(train, last, node));
+                let hop = trial.last().and_then(|last| self.driver.hop_length(train, last, node));
                 trial.pass(node, passed.window, hop);
                 recovery.phase = Phase::Measuring { trial, from };
                 if trial.is_over() {
@@ -351,7 +351,7 @@ impl Watchdog {
         recovery.phase = Phase::Turning { step };
         recovery.by = now + STANDS_WITHIN;
         // Behind it is where it came from.
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         self.issue(now, Order::Reverse { train, then: step });
     }
 
@@ -374,7 +374,7 @@ impl Watchdog {
     /// It stands and is known again.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         if let Some(monitor) = self.monitors.get_mut(&train) {
             monitor.place();
         }

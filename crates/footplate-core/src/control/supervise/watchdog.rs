@@ -132,10 +132,10 @@ impl Watchdog {
         }
     }
 
-    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
         if !self.dangers.contains_key(&train) {
-            self.driver.set_limit(now, train, limit);
+            self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
         }
     }
@@ -159,10 +159,20 @@ impl Watchdog {
         self.drain(now);
     }
 
-    /// See [`Driver::lose`].
+    /// The place of a train was wrong: it is unknown from now on. A watched train is stopped and located again.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.driver.lose(now, train);
+        self.lost(now, train);
         self.drain(now);
+    }
+
+    fn lost(&mut self, now: Timestamp, train: TrainId) {
+        self.monitors.entry(train).or_default().lose();
+        if self.dangers.get(&train).is_some_and(Recovery::is_active) {
+            self.recovering_lost(now, train);
+        } else {
+            self.raise(now, train, Alarm::Lost);
+        }
     }
 
     /// See [`Driver::count_from_behind`].
@@ -336,20 +346,14 @@ impl Watchdog {
         match &notice {
             Notice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
             Notice::Lost { train } => {
-                self.monitors.entry(*train).or_default().lose();
                 let train = *train;
                 self.say(notice);
-                if self.dangers.get(&train).is_some_and(Recovery::is_active) {
-                    self.recovering_lost(now, train);
-                } else {
-                    self.raise(now, train, Alarm::Lost);
-                }
-                return;
+                return self.lost(now, train);
             }
             Notice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_stand(*train, now)
-                        && self.driver.contact_ahead(*train, now) == Some(*sensor)
+                        && self.driver.sensor_ahead(*train, now) == Some(*sensor)
                 };
                 let stray = self.driver.trains().find(stray);
                 if let Some(train) = stray {
@@ -427,7 +431,8 @@ impl Watchdog {
         self.permits_all && self.is_watching
     }
 
-    pub(super) const fn is_watching(&self) -> bool {
+    /// Whether it brings back trains that are not as they were.
+    pub(in crate::control) const fn is_watching(&self) -> bool {
         self.is_watching
     }
 
