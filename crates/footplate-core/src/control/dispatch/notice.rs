@@ -1,4 +1,4 @@
-//! What a dispatcher has to say while it dispatches.
+//! The notices of a dispatcher.
 
 use alloc::vec::Vec;
 
@@ -9,50 +9,50 @@ use crate::time::TimeSpan;
 use crate::track::Landmark;
 use crate::units::Length;
 
-/// What happened, and what is going to.
+/// What has happened to a train, or is about to.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DispatchNotice {
-    /// What the driver says.
+    /// A notice of the driver.
     Drive(DriveNotice),
-    /// What its watchdog says.
+    /// A notice of the watchdog.
     Watch(WatchdogNotice),
-    /// A train got all the track to its destination, or to where it steps aside to.
+    /// All the track to the destination of a train, or to where it steps aside, is reserved.
     RouteSet {
         /// The train.
         train: TrainId,
-        /// How long it will take, as far as is foreseen.
+        /// The predicted running time.
         takes: TimeSpan,
-        /// How often it turns around on the way.
+        /// Reversals on the way.
         turns: usize,
     },
     /// A train has to wait for others.
     Waits {
         /// The train.
         train: TrainId,
-        /// Those that hold track on its way.
+        /// The trains that have reserved track on its path.
         on: Vec<TrainId>,
     },
-    /// Trains at rest are in each other's way: some of them step aside.
+    /// Trains at rest block each other: some of them step aside.
     Deadlock {
-        /// The train that cannot get through.
+        /// The blocked train.
         train: TrainId,
-        /// Those that will step aside, in this order; none if nothing was found that helps, and one will go anywhere else.
+        /// Those that step aside, in this order; none if no moves were found, and one train goes anywhere else.
         moves: Vec<TrainId>,
     },
-    /// A train is sent out of the way of another.
+    /// A train moves to make room for another.
     StepsAside {
         /// The train.
         train: TrainId,
-        /// The one that it makes room for.
+        /// The train that it makes room for.
         makes_room_for: TrainId,
         /// Where to.
         to: Landmark,
     },
-    /// What was granted to a train at rest could not be run, and was taken back; it is tried anew later.
+    /// The authority of a train at rest could not be used and was withdrawn; the dispatcher tries again later.
     Withdrawn {
         /// The train.
         train: TrainId,
-        /// What the driver had against it, if it was the driver.
+        /// Why the driver refused it, if it did.
         why: Option<Refusal>,
     },
     /// A train has come to its destination.
@@ -61,19 +61,19 @@ pub enum DispatchNotice {
         order: OrderId,
         /// The train.
         train: TrainId,
-        /// How far beyond the destination it stands as far as is known, seen as it faces.
+        /// How far beyond the destination it is at rest, as estimated, in the direction that it faces.
         error: Option<Length>,
-        /// How long that took since it was asked for.
+        /// The time since the journey was ordered.
         took: TimeSpan,
     },
-    /// A train is somewhere else than it should be: it was stopped, and so were these, which it could have met.
+    /// A train is not on its reserved track: it was stopped, and so were the trains that it could have met.
     Diverged {
         /// The train.
         train: TrainId,
-        /// Those that were stopped for it.
+        /// The trains that were stopped for it.
         stopped: Vec<TrainId>,
     },
-    /// Nobody knows where a train is. What it may be on stays held.
+    /// The place of a train is unknown. The track that it may be on stays reserved.
     HeldAsUnknown {
         /// The train.
         train: TrainId,
