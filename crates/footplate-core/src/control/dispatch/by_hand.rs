@@ -79,7 +79,8 @@ impl Dispatcher {
             room.behind,
             ahead + room.ahead,
         );
-        // A train that follows another shares its track, and so on along the row: the driver keeps gaps safe.
+        // A train that follows another may run over its track, and so on along the row: the driver keeps gaps safe. It reserves
+        // none of it, or its leader would be stopped before its own follower.
         let mut row = alloc::vec![id];
         while let Some(leader) = row
             .last()
@@ -88,22 +89,26 @@ impl Dispatcher {
         {
             row.push(leader);
         }
-        let is_free = |end: Length| {
+        let is_free = |end: Length, shared: &[TrainId]| {
             let taken = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
-            self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
+            self.trains.values().all(|other| shared.contains(&other.id) || !other.held.meets(&taken))
+        };
+        let free_until = |from: Length, shared: &[TrainId]| {
+            let mut end = from;
+            while end > at && !is_free(end, shared) {
+                end -= EVERY;
+            }
+            end.max(at)
         };
         let reach = (path.length() - room.ahead).min(at + ahead);
-        let mut end = reach;
-        while end > at && !is_free(end) {
-            end -= EVERY;
-        }
-        let end = end.max(at);
-        if !is_free(end) {
+        let end = free_until(reach, &row);
+        if !is_free(end, &row) {
             // Not even the track under it is free: it keeps its reservation, and stays.
             self.watchdog.set_limit(now, id, Some(located.at));
             return;
         }
-        let mut held = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
+        let own_end = free_until(end, &[id]);
+        let mut held = self.reserved(path.reservation(layout, at - room.behind, own_end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
         if self.watchdog.driver().is_in_doubt(id) {
             held.add(layout, &train.held);

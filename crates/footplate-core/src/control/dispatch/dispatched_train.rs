@@ -89,6 +89,8 @@ pub(super) struct DispatchedTrain {
     pub(super) seen_since_start: bool,
     /// A sensor did not report it, and no path leads ahead: it looks back.
     pub(super) looks_back: bool,
+    /// It has run a short distance ahead for the same reason since a sensor reported it last.
+    pub(super) has_looked_ahead: bool,
     /// The running time from here without other trains, in seconds; `None` until it was calculated.
     pub(super) unobstructed_s: Option<f64>,
     /// The factor on its overrun: above 1 after it was stopped at its end of authority.
@@ -124,6 +126,7 @@ impl DispatchedTrain {
             seen_since_turn: false,
             seen_since_start: true,
             looks_back: false,
+            has_looked_ahead: false,
             unobstructed_s: None,
             caution: 1.0,
             looked_at: Timestamp::ZERO,

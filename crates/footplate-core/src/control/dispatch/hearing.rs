@@ -33,6 +33,7 @@ impl Dispatcher {
                 if let Some(train) = self.trains.get_mut(train) {
                     train.seen_since_turn = true;
                     train.seen_since_start = true;
+                    train.has_looked_ahead = false;
                 }
                 let node = self.watchdog.driver().layout().sensor_node(passed.sensor);
                 let is_on_its_path = node.is_some_and(|node| self.confirmed_at(now, *train, node));
@@ -63,6 +64,15 @@ impl Dispatcher {
                     _ => {}
                 }
             }
+            // The watchdog has cut the power, or stopped the train for another reason.
+            DriveNotice::Replaced { order, train } => match self.trains.get(train).map(|known| known.state) {
+                Some(State::Running { order: running, .. } | State::Turning { order: running })
+                    if running == *order =>
+                {
+                    self.gives_up(*train);
+                }
+                _ => {}
+            },
             DriveNotice::Lost { train } => {
                 self.gives_up(*train);
                 self.set_state(*train, State::Lost);

@@ -4,13 +4,13 @@ use crate::control::drive::THERE;
 use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Landmark, TurnoutNeed};
+use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::Length;
 
 use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::itinerary::SHORTEST_RUN;
-use super::movement_authority::{MovementAuthority, SLACK};
+use super::movement_authority::{MovementAuthority, SLACK, Start};
 use super::notice::DispatchNotice;
 use super::path::Path;
 use super::reservation::Reservation;
@@ -23,6 +23,9 @@ const MOST_WITHDRAWN: u8 = 5;
 
 /// The largest standard deviation of a stop at a destination: two thirds of the stops end within a centimetre.
 const SURE: Length = Length::from_mm(10.0);
+
+/// How far a train runs ahead so that a sensor reports it: a little more than the shortest run.
+const AHEAD_TO_BE_SEEN: Length = Length::from_mm(220.0);
 
 /// A train that was stopped on the way goes on after this.
 const AFTER_HALT: TimeSpan = TimeSpan::from_s(1.0);
@@ -97,6 +100,20 @@ impl Dispatcher {
         self.is_stirred = true;
         train.looked_at = Timestamp::ZERO;
         !core::mem::replace(&mut train.looks_back, true)
+    }
+
+    /// Sends a train that a sensor did not report a short distance ahead on its edge, where the track allows it: one that
+    /// came to rest short of the sensor is reported then. Returns whether it goes; once until a sensor reports it.
+    pub(super) fn looks_ahead(&mut self, now: Timestamp, id: TrainId, start: &Start) -> bool {
+        let has_looked =
+            self.trains.get_mut(&id).is_none_or(|train| core::mem::replace(&mut train.has_looked_ahead, true));
+        let target = Position { offset: start.place.offset + AHEAD_TO_BE_SEEN, ..start.place };
+        let proposal = self.propose(start, &[target], &self.obstacles_of_others(id));
+        let Some(proposal) = proposal.filter(|found| !has_looked && self.is_free(id, found)) else {
+            return false;
+        };
+        self.grant(now, id, Purpose::Aside(id), proposal);
+        true
     }
 
     fn is_somewhere(&self, id: TrainId) -> bool {

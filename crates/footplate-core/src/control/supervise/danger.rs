@@ -27,6 +27,8 @@ const DEAD_DOUBT: Length = Length::from_mm(40.0);
 const DANGER_REACH: Length = Length::from_mm(700.0);
 /// A lost train may be this far from where it was seen last: two sensors stayed silent.
 const LOST_REACH: Length = Length::from_mm(4_000.0);
+/// Sensors that have to come ahead of where a lost train was seen last: two may have stayed silent, and the third reports it.
+const SENSORS_AHEAD: usize = 3;
 /// A train reaches this far to either side of its pickup: a long locomotive of the gauge.
 const BODY: Length = Length::from_mm(250.0);
 /// The gap between trains.
@@ -133,6 +135,32 @@ impl Watchdog {
             Some(at)
         });
         self.driver.set_limit(now, train, limit);
+    }
+
+    /// Whether a train whose place is unknown may creep ahead: from where it was seen last, as the turnouts lie,
+    /// [`SENSORS_AHEAD`] sensors come before the end of the track and before any other train.
+    pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
+        let layout = self.driver.layout();
+        let mut taken = BTreeSet::new();
+        for other in self.driver.trains().filter(|other| *other != train) {
+            let Some(place) = self.driver.position(other, now) else { return false };
+            taken.extend(rails_within(layout, place, BODY, BODY));
+        }
+        let Some(seen) = self.seen.get(&train) else { return false };
+        let Some(edge) = layout.edge(seen.edge).filter(|_| !taken.contains(&rails(seen.edge))) else {
+            return false;
+        };
+        let mut sensors = usize::from(layout.sensor_at(edge.to).is_some());
+        for hop in self.driver.context().hops_ahead(edge.to).take(layout.nodes().len()) {
+            if hop.sensor.is_none() || hop.edges.iter().any(|edge| taken.contains(&rails(*edge))) {
+                return false;
+            }
+            sensors += 1;
+            if sensors >= SENSORS_AHEAD {
+                return true;
+            }
+        }
+        false
     }
 
     /// Switches the track power off: the last means to stop a train.

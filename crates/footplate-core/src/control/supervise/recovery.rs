@@ -13,6 +13,7 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::notice::{Outcome, WatchdogNotice};
+use super::remeasuring::is_same;
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 
@@ -62,8 +63,8 @@ pub(super) enum Phase {
     Waiting { asked: bool },
     /// It creeps; `seen` is the sensor that it has passed.
     Crawling { step: SpeedStep, pushed: Timestamp, seen: Option<NodeId> },
-    /// The way ahead has ended: it turns around to crawl the other way.
-    Turning { step: SpeedStep },
+    /// It reverses, to creep the other way; the sensor that reported it last, as it comes to it then.
+    Turning { step: SpeedStep, seen: Option<NodeId> },
     /// It runs at a speed that is measured.
     Measuring { trial: SpeedTrial, from: SpeedStep },
     /// It stops short of a sensor by the new model.
@@ -190,17 +191,46 @@ impl Watchdog {
         }
         let Some(recovery) = self.dangers.get(&train) else { return };
         let is_about = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
-        let crawl = recovery.steps.crawl;
         match self.driver.locate(train, now).filter(|_| is_about) {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
-            None => self.driver.lose(now, train),
+            None => {
+                self.driver.lose(now, train);
+                // Other trains are near, and the track may end ahead. What is behind the train it ran over.
+                if !self.permits_all {
+                    let seen = self.behind.get(&train).map(|node| node.reverse());
+                    return match seen {
+                        Some(_) => self.creep_back(now, train, seen),
+                        None if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
+                        None => self.need_person(now, train),
+                    };
+                }
+            }
         }
+        self.creep_ahead(now, train);
+    }
+
+    /// Creeps to the next sensor as the train faces.
+    fn creep_ahead(&mut self, now: Timestamp, train: TrainId) {
+        let Some(crawl) = self.dangers.get(&train).map(|recovery| recovery.steps.crawl) else { return };
         self.keep_clear(now, train);
         self.say(WatchdogNotice::Crawls { train, step: crawl });
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.by = now + FOUND_WITHIN;
         }
         self.crawl(now, train, crawl, None);
+    }
+
+    /// Reverses and creeps back to the sensor that reported the train last.
+    fn creep_back(&mut self, now: Timestamp, train: TrainId, seen: Option<NodeId>) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let step = recovery.steps.crawl;
+        recovery.has_turned = true;
+        recovery.phase = Phase::Turning { step, seen };
+        recovery.by = now + STANDS_WITHIN;
+        // Behind it is where it came from.
+        self.driver.set_limit(now, train, None);
+        self.say(WatchdogNotice::Crawls { train, step });
+        self.issue(now, Order::Reverse { train, then: step });
     }
 
     fn crawl(&mut self, now: Timestamp, train: TrainId, step: SpeedStep, seen: Option<NodeId>) {
@@ -215,8 +245,8 @@ impl Watchdog {
         let (EventKind::Speed { train, .. } | EventKind::Reverse { train }) = event.kind else { return };
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         recovery.fit.take(self.driver.layout(), self.driver.turnouts(), event);
-        if let (EventKind::Reverse { .. }, Phase::Turning { step }) = (event.kind, recovery.phase) {
-            recovery.phase = Phase::Crawling { step, pushed: now, seen: None };
+        if let (EventKind::Reverse { .. }, Phase::Turning { step, seen }) = (event.kind, recovery.phase) {
+            recovery.phase = Phase::Crawling { step, pushed: now, seen };
             recovery.by = now + FOUND_WITHIN;
             self.keep_clear(now, train);
         } else if let EventKind::Speed { step, .. } = event.kind
@@ -245,8 +275,8 @@ impl Watchdog {
         match recovery.phase {
             Phase::Crawling { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
-                // Two contacts that follow each other say which way it runs.
-                if self.driver.felt_hop(train, seen, node).is_some() {
+                // Two sensors that follow each other say which way it runs, and so does one from both sides.
+                if node == seen || self.driver.felt_hop(train, seen, node).is_some() {
                     self.say(WatchdogNotice::Found { train });
                     self.measure(now, train);
                 } else {
@@ -310,6 +340,9 @@ impl Watchdog {
     /// The track ahead of a train in recovery ends, or another train is there.
     pub(super) fn recovering_blocked(&mut self, now: Timestamp, train: TrainId) {
         match self.dangers.get(&train).map(|recovery| recovery.phase) {
+            Some(Phase::Measuring { .. }) if self.has_only_lost_its_place(train) => {
+                self.end(now, train, Outcome::AsBefore);
+            }
             Some(Phase::Crawling { .. } | Phase::Measuring { .. }) => self.turn_or_decide(now, train),
             Some(Phase::Creeping { .. } | Phase::StoppingShort { .. }) => self.end_rescaled(now, train),
             Some(Phase::LearningSpeed { .. } | Phase::LearningRest) => {
@@ -317,6 +350,13 @@ impl Watchdog {
             }
             _ => {}
         }
+    }
+
+    /// Whether a train was in danger for its place alone, which is known again, and no speed measured since is another one.
+    fn has_only_lost_its_place(&self, train: TrainId) -> bool {
+        self.dangers.get(&train).is_some_and(|recovery| {
+            matches!(recovery.why, Alarm::Lost | Alarm::Elsewhere(_)) && recovery.ratios.iter().all(is_same)
+        })
     }
 
     /// Its place was lost again: it is located once more.
@@ -344,15 +384,14 @@ impl Watchdog {
             }
             return self.measure(now, train);
         }
-        if core::mem::replace(&mut recovery.has_turned, true) {
+        let seen = match recovery.phase {
+            Phase::Crawling { seen, .. } => seen.map(|node| node.reverse()),
+            _ => None,
+        };
+        if recovery.has_turned {
             return self.need_person(now, train);
         }
-        let step = recovery.steps.crawl;
-        recovery.phase = Phase::Turning { step };
-        recovery.by = now + STANDS_WITHIN;
-        // Behind it is where it came from.
-        self.driver.set_limit(now, train, None);
-        self.issue(now, Order::Reverse { train, then: step });
+        self.creep_back(now, train, seen);
     }
 
     /// Everything is known: the train comes to rest.

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::control::drive::{DriveNotice, Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
@@ -49,8 +49,10 @@ pub struct Watchdog {
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
     /// The last order of each train that has not ended.
     pub(super) standing: BTreeMap<TrainId, (OrderId, Order)>,
-    /// The place where a sensor reported each train last, or a person put it.
+    /// The place where a sensor reported each train last, or a person put it, facing as the train does.
     pub(super) seen: BTreeMap<TrainId, Position>,
+    /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
+    pub(super) behind: BTreeMap<TrainId, NodeId>,
     /// The orders of recoveries.
     own: BTreeMap<OrderId, TrainId>,
     /// Whether no dispatcher keeps trains apart and repeats orders.
@@ -79,6 +81,7 @@ impl Watchdog {
             held: BTreeMap::new(),
             standing: BTreeMap::new(),
             seen: BTreeMap::new(),
+            behind: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
             is_watching: true,
@@ -147,6 +150,7 @@ impl Watchdog {
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
+        self.behind.remove(&train);
         if self.dangers.is_empty() {
             // A person is at the track: no waiting train starts by itself.
             for (train, order) in core::mem::take(&mut self.held) {
@@ -300,6 +304,7 @@ impl Watchdog {
         self.stops.forget(train);
         self.monitors.remove(&train);
         self.seen.remove(&train);
+        self.behind.remove(&train);
     }
 
     /// Acts on what has just been received.
@@ -410,6 +415,9 @@ impl Watchdog {
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
         let alarm = self.monitors.entry(train).or_default().pass(passed);
         self.note_place(now, train);
+        if let Some(node) = self.driver.node_passed(passed) {
+            self.behind.insert(train, node);
+        }
         if self.is_watching && self.stops.should_stand(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
             self.power_off(now, train);
@@ -457,6 +465,12 @@ impl Machine for Watchdog {
                 self.monitors.entry(train).or_default().stand();
             } else {
                 self.stops.forget(train);
+            }
+        }
+        if let EventKind::Reverse { train } = event.kind {
+            self.behind.remove(&train);
+            if let Some(place) = self.seen.get_mut(&train) {
+                *place = self.driver.layout().reversed(*place).unwrap_or(*place);
             }
         }
         self.driver.handle_event(now, event);
