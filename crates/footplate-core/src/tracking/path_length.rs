@@ -9,7 +9,7 @@ use crate::track::{Hop, Landmark, Layout, Position, Reach};
 use crate::units::Length;
 
 /// Contacts that may stay silent in a row before the way is no longer believed.
-const BELIEVED_MISSED: usize = 2;
+const MOST_MISSED: usize = 2;
 /// One contact in so many stays silent, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
 const LOG_MISSED: f64 = -3.9;
 /// The same where trains are distinguished, as ln: 0.3 % on a layout that is looked after (chosen from what course reports
@@ -61,7 +61,7 @@ pub(super) fn path_reaches<'g>(
 ) -> impl Iterator<Item = PathReach> + 'g {
     context
         .layout
-        .reaches(from, context.turnouts, BELIEVED_MISSED)
+        .reaches(from, context.turnouts, MOST_MISSED)
         .filter(move |reach| reach.sensor == Some(sensor))
         .map(move |reach| felt(context, model, context.layout, &reach))
 }

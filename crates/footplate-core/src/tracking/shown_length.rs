@@ -12,7 +12,7 @@
 //! a second goes over the same hop otherwise each time, and what a hop then seems to be differs by more: σ never counts for
 //! less than [`BEST_KNOWN`].
 
-use super::locator::{BELIEVED, Locator};
+use super::locator::{GATE, Locator};
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
@@ -36,7 +36,7 @@ impl Locator {
         let hop = context.hop_from(self.node()?).filter(|hop| hop.sensor == Some(sensor))?;
         let section = context.sections.section(hop.id)?;
         let (reach, short, _) = self.best_reach(context, model, sensor, window)?;
-        if reach.missed > 0 || short.mean * short.mean > BELIEVED * BELIEVED * short.variance {
+        if reach.missed > 0 || short.mean * short.mean > GATE * GATE * short.variance {
             return None;
         }
         let unknown = reach.length.variance.max(BEST_KNOWN * BEST_KNOWN);

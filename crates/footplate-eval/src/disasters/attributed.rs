@@ -1,6 +1,6 @@
 //! Several trains running at once: how many of their contacts are laid to the train that closed them.
 
-use footplate_core::control::{DriveNotice, Order};
+use footplate_core::control::{Notice, Order};
 use footplate_core::{Approach, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::Cause;
 
@@ -57,7 +57,7 @@ pub(super) fn attributed(stage: &Rehearsal<'_>, way: &Way, trains: &[TrainId]) -
     let until = began + TimeSpan::from_s(RUN_FOR);
     let mut laid: Vec<(SensorId, Timestamp, Timestamp, TrainId)> = Vec::new();
     while stage.line.now() < until {
-        if let Some(DriveNotice::Passed { train, passed, .. }) = stage.line.drive(&mut driver, until) {
+        if let Some(Notice::Passed { train, passed, .. }) = stage.line.drive(&mut driver, until) {
             laid.push((passed.sensor, passed.window.after, passed.window.until, train));
         }
     }

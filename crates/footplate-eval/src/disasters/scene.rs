@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use footplate_core::control::{DriveNotice, Order, OrderId, Outcome, StopOrder, Watchdog, WatchdogNotice};
+use footplate_core::control::{Notice, Order, OrderId, Outcome, StopOrder, Watchdog};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -111,7 +111,7 @@ impl<'l> Scene<'l> {
     }
 
     /// Lets things happen until a time or a notice.
-    fn drive(&mut self, until: Timestamp) -> Option<WatchdogNotice> {
+    fn drive(&mut self, until: Timestamp) -> Option<Notice> {
         let notice = self.stage.line.drive_hearing(&mut self.watchdog, until, |watchdog, now, notice| {
             if let Some(news) = notice.news() {
                 watchdog.handle_link(now, news);
@@ -121,15 +121,15 @@ impl<'l> Scene<'l> {
         Some(notice)
     }
 
-    fn note(&mut self, notice: &WatchdogNotice) {
+    fn note(&mut self, notice: &Notice) {
         let now = self.now();
         match notice {
-            WatchdogNotice::Danger { train: TRAIN, .. } => match self.happened {
+            Notice::Danger { train: TRAIN, .. } => match self.happened {
                 None => self.result.false_alarms += 1,
                 Some(_) if self.noticed_at.get().is_none() => self.noticed_at.set(Some(now)),
                 Some(_) => {}
             },
-            WatchdogNotice::Recovered { train: TRAIN, outcome, .. } => {
+            Notice::Recovered { train: TRAIN, outcome, .. } => {
                 self.recovered_at.set(Some(now));
                 if let Some(happened) = self.happened {
                     let what = match outcome {
@@ -140,14 +140,12 @@ impl<'l> Scene<'l> {
                     self.result.recovered = Some(((now - happened).as_s(), what));
                 }
             }
-            WatchdogNotice::NeedsPerson { .. } => self.result.needed_person = true,
-            WatchdogNotice::PowerOff { .. } => self.result.powered_off = true,
-            WatchdogNotice::Drive(
-                DriveNotice::Passed { .. } | DriveNotice::Planned(_) | DriveNotice::Thrown { .. },
-            ) => return,
+            Notice::NeedsOperator { .. } => self.result.needed_person = true,
+            Notice::PowerOff { .. } => self.result.powered_off = true,
+            Notice::Passed { .. } | Notice::Planned(_) | Notice::TurnoutThrown { .. } => return,
             _ => {}
         }
-        self.result.said.push(format!("{:.1} {notice}", (now - Timestamp::ZERO).as_s()));
+        self.result.said.push(format!("{:.1} {notice:?}", (now - Timestamp::ZERO).as_s()));
     }
 
     fn wait(&mut self, seconds: f64) {
@@ -190,12 +188,10 @@ impl<'l> Scene<'l> {
         let until = self.now() + TimeSpan::from_s(STOP_PATIENCE);
         while self.now() < until {
             match self.drive(until) {
-                Some(WatchdogNotice::Drive(DriveNotice::Done(done))) if done.order == order => {
+                Some(Notice::Done(done)) if done.order == order => {
                     return Some(());
                 }
-                Some(WatchdogNotice::Drive(DriveNotice::GivenUp { order: given_up, .. }))
-                    if given_up == order =>
-                {
+                Some(Notice::GivenUp { order: given_up, .. }) if given_up == order => {
                     return None;
                 }
                 _ => {}

@@ -87,13 +87,13 @@ pub(crate) fn known(
     // What the laws leave over, from the train itself.
     let stops = steps(numbers.highest).map(|step| {
         let speed = engine.speeds.speed(step, Approach::Below);
-        let really = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+        let really = speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
         (speed.as_m_per_s(), (really - plain.stop(step, Approach::Below).distance).as_m())
     });
     fill_nodes(&mut numbers.values[STOP_NODES..STOP_NODES + NODES], &stops.collect::<Vec<_>>());
     let starts = steps(numbers.highest).filter_map(|step| {
         let really =
-            engine.way_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
+            engine.distance_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
         let foreseen = way_after_start(context, &plain, step)?;
         (really > Length::ZERO)
             .then(|| (engine.speeds.speed(step, Approach::Below).as_m_per_s(), (really - foreseen).as_m()))
@@ -216,7 +216,7 @@ mod tests {
                 let found = model.speed(step, Approach::Below).value;
                 // Half warm: no train is more than 2.5 % slower than warm, nor faster.
                 assert!((0.97..1.01).contains(&(found / speed)), "{law} {step}: {found:?} for {speed:?}");
-                let really = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+                let really = speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
                 let said = model.stop(step, Approach::Below).distance;
                 // A counter's stops jump from step to step by more than the model's nodes can follow.
                 let within_mm = if law == LawFamily::Momentum { 60.0 } else { 10.0 };

@@ -1,6 +1,6 @@
 //! One train from nothing known to stops and moves, each beside the truth.
 
-use footplate_core::control::{Aim, DriveNotice, Driver, Order, OrderId, StopOrder};
+use footplate_core::control::{Aim, Driver, Notice, Order, OrderId, StopOrder};
 use footplate_core::track::{Landmark, Layout, TurnoutStates};
 use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
@@ -228,8 +228,8 @@ impl<'a, 'l> Trial<'a, 'l> {
     fn until_done(&mut self, id: OrderId, patience: Timestamp) -> Option<()> {
         while self.line.now() < patience && self.is_sound() {
             match self.look_on(self.line.now() + LOOK) {
-                Some(DriveNotice::Done(finished)) if finished.order == id => return Some(()),
-                Some(DriveNotice::GivenUp { order, why, .. }) if order == id => {
+                Some(Notice::Done(finished)) if finished.order == id => return Some(()),
+                Some(Notice::GivenUp { order, why, .. }) if order == id => {
                     self.results.failures.push(format!("failed: {why:?}"));
                     return None;
                 }
@@ -240,7 +240,7 @@ impl<'a, 'l> Trial<'a, 'l> {
     }
 
     /// Drives on, and compares the position whenever nothing is said.
-    fn look_on(&mut self, until: Timestamp) -> Option<DriveNotice> {
+    fn look_on(&mut self, until: Timestamp) -> Option<Notice> {
         let notice = self.line.drive(&mut self.driver, until);
         if notice.is_none() {
             self.look();

@@ -1,7 +1,7 @@
 //! Trains commanded to stop at a place in time, beside trains that run there at the step with the mean speed.
 
 use anyhow::Context;
-use footplate_core::control::{DispatchNotice, DriveNotice, Order, OrderId, Refusal, StopOrder};
+use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -255,7 +255,7 @@ impl Trip<'_, '_> {
             {
                 return Err(why);
             }
-            if let Some(DispatchNotice::Drive(DriveNotice::Done(done))) = notice
+            if let Some(Notice::Done(done)) = notice
                 && done.order == order
             {
                 return Ok(());

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::{
-    DispatchNotice, Dispatcher, DriveNotice, Driver, Machine, Order, OrderId, Output, Refusal, TrainLengths,
-    WatchdogNotice,
+    Dispatcher, Driver, Machine, Notice, Order, OrderId, Output, Refusal, TrainLengths,
 };
 use footplate_core::{Command, Event, Timestamp, TrainId};
 use footplate_wire::LinkNotice;
@@ -65,7 +64,7 @@ impl Counted {
     }
 
     /// Lets it drive until it has something to say or a time has come.
-    pub(super) fn drive(&mut self, line: &mut VirtualLine<'_>, until: Timestamp) -> Option<DispatchNotice> {
+    pub(super) fn drive(&mut self, line: &mut VirtualLine<'_>, until: Timestamp) -> Option<Notice> {
         line.drive_hearing(self, until, |counted, now, notice: &LinkNotice| {
             if let (Control::Dispatched(dispatcher), Some(news)) = (&mut counted.control, notice.news()) {
                 dispatcher.handle_link(now, news);
@@ -75,20 +74,18 @@ impl Counted {
 }
 
 /// The train whose order a notice ends before it was carried out, with the order where it has a number, and why.
-pub(super) fn cut_short(notice: &DispatchNotice) -> Option<(TrainId, Option<OrderId>, String)> {
+pub(super) fn cut_short(notice: &Notice) -> Option<(TrainId, Option<OrderId>, String)> {
     match notice {
-        DispatchNotice::Drive(DriveNotice::GivenUp { train, order, why }) => {
-            Some((*train, Some(*order), why.to_string()))
-        }
-        DispatchNotice::Watch(notice @ WatchdogNotice::Dropped { train, .. }) => {
-            Some((*train, None, notice.to_string()))
+        Notice::GivenUp { train, order, why } => Some((*train, Some(*order), why.to_string())),
+        Notice::Cancelled { train, .. } => {
+            Some((*train, None, "its order was cancelled while it was located again".to_owned()))
         }
         _ => None,
     }
 }
 
 impl Machine for Counted {
-    type Notice = DispatchNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         match &mut self.control {
@@ -104,15 +101,10 @@ impl Machine for Counted {
         }
     }
 
-    fn poll_output(&mut self) -> Option<Output<DispatchNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         let output = match &mut self.control {
             Control::Dispatched(dispatcher) => dispatcher.poll_output()?,
-            Control::Bare(driver) => match driver.poll_output()? {
-                Output::Command(command) => Output::Command(command),
-                Output::HoldLine(until) => Output::HoldLine(until),
-                Output::Watch(sensor) => Output::Watch(sensor),
-                Output::Notice(notice) => Output::Notice(DispatchNotice::Drive(notice)),
-            },
+            Control::Bare(driver) => driver.poll_output()?,
         };
         if let Output::Command(Command::Speed { train, .. }) = output {
             *self.steps.entry(train).or_default() += 1;

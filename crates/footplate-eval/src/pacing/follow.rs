@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use footplate_core::control::{DispatchNotice, DriveNotice, Gap, Order, Refusal, TrainLengths};
+use footplate_core::control::{Gap, Notice, Order, Refusal, TrainLengths};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
@@ -268,13 +268,11 @@ impl<'a, 'l> Row<'a, 'l> {
                 of.into_iter().for_each(|followed| followed.trouble = Some(why.clone()));
             }
             match notice {
-                Some(DispatchNotice::Drive(DriveNotice::HeldBack { train, .. })) => {
+                Some(Notice::HeldBack { train, .. }) => {
                     let held = self.followed.iter_mut().find(|followed| followed.train == train);
                     held.into_iter().for_each(|followed| followed.held_back += 1);
                 }
-                Some(DispatchNotice::Drive(DriveNotice::Passed { train, passed, .. }))
-                    if self.by == By::Steps =>
-                {
+                Some(Notice::Passed { train, passed, .. }) if self.by == By::Steps => {
                     self.step_up_or_down(train, passed.sensor, passed.window.middle());
                 }
                 Some(_) => {}

@@ -1,7 +1,7 @@
 //! Trains commanded to run at a speed that none of their steps has, beside the step that comes nearest to it.
 
 use anyhow::Context;
-use footplate_core::control::{DispatchNotice, DriveNotice, Order, PacedLine};
+use footplate_core::control::{Notice, Order, PacedLine};
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::Layout;
@@ -181,13 +181,9 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
             break;
         }
         let found = match notice {
-            Some(DispatchNotice::Drive(DriveNotice::Paced(PacedLine { node, way, time, .. }))) => {
-                Some(Ideal { node, way, time })
-            }
+            Some(Notice::Paced(PacedLine { node, way, time, .. })) => Some(Ideal { node, way, time }),
             // The first contact at a settled speed begins a line, as the driver's does.
-            Some(DispatchNotice::Drive(DriveNotice::Passed { passed, .. }))
-                if settled.is_some_and(|at| at < passed.window.after) =>
-            {
+            Some(Notice::Passed { passed, .. }) if settled.is_some_and(|at| at < passed.window.after) => {
                 let node = counted.driver().node_passed(&passed);
                 node.map(|node| Ideal { node, way: Length::ZERO, time: passed.window.middle() })
             }

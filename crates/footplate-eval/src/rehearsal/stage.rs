@@ -174,7 +174,7 @@ mod tests {
             let sensor = layout.sensor_at(node).expect("a contact");
             let past = rehearsal.world().truth().felt_past(train, sensor).expect("near");
             assert!((past - located.at.way).abs() < Length::from_mm(30.0), "{past:?}");
-            assert!(driver.stands(train, rehearsal.line.now()));
+            assert!(driver.is_at_rest(train, rehearsal.line.now()));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One train that is told to do something over and over, on a layout with zones.
 
 use anyhow::Context;
-use footplate_core::control::{DriveNotice, Driver, Gap, Order, OrderId, Refusal, StopOrder};
+use footplate_core::control::{Driver, Gap, Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
@@ -137,12 +137,12 @@ impl Ride<'_, '_> {
             let look = self.stage.line.now() + LOOK;
             while let Some(notice) = self.stage.line.drive(&mut self.driver, look) {
                 match notice {
-                    DriveNotice::Done(finished) if Some(finished.order) == busy => {
+                    Notice::Done(finished) if Some(finished.order) == busy => {
                         done += 1;
                         let again = matches!(self.told, Told::Stop | Told::Arrive);
                         next = again.then(|| self.stage.line.now() + TimeSpan::from_s(PAUSE));
                     }
-                    DriveNotice::GivenUp { order, why, .. } if Some(order) == busy => {
+                    Notice::GivenUp { order, why, .. } if Some(order) == busy => {
                         trouble = Some(why.to_string());
                     }
                     _ => {}

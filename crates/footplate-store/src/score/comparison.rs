@@ -1,36 +1,36 @@
-//! Us and all rivals over one selection of hits.
+//! The scores of our estimator and of all reference forecasters over the same detections.
 
 use super::forecast_score::ForecastScore;
-use super::rival::Rival;
+use super::reference::ReferenceForecaster;
 use super::scored_hit::ScoredHit;
 
-/// The figures of everybody.
+/// The scores of all forecasters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Ours.
+    /// The scores of our estimator.
     pub ours: ForecastScore,
-    /// The rivals', in the order of [`Rival::ALL`].
-    pub rivals: Vec<RivalScore>,
-    /// Hits for which a next contact had been named.
+    /// The scores of the references, in the order of [`ReferenceForecaster::ALL`].
+    pub references: Vec<ReferenceScore>,
+    /// Detections for which the next sensor had been named.
     pub named: usize,
-    /// Those of them where it was the one that reported.
+    /// Those whose sensor had been named correctly.
     pub right: usize,
 }
 
-/// A rival's figures, and ours on the same hits.
+/// The score of a reference, and ours on the same detections.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RivalScore {
-    /// Who.
-    pub rival: Rival,
-    /// Its figures over the hits that both forecast.
+pub struct ReferenceScore {
+    /// The reference.
+    pub reference: ReferenceForecaster,
+    /// Its score over the detections that both forecast.
     pub score: ForecastScore,
-    /// Ours over exactly these.
+    /// Our score over exactly these.
     pub ours: ForecastScore,
 }
 
-impl RivalScore {
-    /// Our median error over the rival's, on the hits that both forecast: below 1 we are better. Two medians of
-    /// nothing are equal.
+impl ReferenceScore {
+    /// Our median error over the reference's, on the detections that both forecast: below 1 we are better. Two medians
+    /// of zero are equal.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         let (ours, theirs) = (self.ours.median_abs_mm?, self.score.median_abs_mm?);
@@ -39,32 +39,32 @@ impl RivalScore {
 }
 
 impl Comparison {
-    /// Sums up a selection.
+    /// The scores over a selection.
     #[must_use]
     pub fn of<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone) -> Self {
-        let rivals = Rival::ALL.map(|rival| RivalScore {
-            rival,
-            score: ForecastScore::of_rival(hits.clone(), rival),
-            ours: ForecastScore::of_us_beside(hits.clone(), rival),
+        let references = ReferenceForecaster::ALL.map(|reference| ReferenceScore {
+            reference,
+            score: ForecastScore::of_reference(hits.clone(), reference),
+            ours: ForecastScore::of_ours_beside(hits.clone(), reference),
         });
         let named = hits.clone().filter(|hit| hit.hit.named.is_some());
         Self {
             ours: ForecastScore::of(hits),
-            rivals: rivals.into(),
+            references: references.into(),
             named: named.clone().count(),
             right: named.filter(|hit| hit.hit.named == Some(hit.hit.passage.sensor)).count(),
         }
     }
 
-    /// How often the contact named as the next was the one that reported; `None` where none was named.
+    /// The share of correctly named sensors; `None` if none was named.
     #[must_use]
-    pub fn named_right(&self) -> Option<f64> {
+    pub fn named_correctly(&self) -> Option<f64> {
         (self.named > 0).then(|| self.right as f64 / self.named as f64)
     }
 
-    /// The figures of one rival.
+    /// The score of one reference.
     #[must_use]
-    pub fn rival(&self, rival: Rival) -> Option<&RivalScore> {
-        self.rivals.iter().find(|score| score.rival == rival)
+    pub fn reference(&self, reference: ReferenceForecaster) -> Option<&ReferenceScore> {
+        self.references.iter().find(|score| score.reference == reference)
     }
 }

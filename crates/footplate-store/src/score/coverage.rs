@@ -1,27 +1,27 @@
-//! How often stated intervals held what they were to hold, and how sure such a count is.
+//! Coverage: the share of values inside their intervals, with the uncertainty of that share.
 
 use footplate_core::HALF_95;
 
 /// A count of reports inside intervals of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coverage {
-    /// The probability that the intervals state, 0 to 1.
+    /// The stated probability of the intervals, 0 to 1.
     pub level: f64,
     /// Reports inside.
     pub inside: usize,
-    /// Reports in all, at least one.
+    /// All reports, at least one.
     pub of: usize,
 }
 
 impl Coverage {
-    /// The part inside.
+    /// The share inside.
     #[must_use]
     pub fn fraction(self) -> f64 {
         self.inside as f64 / self.of as f64
     }
 
-    /// Which true probabilities the count is in keeping with, at 95 %: the score interval (Wilson, 1927), which
-    /// holds for small counts and at the ends where the usual ± does not.
+    /// The 95 % interval of the true probability: the score interval (Wilson, 1927), which remains valid for small
+    /// counts and near 0 and 1, unlike the normal approximation.
     #[must_use]
     pub fn plausible(self) -> (f64, f64) {
         let (n, p, z) = (self.of as f64, self.fraction(), HALF_95);

@@ -1,25 +1,25 @@
-//! What stands in one field of a written table.
+//! The fields of a written table.
 
 use footplate_core::Timestamp;
 
-/// What a column holds.
+/// The type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Seconds.
     Time,
-    /// Seconds, or nothing.
+    /// Seconds, or empty.
     OptionalTime,
-    /// A whole number, or nothing.
+    /// A whole number, or empty.
     Whole,
     /// A number in every row.
     Number,
-    /// A number, or nothing.
+    /// A number, or empty.
     OptionalNumber,
     /// A text in every row.
     Text,
 }
 
-/// What stands in one field.
+/// The value of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell<'c> {
     Missing,

@@ -1,4 +1,4 @@
-//! Tables that are written row by row, as CSV or Parquet.
+//! Writes tables row by row, as CSV or Parquet.
 
 mod cell;
 mod csv;

@@ -1,4 +1,4 @@
-//! Pictures of curves for `--plot`: what they show, drawn the same as SVG and PNG.
+//! The pictures of `--plot`, drawn alike as SVG and PNG.
 
 mod drawing;
 mod file;

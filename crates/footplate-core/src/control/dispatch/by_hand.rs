@@ -43,7 +43,7 @@ impl Dispatcher {
     /// A train driven by hand that is at rest without an order reserves no more than the track under it. Returns whether it
     /// does.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
-        let is_done = self.watchdog.driver().stands(id, now) && self.watchdog.driver().busy(id).is_none();
+        let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
             self.halted(now, id, true);
@@ -104,13 +104,13 @@ impl Dispatcher {
         let end = free_until(reach, &row);
         if !is_free(end, &row) {
             // Not even the track under it is free: it keeps its reservation, and stays.
-            self.watchdog.set_limit(now, id, Some(located.at));
+            self.watchdog.set_end_of_authority(now, id, Some(located.at));
             return;
         }
         let own_end = free_until(end, &[id]);
         let mut held = self.reserved(path.reservation(layout, at - room.behind, own_end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             held.add(layout, &train.held);
         }
         // Free track up to the horizon is no limit, and neither is a turnout of unknown position: the person who drives sees
@@ -121,7 +121,7 @@ impl Dispatcher {
                 .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
             limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
         });
-        self.watchdog.set_limit(now, id, limit);
+        self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

@@ -2,24 +2,24 @@
 
 use alloc::vec::Vec;
 
-use crate::control::supervise::{Alarm, WatchdogNotice};
+use crate::control::supervise::Alarm;
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::notice::DispatchNotice;
 use super::reservation::{Reservation, Span};
+use crate::control::Notice;
 
 /// The gap between two reservations: those that touch overlap.
 const APART: Length = Length::from_mm(1.0);
 
 impl Dispatcher {
-    /// Takes a notice of the watchdog.
-    pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: WatchdogNotice) {
-        match &notice {
-            WatchdogNotice::Danger { train, stopped, why, .. } => {
+    /// Reacts to a notice of the watchdog.
+    pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: &Notice) {
+        match notice {
+            Notice::Danger { train, stopped, why, .. } => {
                 if matches!(why, Alarm::Lost | Alarm::Elsewhere(_)) {
                     self.doubt_turnouts();
                 }
@@ -29,10 +29,10 @@ impl Dispatcher {
                 self.gives_up(*train);
                 self.set_state(*train, State::InDanger);
             }
-            WatchdogNotice::AsksToCrawl { train } => {
+            Notice::AsksToCreep { train } => {
                 self.crawlers.insert(*train);
             }
-            WatchdogNotice::Recovered { train, .. } => {
+            Notice::Recovered { train, .. } => {
                 self.crawlers.remove(train);
                 if let Some(known) = self.trains.get_mut(train) {
                     // It has left the track of its authority.
@@ -42,16 +42,21 @@ impl Dispatcher {
                 }
                 self.halted(now, *train, true);
             }
-            WatchdogNotice::NeedsPerson { train, .. } => {
+            Notice::NeedsOperator { train, .. } => {
                 self.crawlers.remove(train);
                 self.set_state(*train, State::Lost);
             }
-            // A journey continues by itself.
-            WatchdogNotice::Dropped { train, .. } if self.journey(*train).is_some() => return,
-            _ => {}
+            Notice::PowerOff { .. }
+            | Notice::PowerOn
+            | Notice::Creeps { .. }
+            | Notice::Located { .. }
+            | Notice::SpeedMeasured { .. }
+            | Notice::StopChecked { .. }
+            | Notice::Resumed { .. }
+            | Notice::Cancelled { .. } => {}
+            _ => return,
         }
         self.is_stirred = true;
-        self.say(DispatchNotice::Watch(notice));
     }
 
     /// A train was not where it should have been: turnouts may lie otherwise than they were commanded, several at once. Each
@@ -67,7 +72,7 @@ impl Dispatcher {
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
             let moves = |other: &TrainId| {
-                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().is_at_rest(*other, now)
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);

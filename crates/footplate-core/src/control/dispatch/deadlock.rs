@@ -15,11 +15,11 @@ use super::dispatcher::Dispatcher;
 use super::granting::Proposal;
 use super::movement_authority::Start;
 use super::movement_authority::{ClearanceEnvelope, standing};
-use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
 use super::parking::{OFF, PARKED};
 use super::reservation::Reservation;
+use crate::control::Notice;
 
 /// The limits of a search; beyond them it gives up until something has changed.
 #[derive(Debug, Clone, Copy)]
@@ -112,7 +112,7 @@ impl Dispatcher {
         let Some((moves, place, proposal)) = found else { return false };
         let moves: Vec<TrainId> = moves.into_iter().map(|(train, _)| train).collect();
         if let Some(first) = moves.first().copied() {
-            self.say(DispatchNotice::Deadlock { train: id, moves });
+            self.say(Notice::Deadlock { train: id, moves });
             if let Some(train) = self.trains.get_mut(&id) {
                 train.rooms_made = train.rooms_made.saturating_add(1);
                 if let Some(asked) = train.asked.as_mut().filter(|_| train.rooms_made >= ROOMS_IN_A_ROW) {
@@ -156,7 +156,7 @@ impl Dispatcher {
             let Some(mover) = ready.get(turn).copied() else { continue };
             if let Some((place, proposal)) = self.elsewhere(now, mover) {
                 self.shuffled += nth + 1;
-                self.say(DispatchNotice::Deadlock { train: id, moves: Vec::new() });
+                self.say(Notice::Deadlock { train: id, moves: Vec::new() });
                 self.send_aside(now, mover, id, place, proposal);
                 return;
             }
@@ -169,7 +169,7 @@ impl Dispatcher {
     fn doubts_a_place(&mut self, now: Timestamp) -> bool {
         self.searches_in_vain += 1;
         let is_unseen = |train: &&DispatchedTrain| {
-            let unseen = self.watchdog.driver().unseen(train.id, now).is_some();
+            let unseen = self.watchdog.driver().missed_sensor(train.id, now).is_some();
             train.is_ready(now) && (unseen || !train.seen_since_start)
         };
         let unseen: Vec<TrainId> = self.trains.values().filter(is_unseen).map(|train| train.id).collect();
@@ -212,7 +212,7 @@ impl Dispatcher {
         proposal: Proposal,
     ) {
         let to = Landmark { node: self.node_before(place), offset: place.offset };
-        self.say(DispatchNotice::StepsAside { train: id, makes_room_for, to });
+        self.say(Notice::StepsAside { train: id, makes_room_for, to });
         self.grant(now, id, Purpose::Aside(makes_room_for), proposal);
     }
 
@@ -379,7 +379,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
-        let turned = self.watchdog.driver().turned_place_at(stander.place);
+        let turned = self.watchdog.driver().reversed_position_at(stander.place);
         Some(Start {
             place: stander.place,
             room,

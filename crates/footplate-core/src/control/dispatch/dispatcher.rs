@@ -4,7 +4,7 @@ use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
-use crate::control::supervise::{LinkNews, Watchdog, WatchdogNotice};
+use crate::control::supervise::{LinkNews, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
@@ -18,10 +18,10 @@ use super::blocks::Blocks;
 use super::dispatched_train::{Asked, DispatchedTrain, State};
 use super::journey::{Journey, TrainLengths};
 use super::movement_authority::{ClearanceEnvelope, standing};
-use super::notice::DispatchNotice;
 use super::parking::{PARKED, parking_places};
 use super::reservation::Reservation;
 use super::turnout_command::TurnoutCommand;
+use crate::control::Notice;
 
 /// How often the dispatcher acts while a train waits or runs.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
@@ -43,7 +43,7 @@ pub struct Dispatcher {
     pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
     /// Turnouts whose command has not left yet, with the train and the time of the request.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
-    pub(super) outputs: VecDeque<Output<DispatchNotice>>,
+    pub(super) outputs: VecDeque<Output<Notice>>,
     /// Whether anything has changed since trains at rest were last examined.
     pub(super) is_stirred: bool,
     /// How often a train was moved only to change the places that a search begins from.
@@ -294,7 +294,8 @@ impl Dispatcher {
     pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
-        if self.watchdog.driver().unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+        if self.watchdog.driver().missed_sensor(id, now).is_none() && self.anchors(now, id, place).len() > own
+        {
             self.watchdog.count_from_behind(now, id);
         }
     }
@@ -318,7 +319,7 @@ impl Dispatcher {
         anchors
     }
 
-    pub(super) fn say(&mut self, notice: DispatchNotice) {
+    pub(super) fn say(&mut self, notice: Notice) {
         self.outputs.push_back(Output::Notice(notice));
     }
 
@@ -334,11 +335,12 @@ impl Dispatcher {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                     Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                     Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                    Output::Notice(WatchdogNotice::Drive(notice)) => {
-                        self.say(DispatchNotice::Drive(notice.clone()));
+                    // A journey is resumed by the dispatcher.
+                    Output::Notice(Notice::Cancelled { train, .. }) if self.journey(train).is_some() => {}
+                    Output::Notice(notice) => {
+                        self.say(notice.clone());
                         self.hear(now, &notice);
                     }
-                    Output::Notice(notice) => self.hear_of_danger(now, notice),
                 }
             }
             self.go_on(now);
@@ -387,7 +389,7 @@ impl Dispatcher {
 }
 
 impl Machine for Dispatcher {
-    type Notice = DispatchNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.watchdog.handle_event(now, event);
@@ -399,7 +401,7 @@ impl Machine for Dispatcher {
         self.settle(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<DispatchNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         self.outputs.pop_front()
     }
 

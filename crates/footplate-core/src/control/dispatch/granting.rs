@@ -3,6 +3,7 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TrainId};
@@ -15,7 +16,6 @@ use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::itinerary::{Itinerary, Pace, Search};
 use super::movement_authority::{MovementAuthority, Start, granted};
-use super::notice::DispatchNotice;
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
 use super::path::Path;
@@ -95,7 +95,7 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.watchdog.driver().unseen(id, now).is_none() {
+                if self.watchdog.driver().missed_sensor(id, now).is_none() {
                     self.cannot_go(now, id, self.unreachable(id));
                 } else if !self.begins_to_look_back(id) && !self.looks_ahead(now, id, &start) {
                     self.lose(now, id);
@@ -188,9 +188,9 @@ impl Dispatcher {
             near.extend(train.held.turnouts());
         }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let is_sure = self.watchdog.driver().unseen(id, now).is_none() || looks_back;
+        let is_sure = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.watchdog.driver().turned_place(id, now).filter(|_| may_turn);
+        let turned = self.watchdog.driver().reversed_position(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         let may_back_away = train.seen_since_turn;
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })
@@ -303,7 +303,7 @@ impl Dispatcher {
         train.state = State::Setting { ready: None, since: now };
         train.skipped.clear();
         self.hold(now, id);
-        self.say(DispatchNotice::RouteSet { train: id, takes, turns });
+        self.say(Notice::RouteSet { train: id, takes, turns });
     }
 
     fn waits(&mut self, id: TrainId, wish: &Proposal) {
@@ -312,7 +312,7 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id)
             && !core::mem::replace(&mut train.waits_said, true)
         {
-            self.say(DispatchNotice::Waits { train: id, on });
+            self.say(Notice::Waits { train: id, on });
         }
     }
 

@@ -1,15 +1,15 @@
-//! What the dispatcher does on notices of the driver.
+//! How the dispatcher reacts to notices of the driver.
 
 use alloc::vec::Vec;
 
-use crate::control::drive::{DriveNotice, Refusal};
+use crate::control::Notice;
+use crate::control::drive::Refusal;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::notice::DispatchNotice;
 use super::path::Path;
 
 /// A train that was stopped at its end of authority gets this many times the room at its next stop, up to `MOST_CAUTION`.
@@ -19,17 +19,17 @@ const MOST_CAUTION: f64 = 4.0;
 const MORE: Length = Length::from_mm(60.0);
 
 impl Dispatcher {
-    /// Takes a notice of the driver.
-    pub(super) fn hear(&mut self, now: Timestamp, notice: &DriveNotice) {
+    /// Reacts to a notice of the driver or its watchdog.
+    pub(super) fn hear(&mut self, now: Timestamp, notice: &Notice) {
         match notice {
-            DriveNotice::Thrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
-            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+            Notice::TurnoutThrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
+            Notice::TurnoutMismatch { turnout, curved, train } => {
                 self.turnout_shown(now, *turnout, *curved);
                 if !self.watchdog.is_in_danger(*train) {
                     self.diverged(now, *train);
                 }
             }
-            DriveNotice::Passed { train, passed, .. } => {
+            Notice::Passed { train, passed, .. } => {
                 if let Some(train) = self.trains.get_mut(train) {
                     train.seen_since_turn = true;
                     train.seen_since_start = true;
@@ -43,7 +43,7 @@ impl Dispatcher {
                     self.diverged(now, *train);
                 }
             }
-            DriveNotice::Done(finished) => {
+            Notice::Done(finished) => {
                 let Some(train) = self.trains.get(&finished.train) else { return };
                 match train.state {
                     State::Running { order, .. } if order == finished.order => {
@@ -54,7 +54,7 @@ impl Dispatcher {
                     _ => {}
                 }
             }
-            DriveNotice::GivenUp { order, train, why } => {
+            Notice::GivenUp { order, train, why } => {
                 let Some(known) = self.trains.get(train) else { return };
                 match known.state {
                     State::Running { order: running, .. } if running == *order => {
@@ -65,7 +65,7 @@ impl Dispatcher {
                 }
             }
             // The watchdog has cut the power, or stopped the train for another reason.
-            DriveNotice::Replaced { order, train } => match self.trains.get(train).map(|known| known.state) {
+            Notice::Replaced { order, train } => match self.trains.get(train).map(|known| known.state) {
                 Some(State::Running { order: running, .. } | State::Turning { order: running })
                     if running == *order =>
                 {
@@ -73,12 +73,12 @@ impl Dispatcher {
                 }
                 _ => {}
             },
-            DriveNotice::Lost { train } => {
+            Notice::Lost { train } => {
                 self.gives_up(*train);
                 self.set_state(*train, State::Lost);
-                self.say(DispatchNotice::HeldAsUnknown { train: *train });
+                self.say(Notice::ReservedAsUnknown { train: *train });
             }
-            _ => {}
+            other => self.hear_of_danger(now, other),
         }
     }
 
@@ -97,7 +97,7 @@ impl Dispatcher {
     /// Remembers the last run: whether the train comes to rest near its destination shows once it is at rest.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have left.
-        if self.watchdog.driver().unseen(id, now).is_none()
+        if self.watchdog.driver().missed_sensor(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();
@@ -144,6 +144,6 @@ impl Dispatcher {
                 _ => {}
             }
         }
-        self.say(DispatchNotice::Diverged { train: id, stopped });
+        self.say(Notice::Diverged { train: id, stopped });
     }
 }

@@ -19,7 +19,8 @@ impl Dispatcher {
     pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
         let found = || {
             let known = self.trains.get(&train)?;
-            let limit = self.watchdog.driver().position_at(train, self.watchdog.driver().limit(train)?)?;
+            let limit =
+                self.watchdog.driver().position_at(train, self.watchdog.driver().end_of_authority(train)?)?;
             let layout = self.watchdog.driver().layout();
             let room = self.room(now, known);
             let ahead = room.ahead + BEYOND;

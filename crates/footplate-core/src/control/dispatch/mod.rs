@@ -16,7 +16,6 @@ mod holders;
 mod itinerary;
 mod journey;
 mod movement_authority;
-mod notice;
 mod obstacles;
 mod occupied_path;
 mod parking;
@@ -28,5 +27,4 @@ mod turnout_command;
 
 pub use dispatcher::Dispatcher;
 pub use journey::{Journey, TrainLengths};
-pub use notice::DispatchNotice;
 pub use reservation::{CLEARANCE, Reservation, Span};

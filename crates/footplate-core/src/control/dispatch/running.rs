@@ -1,7 +1,8 @@
 //! The runs of a train, one after the other: set the turnouts, reverse, run, come to rest.
 
-use crate::control::drive::THERE;
-use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
+use crate::control::Notice;
+use crate::control::drive::AT_TARGET;
+use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
@@ -11,7 +12,6 @@ use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::itinerary::SHORTEST_RUN;
 use super::movement_authority::{MovementAuthority, SLACK, Start};
-use super::notice::DispatchNotice;
 use super::path::Path;
 use super::reservation::Reservation;
 
@@ -41,11 +41,11 @@ impl Dispatcher {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed, .. } if self.watchdog.driver().stands(id, now) => {
+                State::Halting { confirmed, .. } if self.watchdog.driver().is_at_rest(id, now) => {
                     self.halted(now, id, confirmed);
                 }
                 State::Lost
-                    if self.watchdog.driver().stands(id, now)
+                    if self.watchdog.driver().is_at_rest(id, now)
                         && self.watchdog.driver().position(id, now).is_some() =>
                 {
                     self.halted(now, id, true);
@@ -61,7 +61,7 @@ impl Dispatcher {
                         && !self.unknown_turnout_ahead(now, id).is_some_and(|unknown| unknown.is_clear) =>
                 {
                     self.set_state(id, State::Lost);
-                    self.say(DispatchNotice::HeldAsUnknown { train: id });
+                    self.say(Notice::ReservedAsUnknown { train: id });
                 }
                 _ => {}
             }
@@ -80,7 +80,7 @@ impl Dispatcher {
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
         self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
-        self.say(DispatchNotice::HeldAsUnknown { train: id });
+        self.say(Notice::ReservedAsUnknown { train: id });
     }
 
     /// A train reverses: no sensor has reported it since.
@@ -105,8 +105,10 @@ impl Dispatcher {
     /// Sends a train that a sensor did not report a short distance ahead on its edge, where the track allows it: one that
     /// came to rest short of the sensor is reported then. Returns whether it goes; once until a sensor reports it.
     pub(super) fn looks_ahead(&mut self, now: Timestamp, id: TrainId, start: &Start) -> bool {
-        let has_looked =
-            self.trains.get_mut(&id).is_none_or(|train| core::mem::replace(&mut train.has_looked_ahead, true));
+        let has_looked = self
+            .trains
+            .get_mut(&id)
+            .is_none_or(|train| core::mem::replace(&mut train.has_looked_ahead, true));
         let target = Position { offset: start.place.offset + AHEAD_TO_BE_SEEN, ..start.place };
         let proposal = self.propose(start, &[target], &self.obstacles_of_others(id));
         let Some(proposal) = proposal.filter(|found| !has_looked && self.is_free(id, found)) else {
@@ -143,7 +145,7 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that its place can be counted from there once it has reversed. It may be
     /// on another edge than planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let turned = self.watchdog.driver().reversed_position(id, now)?;
         let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
@@ -178,7 +180,7 @@ impl Dispatcher {
             let stop = run.path.place(run.stop)?;
             let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
             // The path may lead round to where it is already.
-            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
@@ -191,7 +193,7 @@ impl Dispatcher {
         // Where a train only reverses or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round };
-        self.watchdog.set_limit(now, id, Some(limit));
+        self.watchdog.set_end_of_authority(now, id, Some(limit));
         let taken = self.watchdog.order(now, Order::Stop(stop));
         let retried = |_| self.watchdog.order(now, Order::Stop(StopOrder { step: None, ..stop }));
         match if step.is_some() { taken.or_else(retried) } else { taken } {
@@ -215,7 +217,7 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be, so the runs planned from there do not hold.
@@ -227,7 +229,7 @@ impl Dispatcher {
         }
         if train.course.is_empty() {
             train.state = State::Resting;
-            self.watchdog.set_limit(now, id, None);
+            self.watchdog.set_end_of_authority(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
             self.arrived(now, id, error);
         } else {
@@ -254,9 +256,9 @@ impl Dispatcher {
             train.not_before = now + AFTER_HALT;
             train.unobstructed_s = None;
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         if !is_sure {
-            self.say(DispatchNotice::HeldAsUnknown { train: id });
+            self.say(Notice::ReservedAsUnknown { train: id });
         } else if confirmed {
             self.stand(now, id);
         }
@@ -319,9 +321,9 @@ impl Dispatcher {
             train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         self.hold_again(now, id);
-        self.say(DispatchNotice::Withdrawn { train: id, why });
+        self.say(Notice::Withdrawn { train: id, why });
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
             self.give_up_journey(id, self.unreachable(id));
         }
@@ -332,7 +334,7 @@ impl Dispatcher {
         let Some(train) = self.trains.get_mut(&id) else { return };
         train.withdrawn = 0;
         if let Some(asked) = train.asked.take() {
-            self.say(DispatchNotice::Drive(DriveNotice::GivenUp { order: asked.order, train: id, why }));
+            self.say(Notice::GivenUp { order: asked.order, train: id, why });
         }
     }
 
@@ -354,7 +356,7 @@ impl Dispatcher {
         if let Some(asked) = train.asked.take_if(|asked| Some(asked.order) == granted_for) {
             let took = now - asked.since;
             train.caution = 1.0;
-            self.say(DispatchNotice::Arrived { order: asked.order, train: id, error, took });
+            self.say(Notice::Arrived { order: asked.order, train: id, error, took });
         }
     }
 
@@ -391,7 +393,7 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let Some(at) = run.path.find_node(layout, contact, rear) else { return false };
         // Another train may have caused the detection, or none.
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);

@@ -1,4 +1,4 @@
-//! How the driving half of a turn begins, as it is kept: all that its driver is made of.
+//! The inputs of the driver in a tour, as they are recorded for a replay.
 
 use footplate_core::control::Driver;
 use footplate_core::model::MotionModel;
@@ -11,19 +11,19 @@ use super::calibrating::Calibrated;
 use crate::commands::written_layout::WrittenLayout;
 use crate::witness::{Input, Listener};
 
-/// All that the driver of a train is made of that has just been calibrated.
+/// Everything that the driver of a calibrated train is built from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct TourBeginning {
-    /// The text of the layout.
+    /// The text of the layout file.
     pub(crate) layout: String,
     turnouts: Vec<(TurnoutId, Leg)>,
     model: MotionModel,
-    /// Where the train is.
+    /// The located train.
     locator: Locator,
 }
 
 impl TourBeginning {
-    /// The name of such a machine in a store.
+    /// The kind of this machine in a store.
     pub(crate) const KIND: &'static str = "tour";
 
     pub(super) fn new(on: &WrittenLayout, known: &Calibrated) -> Self {
@@ -35,7 +35,7 @@ impl TourBeginning {
         }
     }
 
-    /// The driver that begins so, on the layout that the text says.
+    /// Builds the driver; `layout` is the one in the text.
     pub(crate) fn driver(self, layout: &Layout) -> Driver {
         let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
         driver.add_located(self.model, self.locator);
@@ -46,7 +46,7 @@ impl TourBeginning {
 impl Listener for Driver {
     fn handle_word(&mut self, now: Timestamp, word: &Input) {
         if let Input::Order(order) = word {
-            // What it refuses, it refuses again.
+            // An order that was refused live is refused in a replay, too.
             let _ = self.order(now, *order);
         }
     }

@@ -1,4 +1,4 @@
-//! Reads what people write to drive trains, and tells them what would be right where it is not.
+//! Parses lines of a script or the prompt; an error names the column and suggests a correction.
 
 use footplate_core::SpeedStep;
 use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder, TrainLengths};
@@ -12,10 +12,10 @@ const VERBS: [&str; 16] = [
     "halt", "power", "where", "wait", "help",
 ];
 
-/// Reads one line; `None` where it says nothing.
+/// Parses one line; `None` for an empty line or a comment.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The first mistake in the line.
 pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>, Mistake> {
     let words = words(line);
     let Some((verb, rest)) = words.split_first() else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! One line of JSON for an order that has ended.
+//! The line of JSON that `drive --json` prints for each order that has ended.
 
 use footplate_core::Length;
 use footplate_core::track::Layout;
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::spoken::{Ended, Target};
 
-/// The line, in the order in which it is written.
+/// The fields in the order in which they are written.
 #[derive(Debug, Serialize)]
 pub(super) struct ResultLine<'e> {
     command: &'static str,
@@ -25,13 +25,13 @@ pub(super) struct ResultLine<'e> {
     refused: Option<&'e str>,
 }
 
-/// A tenth of a millimetre is more than anybody knows.
+/// Millimetres, rounded to 0.1: finer than any estimate.
 fn mm(length: Length) -> f64 {
     (length.as_mm() * 10.0).round() / 10.0
 }
 
 impl<'e> ResultLine<'e> {
-    /// `truth` is how far beyond its target the train really came to rest, where that is known.
+    /// `truth` is how far beyond its target the train really came to rest, if a simulator knows.
     pub(super) fn of(layout: &Layout, ended: &'e Ended, truth: Option<Length>) -> Self {
         let target = match ended.target {
             Target::Place(place) => Some(layout.display(place).to_string()),

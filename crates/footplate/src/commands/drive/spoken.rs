@@ -1,4 +1,4 @@
-//! What is said of a session: lines for people, and finished orders for whoever counts them.
+//! The messages of a driving session: lines of text, detections, alarms and ended orders.
 
 use footplate_core::control::Promise;
 use footplate_core::track::Landmark;
@@ -6,60 +6,59 @@ use footplate_core::{Length, TimeSpan, TrainId};
 
 use crate::dashboard::{Alarm, TrainPassed};
 
-/// Something to be said.
+/// One message.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Spoken {
-    /// For people, and what could stand below it: where trains are.
+    /// A line for operators, with a status line to show below it.
     Line {
-        /// The line.
         text: String,
-        /// Where trains are, shortly.
+        /// Where all trains are, in short.
         status: String,
     },
-    /// A train passed a contact; for whoever draws it.
+    /// A sensor detected a train: for the displays.
     Passed(TrainPassed),
-    /// Something is not as it should be; for whoever looks at pages, where it is said, too.
+    /// An alarm: for the displays.
     Alarm(Alarm),
-    /// An order begins that ends at a place; whoever knows the truth may look where the train is now.
+    /// A train begins an order that ends at a place: the time to note its true position in a simulation.
     Begun(TrainId),
     /// An order has ended.
     Ended(Ended),
-    /// All has been done.
+    /// The session is over.
     Over,
 }
 
-/// An order that has ended, well or not.
+/// An order that has ended, carried out or not.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ended {
-    /// As it was written.
+    /// The line it was given by.
     pub(super) text: String,
-    /// Its first word.
+    /// The first word of that line.
     pub(crate) command: &'static str,
     pub(super) train: Option<TrainId>,
     pub(super) target: Target,
-    /// The target as the train faces it, where it may have come from either side.
-    pub(super) faced: Option<Landmark>,
-    /// The place, as it is believed.
+    /// The target in the direction of arrival, if the train may have come from either side.
+    pub(super) target_on_arrival: Option<Landmark>,
+    /// The estimated place of rest.
     pub(super) achieved: Option<String>,
     /// How far beyond the target that is.
     pub(super) error: Option<Length>,
-    /// What had been promised of that.
+    /// The interval that was predicted for the stop.
     pub(crate) promise: Option<Promise>,
-    /// When, since the session began.
+    /// When it ended, since the session began.
     pub(super) at: TimeSpan,
-    /// A contact that should have reported the train and did not.
+    /// A sensor that should have reported the train and did not.
     pub(super) unseen: Option<String>,
     /// Why it was not carried out.
     pub(crate) refused: Option<String>,
 }
 
-/// Where an order was to lead.
+/// The target of an order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Target {
-    /// Nowhere in particular.
+    /// An order without a target.
     None,
-    /// To a place.
+    /// A place.
     Place(Landmark),
-    /// So far from where it was.
+    /// A distance ahead of where the train was.
     Ahead(Length),
 }

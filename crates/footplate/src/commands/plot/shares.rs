@@ -1,11 +1,11 @@
-//! How values are spread, as a curve: for every share of them, what it stays below.
+//! The distribution of values as a curve: the value below which each share of them lies.
 
-/// Points of a curve (chosen: one for every half per cent).
+/// Points of a curve (chosen: one per half per cent).
 const SAMPLES: usize = 200;
-/// The curve ends here, in per cent: a single wild value must not flatten all others.
+/// The end of the curve, in per cent: outliers must not flatten the rest.
 pub(in crate::commands) const SHOWN: f64 = 95.0;
 
-/// What so many per cent of the values stay below, from the least value on; nothing of no values.
+/// Points (value, per cent of the values below it), from the least value on; empty without values.
 pub(in crate::commands) fn shares(values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
