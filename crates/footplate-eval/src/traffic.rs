@@ -4,4 +4,4 @@ mod page;
 mod session;
 
 pub use self::page::Page;
-pub use self::session::{Asked, Session, Tally};
+pub use self::session::{Asked, HAND, LENGTHS, Session, Tally, is_on_reserved_track, place_by_hand};

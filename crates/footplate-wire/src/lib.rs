@@ -7,13 +7,18 @@
 extern crate alloc;
 
 pub mod dcc_ex;
+mod dialogue;
 mod farewell;
 mod locomotives;
+pub mod loconet;
 pub mod marklin_can;
 pub mod marklin_serial;
 mod news;
+mod opening;
+mod outstanding;
 mod pacing;
 mod queue;
+mod sensors;
 mod session;
 mod silence;
 pub mod z21;

@@ -3,6 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
+use core::ops::RangeInclusive;
 
 use footplate_core::{Command, Event, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
@@ -129,6 +130,11 @@ pub enum LinkNotice {
         /// The turnout.
         turnout: TurnoutId,
     },
+    /// The station has no slot for a train: others use all of them.
+    NoSlot {
+        /// The train.
+        train: TrainId,
+    },
     /// Another throttle drives a train of this program.
     OtherThrottle {
         /// The train.
@@ -241,6 +247,22 @@ pub enum CommandError {
     Closed,
 }
 
+impl CommandError {
+    /// Refuses a train whose address a link does not have.
+    pub(crate) fn check_train(train: TrainId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&train.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Train { train, addresses })
+    }
+
+    /// Refuses a turnout whose address a link does not have.
+    pub(crate) fn check_turnout(turnout: TurnoutId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&turnout.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Turnout { turnout, addresses })
+    }
+}
+
 impl Display for CommandError {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         match self {
@@ -309,6 +331,11 @@ impl Display for LinkNotice {
                 f,
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
                  `turnouts=defined`"
+            ),
+            Self::NoSlot { train } => write!(
+                f,
+                "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \
+                 restart the station"
             ),
             Self::OtherThrottle { train, reversed } => write!(
                 f,

@@ -1,5 +1,6 @@
 //! The program: command line, clock, sockets and threads around the crates that have none.
 
+mod chaos;
 mod clock;
 mod commands;
 mod counted;

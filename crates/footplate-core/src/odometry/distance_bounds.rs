@@ -26,6 +26,14 @@ struct Anchor {
 impl Anchor {
     const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false, only_loosens: false };
 
+    /// Gives up what lies beyond the bound on which all wheels agreed: once the other is no longer asked, a sensor that is
+    /// wrong would else have its way alone.
+    fn agree(&mut self, own: f64, agreed: f64, off: f64) {
+        if self.set && (own - agreed).abs() > off {
+            self.bound += agreed - own;
+        }
+    }
+
     /// The bound after `way` more (m), if the wheel held it for the whole period and before.
     fn bound(&mut self, holds: bool, loosens: bool, way: f64, off: f64) -> Option<f64> {
         self.set &= holds;
@@ -93,7 +101,10 @@ impl DistanceBounds {
         let mut high = self.distance.high + 0.5 * (before.high + now.high) * t + bend;
         // Where both wheels bound the same side the looser bound counts: no single sensor can break it.
         let (mut by_low, mut by_high) = (Vote::NONE, Vote::NONE);
-        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+        let mut own = [[None; 2]; 2];
+        for (((wheel, low_anchor), high_anchor), own) in
+            wheels.iter().zip(&mut self.low).zip(&mut self.high).zip(&mut own)
+        {
             let (short, long) = if wheel.pulses < 0.0 {
                 (wheel.pitch.high, wheel.pitch.low)
             } else {
@@ -105,11 +116,23 @@ impl DistanceBounds {
                 low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
             {
                 by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
+                own[0] = Some(bound);
             }
             if let Some(bound) =
                 high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
             {
                 by_high = by_high.also(bound, high_anchor.only_loosens, larger);
+                own[1] = Some(bound);
+            }
+        }
+        for ((anchors, vote), side) in
+            [(&mut self.low, by_low), (&mut self.high, by_high)].into_iter().zip([0, 1])
+        {
+            let Some(agreed) = vote.outcome() else { continue };
+            for ((anchor, own), wheel) in anchors.iter_mut().zip(&own).zip(wheels) {
+                if let Some(Some(own)) = own.get(side) {
+                    anchor.agree(*own, agreed, PULSES_OFF * wheel.pitch.high);
+                }
             }
         }
         low = by_low.outcome().map_or(low, |bound| larger(low, bound));

@@ -32,7 +32,10 @@ impl Odometer {
         let heading = Heading { way: self.way, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
         let at = (t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
-        [first.read(period, 0, at, heading, allowed), second.read(period, 1, at, heading, allowed)]
+        let counted =
+            [first.read(period, 0, at, heading, allowed), second.read(period, 1, at, heading, allowed)];
+        first.compare(second, t);
+        counted
     }
 
     /// Narrows the guaranteed bounds by the counts and by an inertial sensor.
@@ -43,22 +46,25 @@ impl Odometer {
             axle: wheel.wheelset.axle,
         };
         let wheels = [of(first), of(second)];
-        // Where no sensor tells a direction, a speed is an amount.
+        // Where no sensor tells a direction, a speed is an amount. Before its first pulse none can tell one.
         let tells = |reading: &WheelReading| {
             reading.direction != Direction::Unknown || matches!(reading.count, Count::Counter(_))
         };
         self.signed |= period.wheels.iter().any(tells);
-        let least = if self.signed { -self.vehicle.max_speed.as_m_per_s() } else { 0.0 };
+        self.turned |= period.wheels.iter().any(|reading| matches!(reading.count, Count::Pulses(1..)));
+        let unsigned = self.turned && !self.signed;
+        let least = if unsigned { 0.0 } else { -self.vehicle.max_speed.as_m_per_s() };
         let bounded = self.bounds.narrow(&wheels, allowed, self.vehicle.slide_protection, least, t);
         if self.settings.inertial { self.feel(period, before, bounded, t) } else { bounded }
     }
 
     /// What the hypotheses are asked to explain.
     pub(super) fn scene(&self, [first_counted, second_counted]: [f64; 2], allowed: &Allowed) -> Scene {
-        let of = |wheel: &WheelChannel, other: &WheelChannel, counted: f64| WheelScene {
+        let of = |wheel: &WheelChannel, counted: f64| WheelScene {
             counted,
+            late: wheel.late * wheel.pitch,
             read: wheel.is_read(),
-            stuck: wheel.is_stuck_beside(other),
+            stuck: wheel.stuck,
             speed: wheel.tracker.speed(),
             speed_deviation: wheel.tracker.speed_deviation(),
             acceleration: wheel.tracker.acceleration(),
@@ -70,7 +76,7 @@ impl Odometer {
         };
         let [first, second] = &self.wheels;
         Scene {
-            wheels: [of(first, second, first_counted), of(second, first, second_counted)],
+            wheels: [of(first, first_counted), of(second, second_counted)],
             acceleration: allowed.acceleration,
             rolling: allowed.rolling,
             commanded: allowed.commanded,
@@ -108,8 +114,8 @@ impl Odometer {
     pub(super) fn counted(&self, allowed: &Allowed) -> [Counted; 2] {
         let [first, second] = &self.wheels;
         let [first_wrong, second_wrong] = self.bounds.wrong();
-        let of = |wheel: &WheelChannel, other: &WheelChannel, wrong: bool| {
-            let good = wheel.doubt.is_finite() && !wrong && !wheel.is_stuck_beside(other);
+        let of = |wheel: &WheelChannel, wrong: bool| {
+            let good = wheel.doubt.is_finite() && !wrong && !wheel.stuck;
             let (slides, slips) = wheel.may_differ(allowed);
             Counted {
                 pulses: wheel.pulses,
@@ -121,7 +127,7 @@ impl Odometer {
                 at_most: good && !slides,
             }
         };
-        [of(first, second, first_wrong), of(second, first, second_wrong)]
+        [of(first, first_wrong), of(second, second_wrong)]
     }
 
     /// Lets the inertial sensor narrow the bounds; what is left of them.

@@ -68,8 +68,9 @@ pub struct Odometer {
     pub(super) amounts: [f64; 2],
     /// Periods in which both wheelsets turned faster than the train can run.
     pub(super) above_top: u64,
-    /// A sensor has told a direction.
+    /// A sensor has told a direction, and a wheel has turned.
     pub(super) signed: bool,
+    pub(super) turned: bool,
 }
 
 impl Odometer {
@@ -135,7 +136,8 @@ impl Odometer {
         let read = [first.begin(period, 0, t), second.begin(period, 1, t)];
         let pulse = larger(first.pitch, second.pitch) / t;
         let most = self.vehicle.max_speed.as_m_per_s();
-        let backwards = read.iter().flatten().any(|speed| *speed < 0.0) || read == [None, None];
+        let turns_forward = read.iter().flatten().any(|speed| *speed > 0.0);
+        let backwards = read.iter().flatten().any(|speed| *speed < 0.0) || !turns_forward;
         let bounds = Range { low: if backwards { -most } else { 0.0 }, high: most };
         let speed = match read {
             [Some(a), Some(b)] if (a - b).abs() < AGREE_PULSES * pulse => 0.5 * (a + b),
@@ -195,6 +197,7 @@ impl Odometer {
             amounts: self.amounts,
             above_top: self.above_top,
             signed: self.signed,
+            turned: self.turned,
             ..fresh
         };
         fresh.relocate(reach, reach);
@@ -240,6 +243,7 @@ impl Odometer {
             amounts: [0.0; 2],
             above_top: 0,
             signed: false,
+            turned: false,
         }
     }
 

@@ -19,8 +19,10 @@ const SLIPPING: f64 = 30.0;
 const STUCK_AFTER_S: f64 = 0.7;
 /// Readings before the tracker knows enough to be surprised.
 const WARM: u32 = 8;
-/// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
+/// How many times faster than the fastest train a wheel may turn: one that rolls or is braked, and one that a motor can
+/// spin, which slip control stops no sooner than the train's own wheels let it.
 const FASTER_THAN_TRAIN: f64 = 1.2;
+const FASTER_SPINNING: f64 = 4.0;
 
 /// What one wheelset tells the odometer.
 #[derive(Debug, Clone)]
@@ -37,9 +39,13 @@ pub(super) struct WheelChannel {
     pub(super) quality: Quality,
     /// Pulses of the period in the direction of travel.
     pub(super) pulses: f64,
+    /// Those of them that were not read in the period.
+    pub(super) late: f64,
     pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
+    /// That count is no wheel's.
+    pub(super) stuck: bool,
     /// By how many pulses its last count may be wrong.
     pub(super) doubt: f64,
     doubt_before: f64,
@@ -55,6 +61,7 @@ impl WheelChannel {
     pub(super) fn new(wheelset: Wheelset, vehicle: &Vehicle) -> Self {
         let pitch = wheelset.pulse_pitch().as_m();
         let period = vehicle.period.as_s();
+        let faster = if wheelset.axle.may_slip() { FASTER_SPINNING } else { FASTER_THAN_TRAIN };
         Self {
             wheelset,
             wheelset_pitch: pitch,
@@ -64,15 +71,17 @@ impl WheelChannel {
             tracker: WheelTracker::new(pitch, period),
             quality: Quality::Missing,
             pulses: 0.0,
+            late: 0.0,
             missing_for: 0.0,
             same_for: 0.0,
+            stuck: false,
             doubt: 0.0,
             doubt_before: 0.0,
             told: ReportedDirection::default(),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,
-            most_per_second: FASTER_THAN_TRAIN * vehicle.max_speed.as_m_per_s() / pitch,
+            most_per_second: faster * vehicle.max_speed.as_m_per_s() / pitch,
         }
     }
 
@@ -108,6 +117,7 @@ impl WheelChannel {
         let pulses = turn.pulses * heading.way;
         self.same_for = if pulses == self.pulses && pulses != 0.0 { self.same_for + t } else { 0.0 };
         self.pulses = pulses;
+        self.late = turn.late * heading.way;
         let counted = self.pulses * self.pitch;
         self.doubt = turn.doubt;
         if turn.doubt.is_finite() {
@@ -171,13 +181,27 @@ impl WheelChannel {
     }
 
     /// Its count stands still, where that of a wheel that turns goes to and fro by one.
-    fn is_stuck(&self) -> bool {
+    fn stands_still(&self) -> bool {
         self.same_for > STUCK_AFTER_S
     }
 
-    /// The same, while the count of the other wheel moves.
-    pub(super) fn is_stuck_beside(&self, other: &Self) -> bool {
-        self.is_stuck() && other.is_read() && other.pulses != 0.0 && !other.is_stuck()
+    /// Its count moves.
+    fn moves(&self) -> bool {
+        self.is_read() && self.pulses != 0.0 && !self.stands_still()
+    }
+
+    /// Compares both counts of a period: one that stands still, not at zero, beside one that moves, is stuck until it
+    /// changes, whether the other goes on moving or not.
+    pub(super) fn compare(&mut self, other: &mut Self, t: f64) {
+        let (moves, other_moves) = (self.moves(), other.moves());
+        for (wheel, beside) in [(self, other_moves), (other, moves)] {
+            let was = wheel.stuck;
+            wheel.stuck = wheel.stands_still() && (was || beside);
+            if was && !wheel.stuck && wheel.doubt > 0.0 {
+                // What was followed while it was stuck says nothing.
+                wheel.tracker.restart(wheel.pulses * wheel.pitch / t);
+            }
+        }
     }
 
     /// The true pitch lies within this part of the assumed one.

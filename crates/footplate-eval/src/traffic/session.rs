@@ -3,26 +3,25 @@
 use std::collections::BTreeMap;
 
 use anyhow::bail;
-use footplate_core::control::{
-    DispatchNotice, Dispatcher, DriveNotice, Finished, Journey, Span, TrainLengths,
-};
+use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, TrainLengths};
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_sim::{LivingSwitches, Mishap};
+use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
+use footplate_wire::LinkNotice;
 
-use crate::choice::Choice;
-use crate::rehearsal::Rehearsal;
+use crate::seeds::Choice;
+use crate::testbed::PreparedTrains;
 
 /// How often the truth is compared with what trains hold.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
 /// Rounding of places that are told in true lengths and in surveyed ones.
 const ROUNDING: Length = Length::from_mm(1.0);
 /// What a person measured of the engines: the longer overhang and the pickup, rounded up to a centimetre.
-const LENGTHS: TrainLengths =
+pub const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
 /// How well a person reads off where a train stands.
-const HAND: Length = Length::from_mm(12.0);
+pub const HAND: Length = Length::from_mm(12.0);
 /// No train should be further from where it is believed to stand, in standard deviations: one time in 15 000.
 const CERTAIN: f64 = 4.0;
 /// Who is so far from where it is believed to stand was counted from a contact that it passed the other way.
@@ -74,6 +73,8 @@ pub struct Tally {
     pub diverged: u32,
     /// Trains whose position became unknown.
     pub lost: u32,
+    /// Times that the watchdog stopped a train because it did not run as it should.
+    pub dangers: u32,
     /// Interventions of a person.
     pub hands: u32,
     /// Trains that touched, derailed or ran off the track.
@@ -97,7 +98,7 @@ pub struct Tally {
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: Rehearsal<'l>,
+    rehearsal: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
@@ -106,7 +107,8 @@ pub struct Session<'l> {
     /// Since when each train has been on its way to nowhere.
     since: BTreeMap<TrainId, Timestamp>,
     waits: BTreeMap<TrainId, Timestamp>,
-    lost: BTreeMap<TrainId, Timestamp>,
+    /// Since when each train has needed a person.
+    needs_person: BTreeMap<TrainId, Timestamp>,
     talk: bool,
 }
 
@@ -119,7 +121,7 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
@@ -160,7 +162,7 @@ impl<'l> Session<'l> {
             since: trains.iter().map(|train| (*train, began)).collect(),
             trains,
             waits: BTreeMap::new(),
-            lost: BTreeMap::new(),
+            needs_person: BTreeMap::new(),
             talk,
         })
     }
@@ -175,7 +177,12 @@ impl<'l> Session<'l> {
         }
         while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
             let until = end.min(self.rehearsal.line.now() + LOOK);
-            let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
+            let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
+                if let Some(news) = notice.news() {
+                    dispatcher.handle_link(now, news);
+                }
+            };
+            let notice = self.rehearsal.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
             match notice {
                 Some(notice) => self.hear(&notice),
                 None => self.look(),
@@ -194,45 +201,44 @@ impl<'l> Session<'l> {
         self.tally
     }
 
-    fn hear(&mut self, notice: &DispatchNotice) {
+    fn hear(&mut self, notice: &Notice) {
         let now = self.rehearsal.line.now();
-        if self.talk && !matches!(notice, DispatchNotice::Drive(DriveNotice::Planned(_))) {
+        if self.talk && !matches!(notice, Notice::Planned(_)) {
             eprintln!("{:9.2} {notice:?}", now.as_s());
         }
         match notice {
-            DispatchNotice::Arrived { train, error, took, .. } => {
+            Notice::Arrived { train, error, took, .. } => {
                 self.tally.arrivals += 1;
                 self.tally.took.push(took.as_s());
                 self.tally.errors.extend(error.map(Length::as_mm));
                 self.came_somewhere(*train, now);
                 self.send(*train);
             }
-            DispatchNotice::Drive(DriveNotice::GivenUp { train, why, .. })
-                if self.dispatcher.journey(*train).is_none() =>
-            {
+            Notice::GivenUp { train, why, .. } if self.dispatcher.journey(*train).is_none() => {
                 *self.tally.refused.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
                 self.send(*train);
             }
-            DispatchNotice::RouteSet { train, turns, .. } => {
+            Notice::RouteSet { train, turns, .. } => {
                 self.tally.routes += 1;
                 self.tally.turns += turns;
                 if let Some(since) = self.waits.remove(train) {
                     self.tally.waits.push((now - since).as_s());
                 }
             }
-            DispatchNotice::Withdrawn { train, why } => {
+            Notice::Withdrawn { train, why } => {
                 if self.talk {
                     self.tell_truth(*train);
                 }
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
-            DispatchNotice::Drive(DriveNotice::Done(finished)) => self.check_belief(finished),
-            DispatchNotice::StepsAside { .. } => self.tally.aside += 1,
-            DispatchNotice::Deadlock { .. } => self.tally.deadlocks += 1,
-            DispatchNotice::Diverged { .. } => self.tally.diverged += 1,
-            DispatchNotice::HeldAsUnknown { train } => {
-                self.tally.lost += 1;
-                self.lost.insert(*train, now);
+            Notice::Done(finished) => self.check_belief(finished),
+            Notice::StepsAside { .. } => self.tally.aside += 1,
+            Notice::Deadlock { .. } => self.tally.deadlocks += 1,
+            Notice::Diverged { .. } => self.tally.diverged += 1,
+            Notice::ReservedAsUnknown { .. } => self.tally.lost += 1,
+            Notice::Danger { .. } => self.tally.dangers += 1,
+            Notice::NeedsOperator { train, .. } => {
+                self.needs_person.insert(*train, now);
             }
             _ => {}
         }
@@ -265,7 +271,8 @@ impl<'l> Session<'l> {
     fn look(&mut self) {
         let now = self.rehearsal.line.now();
         for train in self.trains.clone() {
-            let is_inside = self.is_inside(train);
+            let is_inside =
+                is_on_reserved_track(self.layout, self.rehearsal.world(), &self.dispatcher, train);
             if let Some(was) = self.is_inside.insert(train, is_inside)
                 && was
                 && !is_inside
@@ -276,26 +283,13 @@ impl<'l> Session<'l> {
                     self.tell_truth(train);
                 }
             }
-            if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
+            if self.needs_person.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
                 self.help(train, now);
             }
+            if self.dispatcher.journey(train).is_none() {
+                self.send(train);
+            }
         }
-    }
-
-    fn is_inside(&self, train: TrainId) -> bool {
-        let truth = self.rehearsal.world().truth();
-        let Some(held) = self.dispatcher.holds(train) else { return false };
-        truth.under(train).all(|(id, part)| {
-            let Some(edge) = self.layout.edge(id) else { return false };
-            let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);
-            let [from, to] = part.map(|at| at * scale);
-            let span = if id < id.twin() {
-                Span { from, to }
-            } else {
-                Span { from: edge.length - to, to: edge.length - from }
-            };
-            held.covers(id.stretch(), span, ROUNDING)
-        })
     }
 
     /// Compares where a train stands with where it is believed to.
@@ -348,23 +342,52 @@ impl<'l> Session<'l> {
 
     /// A person reads off where a train stands.
     fn help(&mut self, train: TrainId, now: Timestamp) {
-        self.lost.remove(&train);
+        self.needs_person.remove(&train);
         if self.dispatcher.driver().position(train, now).is_some() {
             return;
         }
-        let truth = self.rehearsal.world().truth();
-        let Some(position) = truth.train(train).and_then(|truth| truth.position) else { return };
-        let Some(edge) = self.layout.edge(position.edge) else { return };
-        let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
+        let Some(at) = place_by_hand(self.layout, self.rehearsal.world(), train) else { return };
         self.tally.hands += 1;
-        let at = WayPoint { node: edge.from, way: position.offset * scale };
         self.dispatcher.place(now, train, at, HAND);
     }
 }
 
-fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
+/// Whether all track that is really under a train is reserved for it.
+#[must_use]
+pub fn is_on_reserved_track(
+    layout: &Layout,
+    world: &LivingLayout<'_>,
+    dispatcher: &Dispatcher,
+    train: TrainId,
+) -> bool {
+    let truth = world.truth();
+    let Some(held) = dispatcher.holds(train) else { return false };
+    truth.under(train).all(|(id, part)| {
+        let Some(edge) = layout.edge(id) else { return false };
+        let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);
+        let [from, to] = part.map(|at| at * scale);
+        let span = if id < id.twin() {
+            Span { from, to }
+        } else {
+            Span { from: edge.length - to, to: edge.length - from }
+        };
+        held.covers(id.stretch(), span, ROUNDING)
+    })
+}
+
+/// Where a person who looks at a train would say that it is, in lengths of the surveyed layout.
+#[must_use]
+pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<WayPoint> {
+    let truth = world.truth();
+    let position = truth.train(train)?.position?;
+    let edge = layout.edge(position.edge)?;
+    let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
+    Some(WayPoint { node: edge.from, way: position.offset * scale })
+}
+
+fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
-    let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
     if by_blocks {
         dispatcher.reserve_blocks();
     }

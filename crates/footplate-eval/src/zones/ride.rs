@@ -1,14 +1,14 @@
 //! One train that is told to do something over and over, on a layout with zones.
 
 use anyhow::Context;
-use footplate_core::control::{DriveNotice, Driver, Gap, Order, OrderId, Refusal, StopOrder};
+use footplate_core::control::{Driver, Gap, Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 
 use super::passage::{Passage, Watched};
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often the truth is looked at: a train of 400 mm/s runs 8 mm meanwhile.
 const LOOK: TimeSpan = TimeSpan::from_ms(20);
@@ -78,8 +78,8 @@ pub(super) struct Ridden {
 /// Lets a train ride, or two of which the first follows the second: what came of the first.
 pub(super) fn ride<'l>(
     [plain, restricted]: [&'l Layout; 2],
-    stage: &Rehearsal<'l>,
-    way: &Way,
+    stage: &PreparedTrains<'l>,
+    way: &LongestCircuit,
     [train, leader]: [TrainId; 2],
     told: Told,
     seed: u64,
@@ -106,12 +106,12 @@ pub(super) fn ride<'l>(
 
 struct Ride<'a, 'l> {
     layout: &'l Layout,
-    way: &'a Way,
+    way: &'a LongestCircuit,
     train: TrainId,
     leader: TrainId,
     told: Told,
     driver: Driver,
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     model: MotionModel,
     speed: f64,
 }
@@ -137,12 +137,12 @@ impl Ride<'_, '_> {
             let look = self.stage.line.now() + LOOK;
             while let Some(notice) = self.stage.line.drive(&mut self.driver, look) {
                 match notice {
-                    DriveNotice::Done(finished) if Some(finished.order) == busy => {
+                    Notice::Done(finished) if Some(finished.order) == busy => {
                         done += 1;
                         let again = matches!(self.told, Told::Stop | Told::Arrive);
                         next = again.then(|| self.stage.line.now() + TimeSpan::from_s(PAUSE));
                     }
-                    DriveNotice::GivenUp { order, why, .. } if Some(order) == busy => {
+                    Notice::GivenUp { order, why, .. } if Some(order) == busy => {
                         trouble = Some(why.to_string());
                     }
                     _ => {}

@@ -62,7 +62,7 @@ fn steady_speeds_are_those_of_the_table_from_both_sides() {
             train.run_deviation = footplate_core::Ratio::ZERO;
             train.wander = footplate_core::Ratio::ZERO;
             train.warm_up = footplate_core::Ratio::ZERO;
-            train.curve_feel = 0.0;
+            train.curve_sensitivity = 0.0;
             let mut yard = Yard::new(&layout, train, seed);
             yard.railway.track = footplate_sim::TrueTrack::as_surveyed(&layout);
             for (first, approach) in [(6, Approach::Below), (12, Approach::Above)] {

@@ -41,7 +41,7 @@ fn a_contact_is_reported_while_the_shoe_is_on_it_and_where_it_really_lies() {
     let motion = &run.truth.motion;
     for report in run.truth.reports.iter().filter(|report| report.cause == Cause::Train) {
         let closed_at = motion.distance(report.closed).as_mm();
-        let nearest = motion.contacts().filter(|(sensor, _)| *sensor == report.sensor);
+        let nearest = motion.sensors().filter(|(sensor, _)| *sensor == report.sensor);
         let off = nearest.map(|(_, at)| (at.as_mm() - closed_at).abs()).fold(f64::INFINITY, f64::min);
         assert!(off < 1e-3, "{} closed {off} mm from its place", report.sensor);
         // Still under the shoe at the reading before, or closed since then.

@@ -73,7 +73,7 @@ proptest! {
         };
         let train = Train {
             speeds: SpeedTable::new(&speeds, &speeds), law, command_delay: span(8), start_dead_time: span(9),
-            friction: rate(10), wander_time: span(11), warm_up_time: span(12), curve_feel: wild[13],
+            friction: rate(10), wander_time: span(11), warm_up_time: span(12), curve_sensitivity: wild[13],
             shoe: Length::from_mm(wild[14]), ..drawn
         };
         let layout = oval();
@@ -143,7 +143,7 @@ fn faults_show_and_truth_tells_them_apart() {
         .iter()
         .map(|run| {
             let end = run.truth.motion.distance(run.truth.motion.ends());
-            run.truth.motion.contacts().filter(|(_, at)| at.as_mm() > 0.0 && *at <= end).count()
+            run.truth.motion.sensors().filter(|(_, at)| at.as_mm() > 0.0 && *at <= end).count()
         })
         .sum();
     let seen = all().filter(|report| report.first && report.cause == Cause::Train).count();

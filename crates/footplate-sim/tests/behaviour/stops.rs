@@ -53,7 +53,7 @@ fn the_procedure_itself_scatters_as_asked_under_every_law() {
                 })
                 .collect();
             let (mean, sd) = mean_and_sd(&distances);
-            let expected = yard.train.way_to_rest(step(number), Approach::Below).as_mm();
+            let expected = yard.train.stopping_distance(step(number), Approach::Below).as_mm();
             assert!(
                 (mean - expected).abs() < 1.0 + 4.0 * asked / 20.0,
                 "{family}: {mean}, not {expected} mm"

@@ -11,7 +11,8 @@ use super::file::Store;
 pub struct UnfinishedSession {
     /// What the session is called.
     pub name: String,
-    /// Every train that was commanded to run in it, by number.
+    /// Every train that may be running, by number: those that its machine began with, and all that this store has ever known. A
+    /// command may have left before it was written down, so that what the session commanded is not enough.
     pub trains: Vec<TrainId>,
 }
 
@@ -21,19 +22,20 @@ impl Store {
     /// # Errors
     /// The store cannot be read.
     pub fn unfinished_session(&self) -> Result<Option<UnfinishedSession>, StoreError> {
-        let newest = "SELECT recordings.id, recordings.name FROM machines \
+        let newest = "SELECT recordings.name FROM machines \
                       JOIN recordings ON recordings.id = machines.recording \
                       WHERE machines.id = (SELECT max(id) FROM machines) AND NOT EXISTS \
                       (SELECT 1 FROM inputs WHERE machine = machines.id AND kind = 'end')";
-        let commanded = "SELECT DISTINCT events.train FROM events JOIN runs ON runs.id = events.run \
-                         WHERE runs.recording = ?1 AND events.kind = 'speed' AND events.step > 0 ORDER BY 1";
+        let known = "SELECT train FROM events WHERE train IS NOT NULL UNION SELECT train FROM calibrations \
+                     UNION SELECT part.value FROM machines, json_tree(machines.body) AS part \
+                     WHERE machines.id = (SELECT max(id) FROM machines) AND part.key = 'train' \
+                     AND part.type = 'integer' AND part.value BETWEEN 0 AND 65535 ORDER BY 1";
         let read = || {
-            let columns = |row: &rusqlite::Row<'_>| Ok((row.get::<_, i64>(0)?, row.get(1)?));
-            let Some((recording, name)) = self.connection.query_row(newest, [], columns).optional()? else {
+            let Some(name) = self.connection.query_row(newest, [], |row| row.get(0)).optional()? else {
                 return Ok(None);
             };
-            let mut statement = self.connection.prepare(commanded)?;
-            let trains = statement.query_map([recording], |row| Ok(TrainId(row.get(0)?)))?;
+            let mut statement = self.connection.prepare(known)?;
+            let trains = statement.query_map([], |row| Ok(TrainId(row.get(0)?)))?;
             Ok(Some(UnfinishedSession { name, trains: trains.collect::<rusqlite::Result<_>>()? }))
         };
         read().map_err(|error| self.error(error))

@@ -80,11 +80,13 @@ fn a_beginning_that_was_changed_from_outside_is_noticed() {
 }
 
 #[test]
-fn a_session_without_an_end_is_unfinished_with_the_trains_that_were_commanded_to_run() {
+fn a_session_without_an_end_is_unfinished_with_all_trains_that_may_run() {
     let shelf = Shelf::new();
     assert_eq!(shelf.store().unfinished_session().unwrap(), None);
     let mut journal = journal(&shelf);
-    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    // A train that it began with may have been commanded before that was written down.
+    let body = r#"{"models": [{"train": 77, "speed": 1.0}]}"#;
+    journal.begin_machine(NewMachine { body, ..DRIVE }, minute(0)).unwrap();
     for (train, step) in [(58, 4), (24, 8), (24, 0), (63, 0)] {
         let (train, step) = (TrainId(train), SpeedStep::new(step).unwrap());
         let event = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
@@ -92,7 +94,7 @@ fn a_session_without_an_end_is_unfinished_with_the_trains_that_were_commanded_to
     }
     let unfinished = shelf.store().unfinished_session().unwrap().unwrap();
     assert_eq!(unfinished.name, "evening");
-    assert_eq!(unfinished.trains, [TrainId(24), TrainId(58)]);
+    assert_eq!(unfinished.trains, [24, 58, 63, 77].map(TrainId));
     // It was told the end after all.
     let end = Traced { kind: Cow::Borrowed("end"), ..traced(0) };
     journal.append_all(&[JournalEntry::Traced(end)], minute(1)).unwrap();

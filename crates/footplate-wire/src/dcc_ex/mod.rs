@@ -11,7 +11,6 @@ mod opening;
 mod outstanding;
 mod reply;
 mod request;
-mod sensors;
 mod session;
 mod settings;
 mod time_model;

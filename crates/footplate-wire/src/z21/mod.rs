@@ -10,7 +10,6 @@
 mod broadcasts;
 mod dataset;
 mod detectors;
-mod opening;
 mod outstanding;
 mod reply;
 mod request;

@@ -1,11 +1,9 @@
-//! How turnouts lie, and the one whose output is powered.
+//! The one output of a turnout that is powered.
 //!
 //! Without the queue of later firmware a client has to let go of an output itself, and outputs of two turnouts must not be powered
 //! at once. So it is done here for every station: one turnout after the other.
 
-use alloc::vec::Vec;
-
-use footplate_core::{TimeSpan, Timestamp, TurnoutId};
+use footplate_core::{TimeSpan, Timestamp};
 
 use super::request::Request;
 
@@ -26,33 +24,20 @@ struct Pulse {
     releases: u8,
 }
 
-/// All that were spoken of.
+/// The outputs of all turnouts, of which at most one is powered.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Turnouts {
-    /// Whether each lies curved.
-    lie: Vec<(TurnoutId, bool)>,
+pub(super) struct Outputs {
     pulse: Option<Pulse>,
 }
 
-impl Turnouts {
-    /// A turnout lies so; returns how it was said to lie before.
-    pub(super) fn heard(&mut self, turnout: TurnoutId, curved: bool) -> Option<bool> {
-        match self.lie.iter_mut().find(|(known, _)| *known == turnout) {
-            Some((_, lies)) => Some(core::mem::replace(lies, curved)),
-            None => {
-                self.lie.push((turnout, curved));
-                None
-            }
-        }
-    }
-
+impl Outputs {
     /// An output is powered.
     pub(super) fn powered(&mut self, address: u16, second: bool, now: Timestamp) {
         self.pulse = Some(Pulse { address, second, release_at: now + PULSE, releases: RELEASES });
     }
 
     /// Whether no output is powered.
-    pub(super) const fn is_free(&self) -> bool {
+    pub(super) const fn are_free(&self) -> bool {
         self.pulse.is_none()
     }
 

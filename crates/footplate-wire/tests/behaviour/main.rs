@@ -9,6 +9,9 @@
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
 mod dcc_ex_vectors;
+mod desk;
+mod loconet_codec;
+mod loconet_session;
 mod marklin_can_round_trip;
 mod marklin_can_session;
 mod marklin_can_vectors;

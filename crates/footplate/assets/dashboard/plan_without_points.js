@@ -1,23 +1,23 @@
-// A drawing of a layout whose file has no points: the longest way round as an oval, or from end to end as a line, and every other
+// Draws a layout whose file has no points: its longest circuit as an oval, or its longest line as a straight, and every other
 // track beside it.
 
 import { bezier } from "./plan_curve.js";
 import { placeOf, senseOf } from "./places.js";
 
-/** A rail is drawn at least so long, as a part of all rails, so that it can be seen. */
+/** The least drawn length of an edge, as a part of all edges. */
 const LEAST_PART = 0.02;
-/** Tracks lie so far beside each other, as a part of the main line. */
+/** The distance between parallel tracks, as a part of the main line. */
 const GAP_PART = 0.03;
-/** Each straight of the oval, as a part of its way round. */
+/** Each straight of the oval, as a part of its circumference. */
 const STRAIGHT_PART = 0.32;
-/** A way over a curved leg counts as so much shorter: the main line is the one that goes straight on. */
+/** The weight of a curved leg's length in the search for the main line, which prefers straight legs. */
 const CURVED_COUNTS = 0.8;
-/** Ways that are tried for the main line: enough for any layout whose turnouts a person can draw by hand. */
+/** The most paths tried for the main line: enough for any layout drawn by hand. */
 const MOST_TRIED = 60_000;
-/** Points of a rail: 25 at least, and 160 for a whole way round. */
+/** Points per edge: at least 25, and 160 for the whole circuit. */
 const POINTS = 25;
 const POINTS_ROUND = 160;
-/** A track that ends is drawn so many gaps long at least: beside its turnout, not on it. */
+/** The least drawn length of a dead end, in track distances, so that it lies beside its turnout and not on it. */
 const LEAST_GAPS = 5;
 
 export function planWithoutPoints(layout) {
@@ -32,14 +32,14 @@ class Drawing {
     this.#least = LEAST_PART * layout.edges.reduce((sum, { length_mm: mm }) => sum + mm, 0) / 2 || 1;
     for (const edge of layout.edges) {
       const leaving = this.#leaving.get(edge.from) ?? [];
-      // The straight leg first: the main line follows it where both are as long.
+      // The straight leg first: the main line follows it if both are equally long.
       this.#leaving.set(edge.from, edge.leg === "curved" ? [...leaving, edge] : [edge, ...leaving]);
     }
   }
 
   plan() {
     let top = 0;
-    // What is not joined to the rest is drawn below it.
+    // Track that is not connected is drawn below.
     for (let start = this.#unplaced(); start !== undefined; start = this.#unplaced()) {
       const main = this.#mainLine(start);
       if (main.way.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
@@ -60,7 +60,7 @@ class Drawing {
     return edge?.from;
   }
 
-  /** The longest way that passes no place twice: round if one is, and half as long as any at least. */
+  /** The longest path that passes no place twice: a circuit, if one is at least half as long as the longest line. */
   #mainLine(start) {
     const [round, line] = [{ long: 0, way: [], isRound: true }, { long: 0, way: [], isRound: false }];
     let tried = 0;
@@ -81,7 +81,7 @@ class Drawing {
       }
     };
     const joined = this.#joined(start);
-    // Ends first: a line leads from one to another.
+    // Ends first: a line runs from one end to another.
     const starts = [...joined].sort((one, other) => this.#arriving(one) - this.#arriving(other));
     for (const node of starts) {
       if (most()) break;
@@ -90,7 +90,7 @@ class Drawing {
     return round.long > line.long / 2 ? round : line;
   }
 
-  /** Whether it leads from or to the curved leg of a turnout. */
+  /** Whether an edge begins or ends at the curved leg of a turnout. */
   #isCurved = (edge) => edge.leg === "curved" || this.#edges[edge.id ^ 1]?.leg === "curved";
 
   #arriving = (node) => (this.#leaving.get(node ^ 1) ?? []).length;
@@ -113,7 +113,7 @@ class Drawing {
     }
   }
 
-  /** Puts a place beside the main line, where a train that passes this node runs along it (`way` +1) or against it. */
+  /** Puts a place on a lane, where a train that passes this node runs along the main line (`way` +1) or against it. */
   #spot(node, at, lane, way) {
     const [x, y] = this.#base.point(at, lane);
     this.#points.set(placeOf(node), [x, y]);
@@ -124,7 +124,7 @@ class Drawing {
     this.#rails.set(edge.id >> 1, edge.id % 2 ? points.toReversed() : points);
   }
 
-  /** The next track that begins where something is drawn: the shortest, so that what is between two tracks lies between them. */
+  /** The next track that begins at a drawn place: the shortest first, so that inner tracks lie inside. */
   #nextTrack() {
     let best;
     for (const edge of this.#edges) {
@@ -135,7 +135,7 @@ class Drawing {
     return best;
   }
 
-  /** From an edge on, as the turnouts lie straight, to what is drawn already or to an end. */
+  /** Follows the straight legs from an edge to a drawn place or to an end. */
   #track(first) {
     const edges = [first];
     const seen = new Set([placeOf(first.from)]);
@@ -176,7 +176,7 @@ class Drawing {
     }
   }
 
-  /** A track that leads back, or across: one curve, and its places along it. */
+  /** A track that leads back or across: one curve with its places along it. */
   #placeAcross({ edges, from, to, leaves, long }) {
     const [start, end] = [this.#base.point(from.at, from.lane), this.#base.point(to.at, to.lane)];
     const facing = (spot, way) => this.#base.heading(spot.at) + (way < 0 ? Math.PI : 0);
@@ -195,7 +195,7 @@ class Drawing {
     }
   }
 
-  /** The nearest lane that nothing lies in from one place to another. */
+  /** The nearest lane that is free from one place to another. */
   #freeLane(lane, from, to) {
     const [low, high] = [Math.min(from, to), Math.max(from, to)];
     const out = Math.sign(lane) || 1;
@@ -218,7 +218,7 @@ const pointOf = (curve, part) => {
   return [0, 1].map((axis) => curve[nth][axis] + (curve[nth + 1][axis] - curve[nth][axis]) * (at - nth));
 };
 
-/** The main line: an oval that is run through clockwise, or a straight line; lanes beside it are counted to its right. */
+/** The main line: an oval, run clockwise, or a straight line. Lanes are counted to its right. */
 class Base {
   top = 0; long; gap; #isRound; #straight; #radius; #shift = 0;
 
@@ -231,14 +231,14 @@ class Base {
     if (isRound) this.#turnTo(lengths);
   }
 
-  /** Turns the oval so that as many of its places as can be lie on the straights. */
+  /** Rotates the oval so that most of its places lie on the straights. */
   #turnTo(lengths) {
     let at = 0;
     const places = lengths.map((mm) => { const here = at; at += mm; return here; });
     let best = -1;
     for (let nth = 0; nth < 48; nth += 1) {
       const shift = this.long * nth / 48;
-      // A place well inside a straight counts more than one at its end.
+      // A place in the middle of a straight counts more than one at its end.
       const score = places.reduce((sum, place) => {
         const on = (place + shift) % (this.long / 2) / this.#straight;
         return sum + (on <= 1 ? 1 - 0.5 * Math.abs(on - 0.5) : 0);
@@ -249,7 +249,7 @@ class Base {
 
   hasRoom = (lane) => !this.#isRound || lane * this.gap < 0.75 * this.#radius;
 
-  /** How far it is from one place to another in a direction. */
+  /** The distance from one place to another in a direction. */
   ahead(from, to, way) {
     const span = way * (to - from);
     return this.#isRound ? ((span % this.long) + this.long) % this.long : span;

@@ -1,12 +1,12 @@
-// Draws the charts of a run of odometry from the data inside the page, with what chart.js offers.
+// Draws the charts of an odometry run from the data in the page, with the functions of chart.js.
 
 const report = JSON.parse(document.getElementById("report").textContent);
 /** The run shown. */
 let run = report.runs[0];
 const SYNC = "odometry";
-/** Most rows of the table of marks: it is there to be read. */
+/** The most rows of the table of intervals: it is meant to be read. */
 const LISTED = 200;
-/** Height of the strip of modes, as a part of the axis that shows 100 %. */
+/** Height of the strip of states, as a part of the axis that shows 100 %. */
 const STRIP_OF = 0.09;
 
 const WORDS = pick({
@@ -20,7 +20,7 @@ const PLACES = pick(
   { wheel_1: "wheelset 1", wheel_2: "wheelset 2", mode: "mode" },
   { wheel_1: "Radsatz 1", wheel_2: "Radsatz 2", mode: "Betriebsart" },
 );
-/** What stands on axes and beside lines. */
+/** Labels of axes and lines. */
 const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST, GUARANTEED] = pick(
   ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least", "guaranteed"],
   ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens", "garantiert"],
@@ -34,10 +34,10 @@ const time = () => ({
   },
 });
 
-/** What is marked at a time, if anything. */
+/** The intervals marked at a time. */
 const markedAt = (place, at) => run.marks[place].find(([from, to]) => from < at && at <= to)?.[2];
 
-/** Shades stretches between two heights of a chart, 0 at its top and 1 at its foot, with a firm bar at their upper edge. */
+/** Shades intervals between two heights of a chart, 0 at its top and 1 at its bottom, with a solid bar at their upper edge. */
 function shade(stretches, top, foot, alpha = 0.2) {
   return (u) => {
     const { ctx, bbox } = u;
@@ -49,7 +49,7 @@ function shade(stretches, top, foot, alpha = 0.2) {
     ctx.clip();
     for (const [from, to, what] of stretches) {
       const left = u.valToPos(from, "x", true);
-      // However short it is, it can be seen.
+      // Even the shortest interval is visible.
       const width = Math.max(u.valToPos(to, "x", true) - left, 2 * devicePixelRatio);
       ctx.fillStyle = colour(what);
       ctx.globalAlpha = alpha;
@@ -61,7 +61,7 @@ function shade(stretches, top, foot, alpha = 0.2) {
   };
 }
 
-/** The key to the marks that there are. */
+/** The legend of the marks that occur. */
 function key(figure, places) {
   const there = new Set(places.flatMap((place) => run.marks[place].map(([, , what]) => what)));
   if (there.size === 0) return;
@@ -79,7 +79,7 @@ function key(figure, places) {
   figure.append(list);
 }
 
-/** Says below a chart what it shows, for those who do not see it. */
+/** Describes a chart in words below it, for screen readers. */
 function say(figure, text) {
   const said = document.createElement("p");
   said.className = "said";
@@ -133,7 +133,7 @@ function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
   say(figure, `${pick("Marks", "Marken")}: ${told.join("; ")}.`);
 }
 
-/** How often and how long something is marked, in words. */
+/** How often and how long a state is marked, in words. */
 function stretchesOf(place) {
   const marks = run.marks[place];
   if (marks.length === 0) return place === "mode" ? pick("always normal", "immer normal") : pick("always rolls", "rollt immer");
@@ -228,7 +228,7 @@ function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
   ));
 }
 
-/** Every stretch that is marked, as a table. */
+/** The table of all marked intervals. */
 function listMarks() {
   const marks = Object.keys(PLACES).flatMap((place) => run.marks[place].map((mark) => [place, ...mark]));
   marks.sort(([, one], [, other]) => one - other);

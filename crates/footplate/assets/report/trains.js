@@ -1,4 +1,4 @@
-// Draws the charts of what is known of trains from the data inside the page, with what chart.js offers.
+// Draws the charts of a train report from the data in the page, with the functions of chart.js.
 
 const report = JSON.parse(document.getElementById("report").textContent);
 const trains = new Map(report.trains.map((train) => [String(train.calibration.train), train]));
@@ -8,13 +8,13 @@ const APPROACHES = [
   ["above", pick("reached from above", "von oben erreicht"), "second", 0.12],
   ["unknown", pick("side not recorded", "Seite nicht festgehalten"), "third", 0],
 ];
-/** What a train did while a forecast was made of it. */
+/** What the train was doing when the forecast was made. */
 const PHASES = pick({
   steady: "steady running", first_lap: "first time over this way or at this step", change: "changing speed",
 }, {
   steady: "gleichmäßige Fahrt", first_lap: "zum ersten Mal auf diesem Weg oder bei dieser Stufe", change: "Tempowechsel",
 });
-/** What stands on axes and beside lines. */
+/** Labels of axes and lines. */
 const [LAW, CONTACT, SPEED] = pick(["law", "contact", "speed (mm/s)"], ["Gesetz", "Kontakt", "Tempo (mm/s)"]);
 
 function speeds(figure, train) {
@@ -62,7 +62,7 @@ function change(figure, train) {
   const times = contacts.map(({ time_s }) => time_s);
   const told = new Map(contacts.map(({ time_s, told_by }) => [time_s, told_by]));
   const x = { label: pick("since the command (s)", "seit dem Befehl (s)"), unit: "s", digits: 2 };
-  // All four charts begin and end together, whatever each of them holds; a zoomed range is taken as it is.
+  // All four charts share one x range; a zoomed range is taken as it is.
   const [begins, ends] = [shown.time_s[0], shown.time_s.at(-1)];
   const whole = [begins - 0.02 * (ends - begins), ends + 0.02 * (ends - begins)];
   const range = { x: { range: (u, low, high) => (low <= u.data[0][0] && high >= u.data[0].at(-1) ? whole : [low, high]) } };
@@ -106,7 +106,7 @@ function forecasts(figure, train) {
   for (const [late, half, unit] of [["late_mm", "half_90_mm", "mm"], ["late_ms", "half_90_ms", "ms"]]) {
     const values = points.map((point) => point[late]);
     const widths = points.map((point) => point[half]);
-    // A single wild forecast must not flatten all others: the axis holds 98 in 100.
+    // An outlier must not flatten the rest: the axis contains 98 of 100.
     const sizes = points.map((point) => Math.max(Math.abs(point[late]), point[half])).sort((a, b) => a - b);
     const reach = 1.2 * sizes[Math.floor(0.98 * (sizes.length - 1))];
     const digits = unit === "mm" ? 1 : 0;

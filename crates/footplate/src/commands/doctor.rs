@@ -1,8 +1,10 @@
 //! `footplate doctor`: whether the line to a station is in order, and how fast it is.
 
+mod answers;
 mod board_figures;
 mod can_figures;
 mod figures;
+mod loconet_figures;
 mod z21_figures;
 
 use std::collections::BTreeMap;
@@ -14,11 +16,12 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
-use footplate_wire::{CommandError, LinkNotice, marklin_can, z21};
+use footplate_wire::{CommandError, LinkNotice};
 
 use self::board_figures::BoardFigures;
 use self::can_figures::CanFigures;
-use self::figures::Figures;
+use self::figures::{Figures, StationFigures};
+use self::loconet_figures::LocoNetFigures;
 use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
@@ -40,10 +43,11 @@ Examples:
   footplate doctor --link marklin-serial:/dev/ttyUSB0
   footplate doctor --link dcc-ex:tcp://192.168.4.1:2560
   footplate doctor --link z21:192.168.0.111
-  footplate doctor --link marklin-can:192.168.0.5")]
+  footplate doctor --link marklin-can:192.168.0.5
+  footplate doctor --link loconet:192.168.0.20")]
 pub(crate) struct Arguments {
     /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111,
-    /// marklin-can:192.168.0.5, or tcp://host:port in place of a device.
+    /// marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -83,9 +87,16 @@ impl Arguments {
             Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
         let lost_share = match runtime.session() {
             StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
-            StationSession::DccEx(_) => self.report_board(&heard, output)?,
-            StationSession::Z21(session) => self.report_z21(session.settings(), &heard, output)?,
-            StationSession::Can(session) => self.report_bus(session, &heard, output)?,
+            StationSession::DccEx(_) => self.report(&BoardFigures::of(heard.passed), &heard, output)?,
+            StationSession::Z21(session) => {
+                self.report(&Z21Figures::of(heard.passed, session.settings()), &heard, output)?
+            }
+            StationSession::Can(session) => {
+                self.report(&CanFigures::of(heard.passed, session), &heard, output)?
+            }
+            StationSession::LocoNet(session) => {
+                self.report(&LocoNetFigures::of(heard.passed, session.settings()), &heard, output)?
+            }
         };
         Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
     }
@@ -130,73 +141,29 @@ impl Arguments {
         Ok(figures.lost_share())
     }
 
-    /// Reports on a DCC-EX board; returns the share of requests that were not answered.
-    fn report_board(&self, heard: &Heard<'_>, output: &mut dyn Write) -> anyhow::Result<f64> {
-        let figures = BoardFigures::of(heard.passed);
-        if figures.identity().is_none() {
-            bail!(
-                "no DCC-EX board has said what it is; check the port, and listen longer with --seconds 20 if the board \
-                 is slow to start"
-            );
-        }
-        if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
-        }
-        if self.json {
-            writeln!(output, "{}", figures.json())?;
-        } else {
-            figures.write(output)?;
-            heard.ear.write(output)?;
-        }
-        Ok(figures.lost_share())
-    }
-
-    /// Reports on a Z21; returns the share of requests that were not answered.
-    fn report_z21(
+    /// Reports on a station that reports by itself; returns the share of requests that were not answered.
+    fn report(
         &self,
-        settings: &z21::Settings,
+        figures: &dyn StationFigures,
         heard: &Heard<'_>,
         output: &mut dyn Write,
     ) -> anyhow::Result<f64> {
-        let figures = Z21Figures::of(heard.passed, settings.feedback);
-        if !figures.is_known() {
-            bail!("no Z21 has said its serial number; check its address and the network");
-        }
+        figures.check().map_err(|check| anyhow!(check))?;
+        let answers = figures.answers();
         if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
+            plot.write(&answers.picture())?;
         }
         if self.json {
-            writeln!(output, "{}", figures.json())?;
+            let mut json = figures.json();
+            answers.add_to(&mut json);
+            writeln!(output, "{json}")?;
         } else {
-            figures.write(settings.sensor_delay, output)?;
+            figures.write_station(output)?;
+            answers.write(output)?;
+            figures.write_reports(output)?;
             heard.ear.write(output)?;
         }
-        Ok(figures.lost_share())
-    }
-
-    /// Reports on a Märklin CAN bus; returns the share of requests that were not answered.
-    fn report_bus(
-        &self,
-        session: &marklin_can::Client,
-        heard: &Heard<'_>,
-        output: &mut dyn Write,
-    ) -> anyhow::Result<f64> {
-        let figures = CanFigures::of(heard.passed, session.settings());
-        if !figures.is_known() {
-            bail!(
-                "nobody on the CAN bus has named themselves; check the station's address, or the adapter and its cable"
-            );
-        }
-        if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
-        }
-        if self.json {
-            writeln!(output, "{}", figures.json(session.listed_locomotives()))?;
-        } else {
-            figures.write(session.listed_locomotives(), session.settings().scan, output)?;
-            heard.ear.write(output)?;
-        }
-        Ok(figures.lost_share())
+        Ok(answers.lost_share())
     }
 }
 

@@ -4,11 +4,11 @@
 //! it has no end.
 
 use footplate_core::track::Layout;
-use footplate_core::{Command, SpeedStep};
+use footplate_core::{Command, SpeedStep, TrainId};
 use footplate_store::{Store, UnfinishedSession};
-use footplate_wire::Session;
+use footplate_wire::{Closing, Session};
 
-use crate::link::{Address, Link, Speed, open, open_session};
+use crate::link::{Address, Link, Speed, StationSession, open, open_session};
 use crate::runtime::Runtime;
 
 /// Opens the link and stops all trains if the newest session of the store has not ended. Gives back the link, which the session that
@@ -27,22 +27,32 @@ pub(crate) fn stop_left_running<'l>(
     };
     eprintln!("{}", said(&unfinished));
     let mut link = open(address, layout, pace)?;
-    let mut session = open_session(address, &link, layout)?;
-    for train in unfinished.trains {
+    let session = open_session(address, &link, layout)?;
+    eprintln!("{}", stop_all(&mut link, session, unfinished.trains));
+    Ok(Some(link))
+}
+
+/// Stops trains and switches the power off over a line that has just been opened.
+pub(crate) fn stop_all(
+    link: &mut dyn Link,
+    mut session: StationSession,
+    trains: impl IntoIterator<Item = TrainId>,
+) -> Closing {
+    for train in trains {
         let stop = Command::Speed { train, step: SpeedStep::STAND };
         // Power off stops a train, too, that this station has no address for.
         if let Err(error) = session.handle_command(link.now(), stop) {
             eprintln!("train {train}: {error}");
         }
     }
-    let closing = Runtime::new(&mut link, session, None, None).close();
-    eprintln!("{closing}");
-    Ok(Some(link))
+    Runtime::new(link, session, None, None).close()
 }
 
 fn said(unfinished: &UnfinishedSession) -> String {
     let UnfinishedSession { name, trains } = unfinished;
     let trains = trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let which = if trains.is_empty() { String::new() } else { format!("; commanded to run in it: {trains}") };
-    format!("the session `{name}` has not ended, so its trains may be running: all are stopped first{which}")
+    let which = if trains.is_empty() { String::new() } else { format!(": {trains}") };
+    format!(
+        "the session `{name}` has not ended: every known train may be running and is stopped first{which}"
+    )
 }

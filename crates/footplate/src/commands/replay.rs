@@ -14,6 +14,7 @@ use footplate_store::{RecordingKey, Store, StoredMachine, StoredRecording};
 
 use super::Outcome;
 use crate::clock::now;
+use crate::session_journal::PROGRAM;
 use crate::witness::{Ending, Extent};
 use page::Page;
 pub(super) use pictures::pictures;
@@ -22,8 +23,8 @@ use session::rehearse;
 /// Decide a recorded session of driving or calibrating once more, and compare.
 ///
 /// The machine that decided is made again as it began, is told what it was told at the times at which it was told, and
-/// every decision is compared with the one of then: commands, what it asked of the line, and what it said. The same
-/// program decides the same, to the last bit.
+/// every decision is compared with the one of then: commands, what it asked of the line, and its notices. The same
+/// program decides the same, to the last bit. The notices of another version are worded otherwise and are not compared.
 ///
 /// With --diff a program that decides otherwise shows all that differs. The railway is not there to follow: behind the
 /// first command that differs the inputs are still those of then (but for the clock, which wakes it when it asks), so
@@ -89,10 +90,10 @@ impl Arguments {
             page.list(&machines, &recordings, output)?;
             return Ok(Outcome::Done);
         }
-        let extent = Extent { until: self.until, all: self.diff };
         let mut outcome = Outcome::Done;
         for machine in self.choose(&machines, &recordings)? {
             let trace = store.trace(machine.key)?;
+            let extent = Extent { until: self.until, all: self.diff, notices: machine.program == PROGRAM };
             let rehearing = rehearse(machine, trace, extent)?;
             page.write(machine, &rehearing, output)?;
             let stuck = matches!(rehearing.ending, Ending::Unreadable { .. } | Ending::Gap { .. });

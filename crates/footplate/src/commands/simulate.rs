@@ -1,6 +1,7 @@
 //! `footplate simulate`: worlds whose truth is known.
 
 mod again;
+mod chaos;
 mod disasters;
 mod driving;
 mod layout;
@@ -39,6 +40,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum World {
+    Chaos(chaos::Arguments),
     Disasters(disasters::Arguments),
     Driving(driving::Arguments),
     Layout(layout::Arguments),
@@ -53,6 +55,7 @@ enum World {
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         match self.world {
+            Some(World::Chaos(arguments)) => arguments.run(output),
             Some(World::Disasters(arguments)) => arguments.run(output),
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),

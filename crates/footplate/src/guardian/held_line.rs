@@ -1,24 +1,15 @@
 //! The line that a guardian holds: opened when its child asks, and again for ever when trains have to be stopped.
 
 use std::io::Write;
-use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::frame::{FrameWriter, Kind, cts_byte, cts_of};
 use super::signals::Signals;
 use super::voice::say;
-use crate::clock::Stopwatch;
 use crate::link::{Arrival, Cable, Lost};
-
-/// Between two attempts to open a line again.
-const REOPEN_EVERY: Duration = Duration::from_millis(250);
-/// How long a byte waits for the hand-shake: a station that keeps it down for longer is told all the same.
-const HAND_SHAKE_WITHIN: Duration = Duration::from_millis(100);
-/// How often the hand-shake line is looked at meanwhile.
-const HAND_SHAKE_EVERY: Duration = Duration::from_micros(500);
-/// How long the hand-shake may take to go down after a byte, which it needs to be believed when it is up.
-const HAND_SHAKE_FALLS: Duration = Duration::from_millis(10);
+use crate::runtime::WillLine;
 
 /// Who is told what is heard on the line: the child that there is now.
 pub(super) type Ear = Arc<Mutex<Option<FrameWriter>>>;
@@ -31,12 +22,14 @@ pub(super) struct HeldLine {
     cts: Arc<AtomicU8>,
     /// Which opening it is: what is heard of an earlier one is of no interest. An even number: the line is gone.
     opening: Arc<AtomicU32>,
+    /// Whether the station has said anything since this was cleared.
+    has_heard: Arc<AtomicBool>,
 }
 
 impl HeldLine {
     pub(super) fn new(cable: Cable, ear: Ear) -> Self {
         let cts = Arc::new(AtomicU8::new(cts_byte(None)));
-        Self { cable, ear, writer: None, cts, opening: Arc::default() }
+        Self { cable, ear, writer: None, cts, opening: Arc::default(), has_heard: Arc::default() }
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -53,7 +46,7 @@ impl HeldLine {
         let this = (self.opening.load(Ordering::Acquire) + 1) | 1;
         self.opening.store(this, Ordering::Release);
         let (opening, ear, cts) = (Arc::clone(&self.opening), Arc::clone(&self.ear), Arc::clone(&self.cts));
-        let name = self.cable.to_string();
+        let (name, has_heard) = (self.cable.to_string(), Arc::clone(&self.has_heard));
         let end = self.cable.open(move |arrival| {
             if opening.load(Ordering::Acquire) != this {
                 return false;
@@ -64,7 +57,10 @@ impl HeldLine {
                 let _ = ear.as_mut().map(|child| child.send(kind, bytes));
             };
             match arrival {
-                Arrival::Bytes(bytes) => told(Kind::Heard, bytes),
+                Arrival::Bytes(bytes) => {
+                    has_heard.store(true, Ordering::Release);
+                    told(Kind::Heard, bytes);
+                }
                 Arrival::Cts(up) => {
                     cts.store(cts_byte(Some(up)), Ordering::Release);
                     told(Kind::Cts, &[up.into()]);
@@ -107,62 +103,43 @@ impl HeldLine {
             lost
         })
     }
+}
 
-    /// Says a last will, from its beginning each time the line had to be opened again, until all of it is said or people
-    /// do not want to wait any longer. Returns whether it was said.
-    pub(super) fn carry_out(&mut self, will: &[u8], signals: &Signals) -> bool {
-        let mut was_gone = false;
-        while !signals.gives_up() {
-            if !self.is_open()
-                && let Err(lost) = self.open()
-            {
-                if !was_gone {
-                    say(&format!("{lost}; trying for ever (Ctrl-C gives up, and leaves trains running)"));
-                }
-                was_gone = true;
-                std::thread::sleep(REOPEN_EVERY);
-                continue;
-            }
-            if std::mem::take(&mut was_gone) {
-                say("the line is open again");
-            }
-            match self.try_to_carry_out(will) {
-                Ok(()) => return true,
-                Err(lost) => {
-                    say(&format!("{lost}; trying for ever (Ctrl-C gives up, and leaves trains running)"));
-                    (self.writer, was_gone) = (None, true);
-                    std::thread::sleep(REOPEN_EVERY);
-                }
-            }
-        }
-        false
+/// A held line that is told what stops trains, and the people who may give up.
+pub(super) struct LastLine<'l> {
+    pub(super) line: &'l mut HeldLine,
+    pub(super) signals: &'l Signals,
+}
+
+impl WillLine for LastLine<'_> {
+    fn is_open(&self) -> bool {
+        self.line.is_open()
     }
-
-    fn try_to_carry_out(&mut self, will: &[u8]) -> Result<(), Lost> {
-        let mut rest = will;
-        while let [a, b, c, d, low, high, more @ ..] = rest {
-            let pause = u32::from_le_bytes([*a, *b, *c, *d]);
-            let length = usize::from(u16::from_le_bytes([*low, *high]));
-            let (bytes, further) = more.split_at_checked(length).unwrap_or((more, &[]));
-            std::thread::sleep(Duration::from_micros(pause.into()));
-            self.await_hand_shake();
-            self.write(bytes)?;
-            rest = further;
-        }
-        // A line that went during the last bytes did not carry them.
-        std::thread::sleep(REOPEN_EVERY);
-        if self.is_open() { Ok(()) } else { Err(Lost(format!("`{}` is gone", self.cable))) }
+    fn open(&mut self) -> Result<(), Lost> {
+        self.line.open().map(drop)
     }
-
-    /// Waits until the station takes the next byte, where its hand-shake line can be read.
-    fn await_hand_shake(&self) {
-        let watch = Stopwatch::start();
-        let cts = || cts_of(self.cts.load(Ordering::Acquire));
-        while cts() == Some(true) && watch.elapsed() < HAND_SHAKE_FALLS {
-            std::thread::sleep(HAND_SHAKE_EVERY);
-        }
-        while cts() == Some(false) && watch.elapsed() < HAND_SHAKE_WITHIN {
-            std::thread::sleep(HAND_SHAKE_EVERY);
-        }
+    fn close(&mut self) {
+        self.line.writer = None;
+    }
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        self.line.write(bytes)
+    }
+    fn cts(&self) -> Option<bool> {
+        cts_of(self.line.cts.load(Ordering::Acquire))
+    }
+    fn pause(&mut self, span: Duration) {
+        std::thread::sleep(span);
+    }
+    fn has_answered(&self) -> bool {
+        !self.line.cable.has_datagrams() || self.line.has_heard.load(Ordering::Acquire)
+    }
+    fn expect_answer(&mut self) {
+        self.line.has_heard.store(false, Ordering::Release);
+    }
+    fn gives_up(&self) -> bool {
+        self.signals.gives_up()
+    }
+    fn say(&self, words: &str) {
+        say(&format!("{}: {words}", self.line.cable));
     }
 }

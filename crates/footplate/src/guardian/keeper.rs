@@ -15,12 +15,13 @@ use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags, sendmsg}
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 
 use super::frame::{FrameReader, FrameWriter, Kind, MOST_BYTES, cts_byte};
-use super::held_line::{Ear, HeldLine};
+use super::held_line::{Ear, HeldLine, LastLine};
 use super::signals::Signals;
 use super::voice::say;
 use super::ward::WARD;
 use crate::clock::Stopwatch;
 use crate::link::Cable;
+use crate::runtime::carry_out;
 
 /// A child that drives trains and says nothing for so long is taken for dead (issue of trust: stops within 1 s).
 const LATE: Duration = Duration::from_millis(500);
@@ -80,7 +81,7 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
         if died {
             signals.pass_on_to(None);
             say("the program has left its trains; stopping all of them now");
-            said = line.carry_out(&watched.will, &signals);
+            said = carry_out(&mut LastLine { line: &mut line, signals: &signals }, &watched.will);
         }
         signals.pass_on_to(Some(child.id()));
         let ended = wait_for(&mut child)?;
@@ -216,7 +217,7 @@ mod tests {
 
     use super::*;
     use crate::guardian::ward_link::WardLink;
-    use crate::link::{Address, Heard, Link, StreamLink};
+    use crate::link::{Address, CableLink, Heard, Link};
 
     /// Bytes that are answered.
     const TURNS: usize = 20_000;
@@ -285,7 +286,7 @@ mod tests {
     #[ignore = "measures: cargo nextest run -p footplate -E 'test(what_a_guardian_costs)' --run-ignored all --no-capture"]
     fn what_a_guardian_costs() {
         let cable = echo();
-        let direct = turns(&mut StreamLink::open(cable.clone()).expect("a line"));
+        let direct = turns(&mut CableLink::open(cable.clone()).expect("a line"));
         let held = turns(&mut guarded(&cable));
         for (name, share) in [("median", 0.5), ("p99", 0.99), ("p99.9", 0.999)] {
             let of = |turns: &[f64]| turns[(share * (TURNS - 1) as f64) as usize];

@@ -10,8 +10,8 @@ use footplate_core::{TimeSpan, Timestamp};
 use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
 use super::ward::connection;
 use crate::clock::Stopwatch;
-use crate::link::{Bequest, Cable, Guardian, Heard, Link, Lost, PERSON_MS, StreamLink};
-use crate::runtime::StopFlag;
+use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
+use crate::runtime::{StopFlag, written};
 
 /// How often a guardian is told that its child lives: five times as often as it has to.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
@@ -30,7 +30,7 @@ pub(crate) struct WardLink {
     runs: bool,
     is_orphan: bool,
     /// The line, held by this process after the guardian's death.
-    own: Option<StreamLink>,
+    own: Option<CableLink>,
 }
 
 impl WardLink {
@@ -105,6 +105,9 @@ impl WardLink {
     fn hear(&mut self, within: Duration) -> IoResult<Heard> {
         Ok(match self.frames.next(Some(within))? {
             Some((Kind::Heard, bytes)) => {
+                if self.cable.has_datagrams() {
+                    return Ok(Heard::Datagram(bytes.to_vec()));
+                }
                 self.bytes.extend(bytes);
                 self.bytes.pop_front().map_or(Heard::Nothing, Heard::Byte)
             }
@@ -166,6 +169,10 @@ impl Link for WardLink {
         TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed())
     }
 
+    fn real_time(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
     fn reopen(&mut self) -> Result<(), Lost> {
         if let Some(own) = &mut self.own {
             return own.reopen();
@@ -174,7 +181,7 @@ impl Link for WardLink {
             return self.have_opened();
         }
         // Without a guardian no train runs: the line is opened to stop them.
-        self.own = Some(StreamLink::open(self.cable.clone())?);
+        self.own = Some(CableLink::open(self.cable.clone())?);
         StopFlag::raise();
         eprintln!("without a guardian all trains are stopped, and the program ends");
         Ok(())
@@ -187,14 +194,7 @@ impl Link for WardLink {
 
 impl Guardian for WardLink {
     fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
-        let mut bytes = Vec::new();
-        for Bequest { after, bytes: part } in will {
-            let pause_us = (after.as_s() * 1e6 / self.cable.speed()).clamp(0.0, f64::from(u32::MAX));
-            bytes.extend((pause_us as u32).to_le_bytes());
-            bytes.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
-            bytes.extend(part);
-        }
-        self.tell(Kind::Will, &bytes)
+        self.tell(Kind::Will, &written(will, self.cable.speed()))
     }
 
     fn note_running(&mut self, runs: bool) -> Result<(), Lost> {

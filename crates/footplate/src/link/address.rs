@@ -8,12 +8,15 @@
 use std::str::FromStr;
 
 use footplate_core::{Ratio, TrainId};
-use footplate_sim::{BoardSwitches, CanSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
+use footplate_sim::{
+    BoardSwitches, CanSwitches, Delivery, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
+};
 
 use super::board_address::BoardAddress;
-use super::can_address::{self, CanAddress, CanPlace};
+use super::cable::Cable;
+use super::can_address::{self, CanAddress};
+use super::loconet_address::{self, LocoNetAddress};
 use super::port::Port;
-use super::stream::Cable;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
@@ -21,6 +24,7 @@ const SERIAL: &str = "marklin-serial:";
 const BOARD: &str = "dcc-ex:";
 const Z21: &str = "z21:";
 const CAN: &str = "marklin-can:";
+const LOCONET: &str = "loconet:";
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
 
@@ -41,6 +45,8 @@ pub(crate) enum Address {
     Z21(Z21Address),
     /// A station on Märklin's CAN bus.
     Can(CanAddress),
+    /// A LocoNet server in a network.
+    LocoNet(LocoNetAddress),
 }
 
 impl Address {
@@ -48,23 +54,21 @@ impl Address {
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) => None,
+            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
         }
     }
 }
 
 impl Address {
-    /// The cable to a station outside this program; datagrams need none.
+    /// The line to a station outside this program.
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
             Self::Simulated(_) => None,
             Self::Serial(serial) => Some(serial.into()),
             Self::Board(board) => Some(board.into()),
-            Self::Can(can) => match &can.place {
-                CanPlace::Line(port) => Some((port, can.speed).into()),
-                CanPlace::Datagrams { .. } => None,
-            },
-            Self::Z21(_) => None,
+            Self::Z21(z21) => Some(z21.into()),
+            Self::Can(can) => Some(can.into()),
+            Self::LocoNet(server) => Some(server.into()),
         }
     }
 }
@@ -81,6 +85,8 @@ pub(crate) enum StationKind {
     Z21,
     /// A Central Station on Märklin's CAN bus.
     MarklinCan,
+    /// A command station on LocoNet, behind a server.
+    LocoNet,
 }
 
 impl StationKind {
@@ -94,8 +100,9 @@ impl StationKind {
             "dcc-ex" => Ok(Self::DccEx),
             "z21" => Ok(Self::Z21),
             "marklin-can" => Ok(Self::MarklinCan),
+            "loconet" => Ok(Self::LocoNet),
             _ => Err(format!(
-                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21 and marklin-can"
+                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
             )),
         }
     }
@@ -133,6 +140,8 @@ pub(crate) struct Quirks {
     pub(crate) z21: Z21Switches,
     /// If it is a Central Station.
     pub(crate) can: CanSwitches,
+    /// If it is a LocoNet server.
+    pub(crate) loconet: LocoNetSwitches,
 }
 
 /// How fast a simulated clock runs.
@@ -194,10 +203,14 @@ impl FromStr for Address {
             let mut address = CanAddress::of(place)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::Can(address))
+        } else if let Some(place) = place.strip_prefix(LOCONET) {
+            let mut address = LocoNetAddress::of(place)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::LocoNet(address))
         } else {
             Err(format!(
                 "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, or tcp://host:port in place of a port"
+                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -298,13 +311,15 @@ const LOSSY: Ratio = Ratio::from_percent(0.2);
 
 /// Reads quirks of a DCC-EX board, a Z21 or a Central Station as `chatter,split`.
 pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
-    let Quirks { mut board, mut z21, mut can } = Quirks::default();
+    let Quirks { mut board, mut z21, mut can, mut loconet } = Quirks::default();
     for one in value.split(',') {
-        let is_of_another = set_quirk(&mut z21, one) | can_address::set_quirk(&mut can, one);
+        let is_of_another = set_quirk(&mut z21, one)
+            | can_address::set_quirk(&mut can, one)
+            | loconet_address::set_quirk(&mut loconet, one);
         match one {
             "chatter" => board.chatter = CHATTER,
-            "merged" => board.delivery = Delivery::Merged,
-            "split" => board.delivery = Delivery::Split,
+            "merged" => (board.delivery, loconet.delivery) = (Delivery::Merged, Delivery::Merged),
+            "split" => (board.delivery, loconet.delivery) = (Delivery::Split, Delivery::Split),
             "lossy" => board.lost = LOSSY,
             "silent" => board.has_banner = false,
             _ if is_of_another => {}
@@ -312,13 +327,14 @@ pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
                      (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
-                     DCC-EX board, of a Z21 {QUIRKS}, and of a Central Station {}",
-                    can_address::QUIRKS
+                     DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, and of a LocoNet server {}",
+                    can_address::QUIRKS,
+                    loconet_address::QUIRKS
                 ));
             }
         }
     }
-    Ok(Quirks { board, z21, can })
+    Ok(Quirks { board, z21, can, loconet })
 }
 
 /// The law of a name.
@@ -433,7 +449,7 @@ mod tests {
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
-            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21 and marklin-can"),
+            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21, marklin-can and loconet"),
             ("sim:track-a?quirks=none", "wrong-xor"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),

@@ -1,85 +1,81 @@
-//! A station behind UDP, with the clock of this computer.
-//!
-//! A thread of its own waits for datagrams, so that the program can wait for them and for the time at once.
+//! Exchanges datagrams with a station; a thread of its own waits for those that arrive.
 
-use std::io::ErrorKind;
+use std::fmt::{Display, Formatter, Result as FmtResult};
+use std::io::{ErrorKind, Result as IoResult, Write};
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
-use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::z21::LONGEST_DATAGRAM;
 
-use super::can_address::{CanAddress, CanPlace};
-use super::line::PERSON_MS;
-use super::z21_address::Z21Address;
-use super::{Heard, Link, Lost};
-use crate::clock::Stopwatch;
+use super::Lost;
+use super::cable::{Arrival, CableEnd};
 
-/// How soon a thread notices that nobody listens to it any more.
-const NOTICES_EVERY: Duration = Duration::from_millis(250);
+/// How soon the reading thread notices that its line is closed; so long at most a port is not free yet.
+const NOTICES_EVERY: Duration = Duration::from_millis(50);
 
 /// Where a station is, and where it answers to.
 #[derive(Debug, Clone)]
-pub(crate) struct Correspondent {
-    host: String,
-    port: u16,
+pub(super) struct Correspondent {
+    pub(super) host: String,
+    pub(super) port: u16,
     /// The port that it sends to, from whichever of its own; `None`: it answers to where it was written from.
-    receive_at: Option<u16>,
-    /// How many times faster than real time the station's clock runs.
-    speed: f64,
+    pub(super) receive_at: Option<u16>,
 }
 
-impl From<&Z21Address> for Correspondent {
-    fn from(address: &Z21Address) -> Self {
-        let Z21Address { host, port, speed, .. } = address.clone();
-        Self { host, port, receive_at: None, speed }
+impl Display for Correspondent {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        write!(f, "{}:{}", self.host, self.port)
     }
 }
 
-impl From<&CanAddress> for Correspondent {
-    fn from(address: &CanAddress) -> Self {
-        let (host, port, receive_at) = match address.place.clone() {
-            CanPlace::Datagrams { host, port, receive_at } => (host, port, receive_at),
-            CanPlace::Line(port) => (port.to_string(), 0, 0),
-        };
-        Self { host, port, receive_at: Some(receive_at), speed: address.speed }
-    }
-}
-
-/// A station that is spoken to in datagrams.
-pub(crate) struct DatagramLink {
-    place: Correspondent,
-    line: Line,
-    stopwatch: Stopwatch,
-}
-
-/// What is new when a line is opened again.
-struct Line {
+/// Sends one datagram per call.
+struct Sender {
     socket: UdpSocket,
-    station: SocketAddr,
-    arrivals: Receiver<Result<Vec<u8>, String>>,
+    /// The station, where the socket is not connected to it.
+    station: Option<SocketAddr>,
     is_open: Arc<AtomicBool>,
+    reader: Option<JoinHandle<()>>,
 }
 
-impl Drop for Line {
+impl Write for Sender {
+    fn write(&mut self, bytes: &[u8]) -> IoResult<usize> {
+        let sent = match self.station {
+            None => self.socket.send(bytes),
+            Some(station) => self.socket.send_to(bytes, station),
+        };
+        match sent {
+            Err(error) if is_passing(error.kind()) => Ok(bytes.len()),
+            sent => sent,
+        }
+    }
+
+    fn flush(&mut self) -> IoResult<()> {
+        Ok(())
+    }
+}
+
+impl Drop for Sender {
+    /// The port is free afterwards.
     fn drop(&mut self) {
         self.is_open.store(false, Ordering::Relaxed);
+        // A reader that panicked has closed its socket, too.
+        let _ = self.reader.take().map(JoinHandle::join);
     }
 }
 
-impl DatagramLink {
-    pub(crate) fn open(place: impl Into<Correspondent>) -> Result<Self, Lost> {
-        let place = place.into();
-        Ok(Self { line: open(&place)?, place, stopwatch: Stopwatch::start() })
-    }
-}
-
-fn open(place: &Correspondent) -> Result<Line, Lost> {
-    let Correspondent { host, port, receive_at, .. } = place;
-    let failed = |error: &dyn std::fmt::Display| {
+/// Opens a socket to a station.
+///
+/// # Errors
+/// When its name has no address, or another program receives at the port.
+pub(super) fn exchange_datagrams(
+    correspondent: &Correspondent,
+    deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
+) -> Result<CableEnd, Lost> {
+    let Correspondent { host, port, receive_at } = correspondent;
+    let failed = |error: &dyn Display| {
         Lost(format!("cannot reach {host}:{port}: {error}; check the station's address and the network"))
     };
     let mut addresses = (host.as_str(), *port).to_socket_addrs().map_err(|error| failed(&error))?;
@@ -94,36 +90,39 @@ fn open(place: &Correspondent) -> Result<Line, Lost> {
     }
     socket.set_read_timeout(Some(NOTICES_EVERY)).map_err(|error| failed(&error))?;
     let reader = socket.try_clone().map_err(|error| failed(&error))?;
-    let (sender, arrivals) = channel();
     let is_open = Arc::new(AtomicBool::new(true));
     let listens = Arc::clone(&is_open);
-    std::thread::spawn(move || listen(&reader, station, &listens, &sender));
-    Ok(Line { socket, station, arrivals, is_open })
+    let reader = std::thread::spawn(move || listen(&reader, station, &listens, deliver));
+    let station = receive_at.map(|_| station);
+    Ok(CableEnd { writer: Box::new(Sender { socket, station, is_open, reader: Some(reader) }), cts: None })
 }
 
 fn listen(
     socket: &UdpSocket,
     station: SocketAddr,
     is_open: &AtomicBool,
-    sender: &Sender<Result<Vec<u8>, String>>,
+    mut deliver: impl FnMut(Arrival<'_>) -> bool,
 ) {
     let mut bytes = [0; LONGEST_DATAGRAM];
     while is_open.load(Ordering::Relaxed) {
-        let arrived = match socket.recv_from(&mut bytes) {
+        let goes_on = match socket.recv_from(&mut bytes) {
             // What others send to this port is not the station's.
             Ok((_, from)) if from.ip() != station.ip() => continue,
-            Ok((count, _)) => Ok(bytes.iter().take(count).copied().collect()),
+            Ok((count, _)) => deliver(Arrival::Bytes(bytes.get(..count).unwrap_or_default())),
             Err(error) if is_passing(error.kind()) => continue,
-            Err(error) => Err(error.to_string()),
+            Err(error) => {
+                let _ = deliver(Arrival::Lost(&error.to_string()));
+                return;
+            }
         };
-        let is_over = arrived.is_err();
-        if sender.send(arrived).is_err() || is_over {
+        if !goes_on {
             return;
         }
     }
 }
 
-/// Nobody listens at the other end yet, or any more: a station that starts. The session notices that it is silent.
+/// Whether an error passes by itself: no program receives at the other end yet, or any more, as at a station that starts. The
+/// session notices that it is silent.
 const fn is_passing(kind: ErrorKind) -> bool {
     matches!(
         kind,
@@ -133,56 +132,4 @@ const fn is_passing(kind: ErrorKind) -> bool {
             | ErrorKind::ConnectionRefused
             | ErrorKind::ConnectionReset
     )
-}
-
-impl Link for DatagramLink {
-    fn now(&self) -> Timestamp {
-        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.place.speed)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        let sent = match self.place.receive_at {
-            None => self.line.socket.send(bytes),
-            Some(_) => self.line.socket.send_to(bytes, self.line.station),
-        };
-        match sent {
-            Ok(_) => Ok(()),
-            Err(error) if is_passing(error.kind()) => Ok(()),
-            Err(error) => {
-                Err(Lost(format!("cannot write to {}:{}: {error}", self.place.host, self.place.port)))
-            }
-        }
-    }
-
-    fn wait(&mut self, until: Timestamp) -> Heard {
-        let span_s = (until - self.now()).as_s() / self.place.speed;
-        let heard = match self.line.arrivals.try_recv() {
-            Ok(arrival) => Ok(arrival),
-            Err(_) if span_s <= 0.0 => return Heard::Nothing,
-            Err(_) => self.line.arrivals.recv_timeout(Duration::from_secs_f64(span_s)),
-        };
-        match heard {
-            Ok(Ok(datagram)) => Heard::Datagram(datagram),
-            Ok(Err(why)) => {
-                Heard::Lost(Lost(format!("{}:{} is gone: {why}", self.place.host, self.place.port)))
-            }
-            Err(RecvTimeoutError::Timeout) => Heard::Nothing,
-            Err(RecvTimeoutError::Disconnected) => {
-                Heard::Lost(Lost(format!("{}:{} is gone", self.place.host, self.place.port)))
-            }
-        }
-    }
-
-    fn cts(&self) -> Option<bool> {
-        None
-    }
-
-    fn patience(&self) -> TimeSpan {
-        TimeSpan::from_s(PERSON_MS * 1e-3 * self.place.speed)
-    }
-
-    fn reopen(&mut self) -> Result<(), Lost> {
-        self.line = open(&self.place)?;
-        Ok(())
-    }
 }

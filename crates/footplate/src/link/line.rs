@@ -1,5 +1,7 @@
 //! What every link can do, and what is heard of it.
 
+use std::time::Duration;
+
 use footplate_core::{TimeSpan, Timestamp};
 
 /// How often people are asked for what they want while nothing else happens (ms): twice as often as a browser is shown a
@@ -25,6 +27,15 @@ pub(crate) trait Link {
 
     /// Tries to open a lost line again.
     fn reopen(&mut self) -> Result<(), Lost>;
+
+    /// Real time, since some moment before: how long a person has waited. In a world that is simulated with the program itself,
+    /// the time of that world.
+    fn real_time(&self) -> Duration;
+
+    /// Lets so much of it pass.
+    fn pause(&mut self, span: Duration) {
+        std::thread::sleep(span);
+    }
 
     /// The guardian of this line, where another process holds it and stops the trains if this one dies.
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
@@ -99,6 +110,12 @@ impl<L: Link + ?Sized> Link for Box<L> {
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
     }
+    fn real_time(&self) -> Duration {
+        (**self).real_time()
+    }
+    fn pause(&mut self, span: Duration) {
+        (**self).pause(span);
+    }
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         (**self).guardian()
     }
@@ -122,6 +139,12 @@ impl<L: Link + ?Sized> Link for &mut L {
     }
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
+    }
+    fn real_time(&self) -> Duration {
+        (**self).real_time()
+    }
+    fn pause(&mut self, span: Duration) {
+        (**self).pause(span);
     }
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         (**self).guardian()

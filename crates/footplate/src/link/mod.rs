@@ -2,8 +2,7 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  a station on Märklin's CAN bus
-//! z21_address  datagrams  a Z21: its address, and the line to it over UDP
+//! can_address  loconet_address  z21_address   a station on Märklin's CAN bus; a LocoNet server; a Z21
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
@@ -14,14 +13,17 @@
 //! tapped      any of them, with every byte noted
 //! rhythm      what bytes tell of how often sensors are asked for
 //! observed    any of them, with its times counted while it is used
-//! stream      a serial port or a network connection, read by a thread, with the clock of this computer
+//! cable       a line outside this process, read by a thread, with the clock of this computer
+//! stream  datagrams   how it is opened: a serial port or a connection; a station behind UDP
 //! ```
 
 mod address;
 mod board_address;
+mod cable;
 mod can_address;
 mod datagrams;
 mod line;
+mod loconet_address;
 mod observed;
 mod open;
 mod port;
@@ -36,14 +38,13 @@ mod time_models;
 mod z21_address;
 
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
-pub(crate) use datagrams::DatagramLink;
+pub(crate) use cable::{Arrival, Cable, CableLink};
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;
 pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
-pub(crate) use simulated_station::SimulatedStation;
+pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
 pub(crate) use station_session::StationSession;
-pub(crate) use stream::{Arrival, Cable, StreamLink};
 pub(crate) use tapped::{Passed, TappedLink};

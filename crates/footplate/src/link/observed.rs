@@ -88,9 +88,10 @@ impl<L: Link> Link for ObservedLink<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         // What is written byte by byte is a 6051's; a DCC-EX board is written messages, and is not polled.
         if let (Some(observed), [_, _, ..]) = (&mut self.observed, bytes) {
-            // A DCC-EX board's begin with a bracket; a Z21's with their length, which is never 60.
+            // A DCC-EX board's begin with a bracket, a LocoNet server's with a word; a Z21's with their length, which is neither.
             match bytes {
                 [b'<', ..] => observed.rhythm.wrote_message(bytes),
+                [b'S', b'E', ..] => observed.rhythm.wrote_line(bytes),
                 // A frame of Märklin's CAN bus with 0, or as a line of an adapter; no length of a Z21's is one of these.
                 [0 | b'T' | b'\r', ..] => observed.rhythm.wrote_frame(bytes),
                 _ => observed.rhythm.wrote_datagram(bytes),
@@ -118,6 +119,7 @@ impl<L: Link> Link for ObservedLink<L> {
         if let Heard::Byte(byte) = heard {
             observed.rhythm.heard_of_board(byte);
             observed.rhythm.heard_of_bus(byte);
+            observed.rhythm.heard_of_server(byte);
             if let Some(span) = observed.rhythm.heard(self.link.now()) {
                 observed.own.first_bytes.add(span.as_ms());
             }
@@ -135,6 +137,14 @@ impl<L: Link> Link for ObservedLink<L> {
 
     fn reopen(&mut self) -> Result<(), Lost> {
         self.link.reopen()
+    }
+
+    fn real_time(&self) -> Duration {
+        self.link.real_time()
+    }
+
+    fn pause(&mut self, span: Duration) {
+        self.link.pause(span);
     }
 
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {

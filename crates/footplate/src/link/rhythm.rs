@@ -3,7 +3,7 @@
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
-use footplate_wire::{marklin_can, z21};
+use footplate_wire::{loconet, marklin_can, z21};
 use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
@@ -20,6 +20,8 @@ pub(crate) struct Rhythm {
     replies: Option<Framing>,
     /// What a station on Märklin's CAN bus says, once something was written to one.
     frames: Option<marklin_can::Framing>,
+    /// What a LocoNet server says, once something was written to one.
+    lines: Option<loconet::Lines>,
 }
 
 /// What the station was commanded last of the power, and whether anything was heard of it since.
@@ -120,6 +122,29 @@ impl Rhythm {
         }
     }
 
+    /// A line was written to a LocoNet server.
+    pub(crate) fn wrote_line(&mut self, text: &[u8]) {
+        self.lines.get_or_insert_default();
+        let mut lines = loconet::Lines::default();
+        let line = text.iter().find_map(|byte| lines.push(*byte).map(loconet::Line::read));
+        let is_on = match line {
+            Some(Ok(loconet::Line::Send(loconet::Message::PowerOn))) => true,
+            Some(Ok(loconet::Line::Send(loconet::Message::PowerOff))) => false,
+            _ => return,
+        };
+        self.power = Some(PowerCommand { is_on, has_answered: false });
+    }
+
+    /// A byte was heard; if a command station on LocoNet says in a slot that the power is as commanded, that counts.
+    pub(crate) fn heard_of_server(&mut self, byte: u8) {
+        let line = self.lines.as_mut().and_then(|lines| lines.push(byte)).map(loconet::Line::read);
+        if let Some(Ok(loconet::Line::Receive(loconet::Message::Slot(slot)))) = line
+            && let Some(power) = self.power.as_mut().filter(|power| slot.is_powered() == power.is_on)
+        {
+            power.has_answered = true;
+        }
+    }
+
     /// What the station was told of the power.
     pub(crate) const fn power(&self) -> Option<PowerCommand> {
         self.power
@@ -159,6 +184,21 @@ mod tests {
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
         b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
+    }
+
+    #[test]
+    fn a_command_station_on_loconet_confirms_the_power_in_a_slot() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_line(b"SEND 83 7C\r\n");
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        for (line, has_answered) in [
+            (&b"RECEIVE 83 7C\r\n"[..], false),
+            (b"RECEIVE E7 0E 05 13 06 00 20 06 00 18 00 00 00 38\r\n", false),
+            (b"RECEIVE E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10\r\n", true),
+        ] {
+            line.iter().for_each(|byte| rhythm.heard_of_server(*byte));
+            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+        }
     }
 
     #[test]

@@ -90,6 +90,10 @@ impl Link for SimulatedLink<'_> {
         }
     }
 
+    fn real_time(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
     fn reopen(&mut self) -> Result<(), Lost> {
         Ok(())
     }

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use footplate_core::Timestamp;
 use footplate_sim::living::{
-    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualStation,
-    VirtualZ21,
+    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualLocoNet,
+    VirtualStation, VirtualZ21,
 };
 
 /// A simulated station and the world behind it.
@@ -19,6 +19,8 @@ pub(crate) enum SimulatedStation<'l> {
     Z21(Box<VirtualZ21<'l>>),
     /// A Central Station.
     Can(Box<VirtualCentralStation<'l>>),
+    /// A command station on LocoNet.
+    LocoNet(Box<VirtualLocoNet<'l>>),
 }
 
 impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
@@ -45,6 +47,12 @@ impl<'l> From<VirtualCentralStation<'l>> for SimulatedStation<'l> {
     }
 }
 
+impl<'l> From<VirtualLocoNet<'l>> for SimulatedStation<'l> {
+    fn from(station: VirtualLocoNet<'l>) -> Self {
+        Self::LocoNet(Box::new(station))
+    }
+}
+
 /// What reaches the host from any.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FromSimulated {
@@ -64,6 +72,7 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.now(),
             Self::Z21(station) => station.now(),
             Self::Can(station) => station.now(),
+            Self::LocoNet(station) => station.now(),
         }
     }
 
@@ -78,6 +87,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => {
                 station.advance(until).map(|(client, datagram)| FromSimulated::Datagram(client, datagram))
             }
+            Self::LocoNet(station) => station.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
             Self::Can(station) => station.advance(until).map(|(client, bytes)| match station.transport() {
                 CanTransport::Datagrams => FromSimulated::Datagram(client, bytes),
                 CanTransport::Stream | CanTransport::Adapter => FromSimulated::Bytes(bytes.into()),
@@ -97,6 +107,7 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.write(bytes),
             Self::Z21(station) => station.write(client, bytes),
             Self::Can(station) => station.write(client, bytes),
+            Self::LocoNet(station) => station.write(bytes),
         }
     }
 
@@ -104,7 +115,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => None,
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
         }
     }
 
@@ -115,6 +126,7 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.world(),
             Self::Z21(station) => station.world(),
             Self::Can(station) => station.world(),
+            Self::LocoNet(station) => station.world(),
         }
     }
 
@@ -125,6 +137,7 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.world_mut(),
             Self::Z21(station) => station.world_mut(),
             Self::Can(station) => station.world_mut(),
+            Self::LocoNet(station) => station.world_mut(),
         }
     }
 
@@ -132,7 +145,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => &[],
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => &[],
         }
     }
 }

@@ -1,5 +1,7 @@
 //! A link with a listener: what was written and heard, and when.
 
+use std::time::Duration;
+
 use footplate_core::{TimeSpan, Timestamp};
 
 use super::{Guardian, Heard, Link, Lost};
@@ -64,6 +66,14 @@ impl<L: Link> Link for TappedLink<L> {
 
     fn reopen(&mut self) -> Result<(), Lost> {
         self.link.reopen()
+    }
+
+    fn real_time(&self) -> Duration {
+        self.link.real_time()
+    }
+
+    fn pause(&mut self, span: Duration) {
+        self.link.pause(span);
     }
 
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {

@@ -1,7 +1,7 @@
 //! How long the link to each kind of station takes.
 
 use footplate_core::link::TimeModel;
-use footplate_wire::{dcc_ex, marklin_can, marklin_serial, z21};
+use footplate_wire::{dcc_ex, loconet, marklin_can, marklin_serial, z21};
 
 use super::address::{Address, StationKind};
 
@@ -14,6 +14,7 @@ impl Address {
             Self::Board(_) => StationKind::DccEx.time_model(),
             Self::Z21(_) => StationKind::Z21.time_model(),
             Self::Can(_) => StationKind::MarklinCan.time_model(),
+            Self::LocoNet(_) => StationKind::LocoNet.time_model(),
         }
     }
 }
@@ -25,6 +26,7 @@ impl StationKind {
             Self::DccEx => dcc_ex::TIME_MODEL,
             Self::Z21 => z21::TIME_MODEL,
             Self::MarklinCan => marklin_can::TIME_MODEL,
+            Self::LocoNet => loconet::TIME_MODEL,
         }
     }
 }

@@ -30,6 +30,11 @@ pub(crate) trait Attendant<M: Machine> {
     /// The line has something to say.
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice);
 
+    /// Something for people to read that concerns the line itself.
+    fn read(&mut self, words: &str) {
+        eprintln!("{words}");
+    }
+
     /// A command of the machine was not taken. Without an own answer it is only said.
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError);
 

@@ -1,6 +1,7 @@
 //! How a run ends, and what a person has to know then.
 
 use std::fmt::{Display, Formatter, Result as FmtResult};
+use std::time::Duration;
 
 use footplate_core::TimeSpan;
 
@@ -14,7 +15,7 @@ pub(super) const WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 pub(super) const SECOND_CHANCE: TimeSpan = TimeSpan::from_ms(3_000);
 
 /// How long a lost line is tried to be opened again, in real time: long enough for a plug to be pushed back in.
-pub(super) const REOPEN_WITHIN_S: f64 = 5.0;
+pub(super) const REOPEN_WITHIN: Duration = Duration::from_secs(5);
 
 /// Why a run has ended.
 #[derive(Debug)]

@@ -5,6 +5,7 @@
 //! has a session.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use footplate_core::{Command, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_wire::{Session, Transmit};
@@ -17,6 +18,15 @@ use crate::link::{Bequest, Link, Lost, StationSession};
 const HAND_SHAKE: TimeSpan = TimeSpan::from_ms(5);
 /// More is not bequeathed: many times what stops every train that a station has.
 const MOST_PARTS: usize = 2_000;
+
+/// Between two attempts to open a line again.
+const REOPEN_EVERY: Duration = Duration::from_millis(250);
+/// How long a byte waits for the hand-shake: a station that keeps it down for longer is told all the same.
+const HAND_SHAKE_WITHIN: Duration = Duration::from_millis(100);
+/// How often the hand-shake line is looked at meanwhile.
+const HAND_SHAKE_EVERY: Duration = Duration::from_micros(500);
+/// How long the hand-shake may take to go down after a byte, which it needs to be believed when it is up.
+const HAND_SHAKE_FALLS: Duration = Duration::from_millis(10);
 
 /// Keeps the guardian's last will up to date.
 #[derive(Debug, Default)]
@@ -80,6 +90,103 @@ impl LastWill {
             guardian.note_running(runs)?;
         }
         Ok(())
+    }
+}
+
+/// A last will as bytes: of each part the pause before it (µs, four bytes), its length (two bytes) and its bytes. A pause of the
+/// station's clock takes `1 / speed` of it in real time.
+pub(crate) fn written(will: &[Bequest], speed: f64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for Bequest { after, bytes: part } in will {
+        let pause_us = (after.as_s() * 1e6 / speed).clamp(0.0, f64::from(u32::MAX));
+        bytes.extend((pause_us as u32).to_le_bytes());
+        bytes.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
+        bytes.extend(part);
+    }
+    bytes
+}
+
+/// A line on which a last will is carried out, by whoever outlived the program.
+pub(crate) trait WillLine {
+    fn is_open(&self) -> bool;
+
+    /// Opens it, anew if it is open.
+    fn open(&mut self) -> Result<(), Lost>;
+
+    /// Closes it, because it is gone.
+    fn close(&mut self);
+
+    /// Puts bytes on the line now.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost>;
+
+    /// The station's hand-shake line; `None` where there is none that could be read.
+    fn cts(&self) -> Option<bool>;
+
+    fn pause(&mut self, span: Duration);
+
+    /// Whether the station has answered anything since [`expect_answer`](Self::expect_answer); `true` on a line that says
+    /// itself when it is gone.
+    fn has_answered(&self) -> bool;
+
+    fn expect_answer(&mut self);
+
+    /// Whether a person does not want to wait any longer.
+    fn gives_up(&self) -> bool;
+
+    fn say(&self, words: &str);
+}
+
+/// Carries a last will out, from its beginning each time the line had to be opened again, until all of it is said or a person
+/// gives up. Returns whether it was said.
+pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
+    let mut was_gone = false;
+    while !line.gives_up() {
+        let said = if line.is_open() { Ok(()) } else { line.open() };
+        if said.is_ok() && std::mem::take(&mut was_gone) {
+            line.say("the line is open again");
+        }
+        let Err(lost) = said.and_then(|()| try_to_carry_out(line, will)) else { return true };
+        if !was_gone {
+            line.say(&format!("{lost}; trying for ever (Ctrl-C gives up, and leaves trains running)"));
+        }
+        was_gone = true;
+        line.close();
+        line.pause(REOPEN_EVERY);
+    }
+    false
+}
+
+fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
+    line.expect_answer();
+    let mut rest = will;
+    while let [a, b, c, d, low, high, more @ ..] = rest {
+        let pause = u32::from_le_bytes([*a, *b, *c, *d]);
+        let length = usize::from(u16::from_le_bytes([*low, *high]));
+        let (bytes, further) = more.split_at_checked(length).unwrap_or((more, &[]));
+        line.pause(Duration::from_micros(pause.into()));
+        await_hand_shake(line);
+        line.write(bytes)?;
+        rest = further;
+    }
+    // A line that went during the last bytes did not carry them.
+    line.pause(REOPEN_EVERY);
+    if !line.is_open() {
+        return Err(Lost("the line is gone".to_owned()));
+    }
+    // Datagrams vanish without notice. A station that exchanges them answers each command.
+    if line.has_answered() { Ok(()) } else { Err(Lost("the station does not answer".to_owned())) }
+}
+
+/// Waits until the station takes the next byte, where its hand-shake line can be read.
+fn await_hand_shake(line: &mut impl WillLine) {
+    let mut waited = Duration::ZERO;
+    while line.cts() == Some(true) && waited < HAND_SHAKE_FALLS {
+        line.pause(HAND_SHAKE_EVERY);
+        waited += HAND_SHAKE_EVERY;
+    }
+    while line.cts() == Some(false) && waited < HAND_SHAKE_WITHIN {
+        line.pause(HAND_SHAKE_EVERY);
+        waited += HAND_SHAKE_EVERY;
     }
 }
 

@@ -23,5 +23,6 @@ mod over_a_simulation;
 
 pub(crate) use attendant::{Attendant, Recorder, Wish};
 pub(crate) use ending::Ended;
+pub(crate) use last_will::{WillLine, carry_out, written};
 pub(crate) use run::Runtime;
 pub(crate) use stop_flag::StopFlag;

@@ -13,7 +13,7 @@ use footplate_wire::LinkNotice;
 use super::over_a_simulation::{Runs, Until};
 use super::{Ended, Runtime};
 use crate::link::{
-    Address, Link, Server, SimulatedAddress, SimulatedStation, Speed, StreamLink, listen_on, open_session,
+    Address, CableLink, Link, Server, SimulatedAddress, SimulatedStation, Speed, listen_on, open_session,
     open_simulated, station,
 };
 
@@ -63,10 +63,10 @@ impl Served {
     }
 }
 
-fn connected(place: &str) -> Runtime<'static, StreamLink> {
+fn connected(place: &str) -> Runtime<'static, CableLink> {
     let address: Address = format!("dcc-ex:{place}?speed={TIMES}").parse().expect("an address");
     let Address::Board(board) = &address else { panic!("a board") };
-    let link = StreamLink::open(board).expect("a connection");
+    let link = CableLink::open(board).expect("a connection");
     let layout = layout_named("track-a").expect("a layout").layout;
     let session = open_session(&address, &link, &layout).expect("a session");
     Runtime::new(link, session, None, None)

@@ -14,7 +14,7 @@ use super::over_a_simulation::{Runs, Until};
 use super::{Ended, Runtime};
 use crate::clock::Stopwatch;
 use crate::link::{
-    Address, Link, Server, SimulatedAddress, StreamLink, listen_on, open_pseudo_terminal, open_session,
+    Address, CableLink, Link, Server, SimulatedAddress, listen_on, open_pseudo_terminal, open_session,
     station,
 };
 
@@ -68,11 +68,11 @@ impl Standing {
     }
 }
 
-fn connected(place: &str) -> Runtime<'static, StreamLink> {
+fn connected(place: &str) -> Runtime<'static, CableLink> {
     let written = format!("marklin-serial:{place}?pace=fast&speed={TIMES}");
     let address: Address = written.parse().expect("an address");
     let Address::Serial(serial) = &address else { panic!("a serial one") };
-    let link = StreamLink::open(serial).expect("a connection");
+    let link = CableLink::open(serial).expect("a connection");
     let layout = layout_named("track-a").expect("a layout").layout;
     let session = open_session(&address, &link, &layout).expect("modules");
     Runtime::new(link, session, None, None)

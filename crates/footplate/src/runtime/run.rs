@@ -7,10 +7,9 @@ use footplate_core::{Event, TimeSpan, Timestamp};
 use footplate_wire::{Closing, LinkNotice, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
-use super::ending::{Ended, REOPEN_WITHIN_S, SECOND_CHANCE, WITHIN};
+use super::ending::{Ended, REOPEN_WITHIN, SECOND_CHANCE, WITHIN};
 use super::last_will::LastWill;
 use super::stop_flag::StopFlag;
-use crate::clock::Stopwatch;
 use crate::link::{Heard, Link, Lost, StationSession};
 
 /// A machine that was woken and still asks for a time that has passed is woken again after this, so that time goes on
@@ -91,7 +90,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             let mut eventful = match self.serve(machine) {
                 Ok(eventful) => eventful,
                 Err(Broken::Recorder(error)) => return Err(error),
-                Err(Broken::Lost(lost)) => match self.open_again(lost) {
+                Err(Broken::Lost(lost)) => match self.open_again(lost, attendant) {
                     Ok(()) => false,
                     Err(lost) => return Ok(Ended::LineLost(lost)),
                 },
@@ -128,7 +127,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 self.session.handle_timeout(now);
             }
             if let Err(lost) = self.write() {
-                match self.open_again(lost) {
+                match self.open_again(lost, attendant) {
                     Ok(()) => continue,
                     Err(lost) => return Ok(Ended::LineLost(lost)),
                 }
@@ -153,7 +152,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                         Heard::Datagram(datagram) => self.session.handle_bytes(now, &datagram),
                         Heard::Cts(up) => self.session.handle_cts(now, up),
                         Heard::Lost(lost) => {
-                            if let Err(lost) = self.open_again(lost) {
+                            if let Err(lost) = self.open_again(lost, attendant) {
                                 return Ok(Ended::LineLost(lost));
                             }
                         }
@@ -219,18 +218,18 @@ impl<'r, L: Link> Runtime<'r, L> {
     }
 
     /// A lost line may come back: a plug was pushed in again, a server was started anew.
-    fn open_again(&mut self, lost: Lost) -> Result<(), Lost> {
-        eprintln!("{lost}; trying to open it again for {REOPEN_WITHIN_S:.0} s");
-        let since = Stopwatch::start();
-        while since.elapsed().as_secs_f64() < REOPEN_WITHIN_S && !self.stop.is_some_and(StopFlag::is_up) {
-            std::thread::sleep(REOPEN_EVERY);
+    fn open_again<M: Machine>(&mut self, lost: Lost, attendant: &mut dyn Attendant<M>) -> Result<(), Lost> {
+        attendant.read(&format!("{lost}; trying to open it again for {} s", REOPEN_WITHIN.as_secs()));
+        let began = self.link.real_time();
+        while self.link.real_time() - began < REOPEN_WITHIN && !self.stop.is_some_and(StopFlag::is_up) {
+            self.link.pause(REOPEN_EVERY);
             if self.link.reopen().is_ok() {
                 let now = self.link.now();
                 self.session.handle_reopened(now);
                 if let Some(up) = self.link.cts() {
                     self.session.handle_cts(now, up);
                 }
-                eprintln!("the line is open again");
+                attendant.read("the line is open again");
                 return Ok(());
             }
         }
@@ -254,8 +253,7 @@ impl<'r, L: Link> Runtime<'r, L> {
     }
 
     fn say_goodbye(&mut self) {
-        let began = self.link.now();
-        let stopwatch = Stopwatch::start();
+        let (began, since) = (self.link.now(), self.link.real_time());
         self.session.close(began);
         loop {
             if self.write().is_err() {
@@ -270,7 +268,8 @@ impl<'r, L: Link> Runtime<'r, L> {
             }
             self.notices.clear();
             let now = self.link.now();
-            let late = now - began >= WITHIN || stopwatch.elapsed().as_secs_f64() >= WITHIN.as_s();
+            let waited = self.link.real_time() - since;
+            let late = now - began >= WITHIN || waited.as_secs_f64() >= WITHIN.as_s();
             if late || self.session.closing().is_complete() {
                 return;
             }

@@ -28,6 +28,14 @@ pub(crate) struct Extent {
     pub(crate) until: Option<Timestamp>,
     /// On behind the first difference.
     pub(crate) all: bool,
+    /// Notices, too: they are compared by the text that this version gives them, which another may word otherwise.
+    pub(crate) notices: bool,
+}
+
+impl Extent {
+    fn compares(self, kind: &str) -> bool {
+        self.notices || kind != Decision::NOTICE
+    }
 }
 
 /// What came of it.
@@ -88,7 +96,7 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
     };
     let mut lone = Vec::new();
     let mut after: Rc<str> = "the beginning".into();
-    let mut now = decided(machine, Timestamp::ZERO, &after);
+    let mut now = decided(machine, Timestamp::ZERO, &after, extent);
     let mut rows = trace.into_iter().zip(0_u64..).peekable();
     let mut is_over = false;
     while !is_over {
@@ -97,11 +105,11 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
             match told(&row, place, extent) {
                 Ok(input) => {
                     if !lone.is_empty() {
-                        now.extend(decided_by_itself(machine, rehearing.at, row.time));
+                        now.extend(decided_by_itself(machine, rehearing.at, row.time, extent));
                     }
                     after = format!("input {}: {} {}", row.number, row.kind, row.text).into();
                     machine.handle_input(row.time, &input);
-                    now.extend(decided(machine, row.time, &after));
+                    now.extend(decided(machine, row.time, &after, extent));
                     rehearing.inputs += 1;
                     rehearing.at = row.time;
                 }
@@ -121,7 +129,9 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
                 break;
             }
             let (kind, text) = (row.kind.into_owned(), row.text);
-            then.push(Row { kind, text, time: row.time, after: Rc::clone(&after) });
+            if extent.compares(&kind) {
+                then.push(Row { kind, text, time: row.time, after: Rc::clone(&after) });
+            }
         }
         is_over |= rows.peek().is_none();
         // Killed in the middle of writing: what is missing at the very end was decided, and is not there.
@@ -144,13 +154,18 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
 }
 
 /// What a machine that has decided otherwise decides between two inputs of then: it asks for other times now.
-fn decided_by_itself<M: Listener>(machine: &mut M, from: Timestamp, until: Timestamp) -> Vec<Row> {
+fn decided_by_itself<M: Listener>(
+    machine: &mut M,
+    from: Timestamp,
+    until: Timestamp,
+    extent: Extent,
+) -> Vec<Row> {
     let after: Rc<str> = "the time that it asks for now".into();
     let mut rows = Vec::new();
     let mut last = from;
     while let Some(due) = machine.next_timeout().filter(|due| *due > last && until - *due > WOKEN_WITHIN) {
         machine.handle_timeout(due);
-        rows.extend(decided(machine, due, &after));
+        rows.extend(decided(machine, due, &after, extent));
         last = due;
     }
     rows
@@ -177,10 +192,11 @@ fn obstacle(row: &Traced, place: u64, extent: Extent) -> Option<Ending> {
 }
 
 /// All that a machine has decided since it was asked last.
-fn decided<M: Listener>(machine: &mut M, time: Timestamp, after: &Rc<str>) -> Vec<Row> {
+fn decided<M: Listener>(machine: &mut M, time: Timestamp, after: &Rc<str>, extent: Extent) -> Vec<Row> {
     let outputs = std::iter::from_fn(|| machine.poll_output());
     let row = |Decision { kind, text }| Row { kind: kind.to_owned(), text, time, after: Rc::clone(after) };
-    outputs.map(|output| row(Decision::of(&output))).collect()
+    let decisions = outputs.map(|output| Decision::of(&output));
+    decisions.filter(|decision| extent.compares(decision.kind)).map(row).collect()
 }
 
 /// A decision of then or of now.
@@ -349,7 +365,7 @@ mod tests {
         ]
     }
 
-    const ALL: Extent = Extent { until: None, all: true };
+    const ALL: Extent = Extent { until: None, all: true, notices: true };
 
     #[test]
     fn the_same_machine_decides_the_same() {
@@ -373,6 +389,16 @@ mod tests {
             (only_first.ending, &only_first.differences[..]),
             (Ending::Differs, &found.differences[..1])
         );
+    }
+
+    #[test]
+    fn another_wording_is_a_difference_only_if_notices_are_compared() {
+        let mut trace = evening();
+        let said = trace.iter_mut().find(|row| row.kind == "notice").unwrap();
+        said.text = "Drive(\"3\")".to_owned();
+        let differences = |extent| rehear(&mut Obedient::default(), trace.clone(), extent).differences.len();
+        assert_eq!(differences(ALL), 1);
+        assert_eq!(differences(Extent { notices: false, ..ALL }), 0);
     }
 
     #[test]
@@ -412,7 +438,7 @@ mod tests {
         strange[3].kind = Cow::Borrowed("telepathy");
         let found = rehear(&mut Obedient::default(), strange, ALL);
         assert!(matches!(found.ending, Ending::Unreadable { number: 3, .. }));
-        let until = Extent { until: Some(Timestamp::ZERO + TimeSpan::from_ms(600)), all: true };
+        let until = Extent { until: Some(Timestamp::ZERO + TimeSpan::from_ms(600)), ..ALL };
         let found = rehear(&mut Obedient::default(), evening(), until);
         assert_eq!((found.ending, found.inputs, found.decisions), (Ending::Asked, 2, 2));
     }

@@ -16,9 +16,9 @@ use crate::board::calibrated;
 use crate::station::Standing;
 
 /// Stops are on the line within this (issue 19) ...
-const WITHIN: Duration = Duration::from_secs(1);
+pub(crate) const WITHIN: Duration = Duration::from_secs(1);
 /// ... and nothing else here takes longer than this.
-const PATIENCE: Duration = Duration::from_secs(30);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 const EVERY: Duration = Duration::from_millis(5);
 
 /// What a station heard, and when.
@@ -145,7 +145,7 @@ pub(crate) struct Driven {
 }
 
 impl Driven {
-    fn over(link: &str, store: &Path, more: &[&str]) -> Self {
+    pub(crate) fn over(link: &str, store: &Path, more: &[&str]) -> Self {
         let own = ["serve", "0", "--layout", "track-a", "--train", "24", "--link", link];
         Self::given(&[&own[..], more].concat(), store)
     }
@@ -173,8 +173,13 @@ impl Driven {
         Self { guardian, orders, errors }
     }
 
-    fn errors(&self) -> String {
+    pub(crate) fn errors(&self) -> String {
         self.errors.lock().expect("no panic").clone()
+    }
+
+    /// The process that was started.
+    pub(crate) fn guardian(&self) -> u32 {
+        self.guardian.id()
     }
 
     /// The child that drives.
@@ -182,7 +187,7 @@ impl Driven {
         child_of(self.guardian.id()).expect("a child")
     }
 
-    fn await_errors(&self, words: &str) {
+    pub(crate) fn await_errors(&self, words: &str) {
         let began = Instant::now();
         while !self.errors().contains(words) {
             assert!(began.elapsed() < PATIENCE, "{words} in {}", self.errors());
@@ -198,7 +203,7 @@ impl Driven {
         at.expect("an address").trim_end_matches('/').to_owned()
     }
 
-    fn order(&self, line: &str) {
+    pub(crate) fn order(&self, line: &str) {
         let host = self.host();
         let body = format!("{{\"line\": \"{line}\"}}");
         let mut stream = TcpStream::connect(&host).expect("a connection");
@@ -212,7 +217,7 @@ impl Driven {
         assert!(String::from_utf8_lossy(&answer[..count]).contains("202"));
     }
 
-    fn status(&mut self) -> Option<i32> {
+    pub(crate) fn status(&mut self) -> Option<i32> {
         let began = Instant::now();
         loop {
             if let Some(status) = self.guardian.try_wait().expect("a status") {

@@ -50,7 +50,7 @@ fn the_next_session_stops_what_a_killed_one_left_running() {
 
     // then the train is commanded to stop before the power is switched off, and both before it is switched on again.
     assert_eq!(output.status, 0, "{}", output.errors);
-    assert!(output.errors.contains("has not ended, so its trains may be running"), "{}", output.errors);
+    assert!(output.errors.contains("has not ended: every known train may be running"), "{}", output.errors);
     assert!(output.errors.contains("commanded to stop: 24; track power switched off"), "{}", output.errors);
     let said = tap.said();
     let first = |words: &str| said.find(words).unwrap_or_else(|| panic!("{words} in {said}"));

@@ -13,6 +13,7 @@ mod drive;
 mod emergency_stop;
 mod forecasts_hold;
 mod guardian;
+mod guardian_datagrams;
 mod inertial_slides;
 mod killed;
 mod layout;

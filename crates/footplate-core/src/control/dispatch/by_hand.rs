@@ -7,7 +7,7 @@ use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::way::Way;
+use super::path::Path;
 
 /// How far ahead a train that is driven by hand takes the track at least and at most: a locomotive's length, and more than
 /// any train needs to stop from its highest step (1.2 m) and the next contact.
@@ -43,7 +43,7 @@ impl Dispatcher {
     /// A train that was driven by hand and stands, with nothing more to do, holds no more than where it stands; whether it
     /// does.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
-        let is_done = self.watchdog.driver().stands(id, now) && self.watchdog.driver().busy(id).is_none();
+        let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
             self.halted(now, id, true);
@@ -71,7 +71,7 @@ impl Dispatcher {
             let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
-        let (way, at) = Way::around(
+        let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
             place,
@@ -89,10 +89,10 @@ impl Dispatcher {
             row.push(leader);
         }
         let is_free = |end: Length| {
-            let taken = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
+            let taken = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
             self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
         };
-        let reach = (way.length() - room.ahead).min(at + ahead);
+        let reach = (path.length() - room.ahead).min(at + ahead);
         let mut end = reach;
         while end > at && !is_free(end) {
             end -= EVERY;
@@ -100,22 +100,23 @@ impl Dispatcher {
         let end = end.max(at);
         if !is_free(end) {
             // Not even where it stands: it keeps what it held, and stays.
-            self.watchdog.set_limit(now, id, Some(located.at));
+            self.watchdog.set_end_of_authority(now, id, Some(located.at));
             return;
         }
-        let mut held = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
+        let mut held = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             held.add(layout, &train.held);
         }
         // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:
         // whoever drives by hand sees it.
         let limit = (end < reach).then(|| {
-            let limit =
-                way.place(end).and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
+            let limit = path
+                .place(end)
+                .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
             limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
         });
-        self.watchdog.set_limit(now, id, limit);
+        self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

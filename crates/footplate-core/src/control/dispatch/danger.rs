@@ -2,34 +2,37 @@
 
 use alloc::vec::Vec;
 
-use crate::control::supervise::WatchdogNotice;
+use crate::control::supervise::Alarm;
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::notice::DispatchNotice;
 use super::reservation::{Reservation, Span};
+use crate::control::Notice;
 
 /// Track of two trains that touches is track of both: so much is left between them.
 const APART: Length = Length::from_mm(1.0);
 
 impl Dispatcher {
-    /// Takes note of what the watchdog says.
-    pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: WatchdogNotice) {
-        match &notice {
-            WatchdogNotice::Danger { train, stopped, .. } => {
+    /// Reacts to a notice of the watchdog.
+    pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: &Notice) {
+        match notice {
+            Notice::Danger { train, stopped, why, .. } => {
+                if matches!(why, Alarm::Lost | Alarm::Elsewhere(_)) {
+                    self.doubt_turnouts();
+                }
                 for stopped in stopped {
                     self.gives_up(*stopped);
                 }
                 self.gives_up(*train);
                 self.set_state(*train, State::InDanger);
             }
-            WatchdogNotice::AsksToCrawl { train } => {
+            Notice::AsksToCreep { train } => {
                 self.crawlers.insert(*train);
             }
-            WatchdogNotice::Recovered { train, .. } => {
+            Notice::Recovered { train, .. } => {
                 self.crawlers.remove(train);
                 if let Some(known) = self.trains.get_mut(train) {
                     // What it was granted is long behind it.
@@ -39,16 +42,27 @@ impl Dispatcher {
                 }
                 self.halted(now, *train, true);
             }
-            WatchdogNotice::NeedsPerson { train, .. } => {
+            Notice::NeedsOperator { train, .. } => {
                 self.crawlers.remove(train);
                 self.set_state(*train, State::Lost);
             }
-            // A journey goes on by itself.
-            WatchdogNotice::Dropped { train, .. } if self.journey(*train).is_some() => return,
-            _ => {}
+            Notice::PowerOff { .. }
+            | Notice::PowerOn
+            | Notice::Creeps { .. }
+            | Notice::Located { .. }
+            | Notice::SpeedMeasured { .. }
+            | Notice::StopChecked { .. }
+            | Notice::Resumed { .. }
+            | Notice::Cancelled { .. } => {}
+            _ => return,
         }
         self.is_stirred = true;
-        self.say(DispatchNotice::Watch(notice));
+    }
+
+    /// A train was not where it should have been: turnouts may lie otherwise than they were commanded, several at once. Each
+    /// is commanded again before another train relies on it.
+    fn doubt_turnouts(&mut self) {
+        self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
     /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.
@@ -58,7 +72,7 @@ impl Dispatcher {
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
             let moves = |other: &TrainId| {
-                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().is_at_rest(*other, now)
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);

@@ -4,7 +4,7 @@ use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
-use crate::control::supervise::{LinkNews, Watchdog, WatchdogNotice};
+use crate::control::supervise::{LinkNews, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
@@ -18,10 +18,10 @@ use super::blocks::Blocks;
 use super::dispatched_train::{Asked, DispatchedTrain, State};
 use super::journey::{Journey, TrainLengths};
 use super::movement_authority::{ClearanceEnvelope, standing};
-use super::notice::DispatchNotice;
 use super::parking::{PARKED, parking_places};
 use super::reservation::Reservation;
 use super::turnout_command::TurnoutCommand;
+use crate::control::Notice;
 
 /// How often it looks what can be done while something waits to be.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
@@ -43,13 +43,15 @@ pub struct Dispatcher {
     pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
     /// Turnouts that were asked for and not told yet, for whom and since when.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
-    pub(super) outputs: VecDeque<Output<DispatchNotice>>,
+    pub(super) outputs: VecDeque<Output<Notice>>,
     /// Whether anything has changed since trains at rest were last looked at.
     pub(super) is_stirred: bool,
     /// How often trains were moved only to have other places to begin from.
     pub(super) shuffled: usize,
     /// When it last thought hard, and in vain, about who could make room for whom.
     pub(super) thought: Option<Timestamp>,
+    /// How many thorough searches in a row found no move that helps.
+    pub(super) searches_in_vain: u8,
     /// What is taken of a block is all of it; `None` where track is taken to the millimetre.
     blocks: Option<Blocks>,
     looks_at: Option<Timestamp>,
@@ -58,7 +60,7 @@ pub struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// Dispatches the trains of a driver. Turnouts that it knows lie as it says.
+    /// Dispatches the trains of a driver. Turnouts are taken to lie as it says, and commanded again before they are used.
     #[must_use]
     pub fn new(now: Timestamp, driver: Driver) -> Self {
         Self::over(now, Watchdog::unwatched(driver, now))
@@ -75,8 +77,9 @@ impl Dispatcher {
 
     fn over(now: Timestamp, watchdog: Watchdog) -> Self {
         let layout = watchdog.driver().layout();
-        let lies =
-            |turnout| Some((turnout, TurnoutCommand::sure(now, watchdog.driver().turnouts().get(turnout)?)));
+        let lies = |turnout| {
+            Some((turnout, TurnoutCommand::remembered(now, watchdog.driver().turnouts().get(turnout)?)))
+        };
         let commanded = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
         let ids: Vec<TrainId> = watchdog.driver().trains().collect();
         let mut dispatcher = Self {
@@ -89,6 +92,7 @@ impl Dispatcher {
             is_stirred: true,
             shuffled: 0,
             thought: None,
+            searches_in_vain: 0,
             blocks: None,
             looks_at: None,
             arranged: None,
@@ -194,6 +198,7 @@ impl Dispatcher {
         if let Some(other) = self.trains.values().find(|other| is_nowhere(other)) {
             return Err(Refusal::OtherNowhere { train, other: other.id });
         }
+        self.set_unknown_turnouts(now)?;
         self.give_back(now, train);
         let order = self.watchdog.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
@@ -291,7 +296,8 @@ impl Dispatcher {
     pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
-        if self.watchdog.driver().unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+        if self.watchdog.driver().missed_sensor(id, now).is_none() && self.anchors(now, id, place).len() > own
+        {
             self.watchdog.count_from_behind(now, id);
         }
     }
@@ -304,7 +310,7 @@ impl Dispatcher {
             return anchors;
         };
         for _ in 0..layout.edges().len() {
-            let ahead = super::way::edge_from(layout, self.watchdog.driver().turnouts(), node);
+            let ahead = super::path::edge_from(layout, self.watchdog.driver().turnouts(), node);
             let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { break };
             anchors.extend(layout.needs_of(edge).filter(|need| need.facing).map(|need| need.turnout));
             if edge == place.edge {
@@ -315,7 +321,7 @@ impl Dispatcher {
         anchors
     }
 
-    pub(super) fn say(&mut self, notice: DispatchNotice) {
+    pub(super) fn say(&mut self, notice: Notice) {
         self.outputs.push_back(Output::Notice(notice));
     }
 
@@ -331,11 +337,12 @@ impl Dispatcher {
                     Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                     Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                     Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                    Output::Notice(WatchdogNotice::Drive(notice)) => {
-                        self.say(DispatchNotice::Drive(notice.clone()));
+                    // A journey is resumed by the dispatcher.
+                    Output::Notice(Notice::Cancelled { train, .. }) if self.journey(train).is_some() => {}
+                    Output::Notice(notice) => {
+                        self.say(notice.clone());
                         self.hear(now, &notice);
                     }
-                    Output::Notice(notice) => self.hear_of_danger(now, notice),
                 }
             }
             self.go_on(now);
@@ -384,7 +391,7 @@ impl Dispatcher {
 }
 
 impl Machine for Dispatcher {
-    type Notice = DispatchNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.watchdog.handle_event(now, event);
@@ -396,7 +403,7 @@ impl Machine for Dispatcher {
         self.settle(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<DispatchNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         self.outputs.pop_front()
     }
 

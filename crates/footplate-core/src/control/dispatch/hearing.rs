@@ -1,16 +1,16 @@
-//! What follows from what the driver says.
+//! How the dispatcher reacts to notices of the driver.
 
 use alloc::vec::Vec;
 
-use crate::control::drive::{DriveNotice, Refusal};
+use crate::control::Notice;
+use crate::control::drive::Refusal;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::notice::DispatchNotice;
-use super::way::Way;
+use super::path::Path;
 
 /// A train that was stopped for its limit is given so many times as much room the next time, up to this many times.
 const MORE_CAUTION: f64 = 1.5;
@@ -19,17 +19,17 @@ const MOST_CAUTION: f64 = 4.0;
 const MORE: Length = Length::from_mm(60.0);
 
 impl Dispatcher {
-    /// Takes note of what the driver says.
-    pub(super) fn hear(&mut self, now: Timestamp, notice: &DriveNotice) {
+    /// Reacts to a notice of the driver or its watchdog.
+    pub(super) fn hear(&mut self, now: Timestamp, notice: &Notice) {
         match notice {
-            DriveNotice::Thrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
-            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+            Notice::TurnoutThrown { turnout, curved, .. } => self.turnout_told(now, *turnout, *curved),
+            Notice::TurnoutMismatch { turnout, curved, train } => {
                 self.turnout_shown(now, *turnout, *curved);
                 if !self.watchdog.is_in_danger(*train) {
                     self.diverged(now, *train);
                 }
             }
-            DriveNotice::Passed { train, passed, .. } => {
+            Notice::Passed { train, passed, .. } => {
                 if let Some(train) = self.trains.get_mut(train) {
                     train.seen_since_turn = true;
                     train.seen_since_start = true;
@@ -42,7 +42,7 @@ impl Dispatcher {
                     self.diverged(now, *train);
                 }
             }
-            DriveNotice::Done(finished) => {
+            Notice::Done(finished) => {
                 let Some(train) = self.trains.get(&finished.train) else { return };
                 match train.state {
                     State::Running { order, .. } if order == finished.order => {
@@ -53,7 +53,7 @@ impl Dispatcher {
                     _ => {}
                 }
             }
-            DriveNotice::GivenUp { order, train, why } => {
+            Notice::GivenUp { order, train, why } => {
                 let Some(known) = self.trains.get(train) else { return };
                 match known.state {
                     State::Running { order: running, .. } if running == *order => {
@@ -63,12 +63,12 @@ impl Dispatcher {
                     _ => {}
                 }
             }
-            DriveNotice::Lost { train } => {
+            Notice::Lost { train } => {
                 self.gives_up(*train);
                 self.set_state(*train, State::Lost);
-                self.say(DispatchNotice::HeldAsUnknown { train: *train });
+                self.say(Notice::ReservedAsUnknown { train: *train });
             }
-            _ => {}
+            other => self.hear_of_danger(now, other),
         }
     }
 
@@ -87,7 +87,7 @@ impl Dispatcher {
     /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
         // It may not even have set out.
-        if self.watchdog.driver().unseen(id, now).is_none()
+        if self.watchdog.driver().missed_sensor(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();
@@ -112,9 +112,9 @@ impl Dispatcher {
         let located = self.watchdog.driver().locate(id, now);
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
-        let (way, at) =
-            Way::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
-        let taken = self.reserved(way.reservation(layout, at - room.behind, at + ahead));
+        let (path, at) =
+            Path::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
+        let taken = self.reserved(path.reservation(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut held = taken;
@@ -135,6 +135,6 @@ impl Dispatcher {
                 _ => {}
             }
         }
-        self.say(DispatchNotice::Diverged { train: id, stopped });
+        self.say(Notice::Diverged { train: id, stopped });
     }
 }

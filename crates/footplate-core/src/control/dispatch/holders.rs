@@ -7,7 +7,7 @@ use crate::time::Timestamp;
 use crate::units::Length;
 
 use super::dispatcher::Dispatcher;
-use super::way::Way;
+use super::path::Path;
 
 /// So far beyond the end of what a train may enter its holder is looked for: two of the steps in which free track is looked
 /// for.
@@ -20,13 +20,14 @@ impl Dispatcher {
     pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
         let found = || {
             let known = self.trains.get(&train)?;
-            let limit = self.watchdog.driver().position_at(train, self.watchdog.driver().limit(train)?)?;
+            let limit =
+                self.watchdog.driver().position_at(train, self.watchdog.driver().end_of_authority(train)?)?;
             let layout = self.watchdog.driver().layout();
             let room = self.room(now, known);
             let ahead = room.ahead + BEYOND;
             let turnouts = self.watchdog.driver().turnouts();
-            let (way, at) = Way::around(layout, turnouts, limit, &known.came, Length::ZERO, ahead);
-            let taken = way.reservation(layout, at, at + ahead);
+            let (path, at) = Path::around(layout, turnouts, limit, &known.came, Length::ZERO, ahead);
+            let taken = path.reservation(layout, at, at + ahead);
             let others = self.trains.values().filter(|other| other.id != train && other.held.meets(&taken));
             Some(others.map(|other| other.id).collect())
         };

@@ -10,12 +10,12 @@ use crate::track::{Layout, NodeKind, Position, TurnoutNeed, TurnoutStates};
 use crate::units::{Length, Speed};
 
 use super::obstacles::Obstacles;
-use super::way::edge_from;
+use super::path::edge_from;
 
 /// Shorter moves are hard to make and say nothing of where a train is: it goes round or comes from the other side.
 pub(super) const SHORTEST_RUN: Length = Length::from_mm(200.0);
-/// Ways looked at beyond one turnout on which a train could turn around.
-const MOST_NECKS: usize = 8;
+/// Edges that are tried beyond one turnout for a place to reverse: to the first sensor there are at most three turnouts.
+const MOST_NECKS: usize = 16;
 
 /// How long a train takes for what.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,12 +190,15 @@ impl<'a> Search<'a> {
     fn shunt(&self, reached: &mut Reached<'_>, at: Open, needs: &[TurnoutNeed], open: &mut BinaryHeap<Open>) {
         let mut paths: Vec<(Vec<EdgeId>, NodeId, Length, f64)> =
             vec![(Vec::new(), at.node, self.clears, 0.0)];
-        let is_sure = self.is_contact(at.node) || self.is_merge(at.node);
-        // Without a contact on the way nobody knows whether it has left at all, and nothing is thrown behind it.
+        let is_merge = self.is_merge(at.node);
+        let is_sure = self.is_contact(at.node) || is_merge;
+        // A turnout is thrown behind the train only after a sensor beyond it has reported the train: one that got stuck on
+        // dirt between the last sensor and the turnout comes to rest on it without anybody noticing. To back away, any sensor
+        // on the run does: it says that the train has left.
         let is_seen = |path: &[EdgeId]| {
             path.iter().filter_map(|id| self.layout.edge(*id)).any(|edge| self.is_contact(edge.to))
         };
-        let is_seen_before = reached.run_to(at.node).is_some_and(|(edges, _)| is_seen(&edges));
+        let is_seen_before = !is_merge && reached.run_to(at.node).is_some_and(|(edges, _)| is_seen(&edges));
         let mut looked_at = 0;
         while let Some((path, node, left, cost)) = paths.pop() {
             looked_at += 1;

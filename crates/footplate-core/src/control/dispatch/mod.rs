@@ -16,17 +16,15 @@ mod holders;
 mod itinerary;
 mod journey;
 mod movement_authority;
-mod notice;
 mod obstacles;
 mod occupied_path;
 mod parking;
+mod path;
 mod reservation;
 mod route_setting;
 mod running;
 mod turnout_command;
-mod way;
 
 pub use dispatcher::Dispatcher;
 pub use journey::{Journey, TrainLengths};
-pub use notice::DispatchNotice;
 pub use reservation::{CLEARANCE, Reservation, Span};

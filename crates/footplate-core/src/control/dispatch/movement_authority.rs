@@ -9,8 +9,8 @@ use super::itinerary::Pace;
 use super::itinerary::{Itinerary, Run};
 use super::journey::TrainLengths;
 use super::occupied_path::OccupiedPath;
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
 
 /// Where a train begins to look for a way, and what it needs.
 #[derive(Debug, Clone)]
@@ -65,7 +65,7 @@ const CERTAIN: f64 = 3.3;
 pub(super) struct MovementAuthority {
     pub(super) turns: bool,
     /// From behind the train's rear end to beyond its front end when it has come to rest.
-    pub(super) way: Way,
+    pub(super) path: Path,
     /// Where its pickup is on that way, and where it shall be.
     pub(super) start: Length,
     pub(super) stop: Length,
@@ -83,7 +83,7 @@ pub(super) struct MovementAuthority {
 impl MovementAuthority {
     /// What it takes from a point on, where its rear end is.
     pub(super) fn takes_beyond(&self, layout: &Layout, from: Length) -> Reservation {
-        self.way.reservation(layout, from, self.end)
+        self.path.reservation(layout, from, self.end)
     }
 }
 
@@ -98,22 +98,22 @@ pub(super) fn granted(
     let mut runs: Vec<MovementAuthority> = Vec::new();
     for run in &itinerary.runs {
         let before = runs.last();
-        let (way, start) = way_of(layout, turnouts, run, before, begins)?;
+        let (path, start) = path_of(layout, turnouts, run, before, begins)?;
         let stop = stop_on(layout, run, start)?;
         let limit = stop + room.overrun;
         let end = limit + room.front;
-        if way.length() < end {
+        if path.length() < end {
             return None;
         }
         let begin = start - room.behind;
         // What it came over matters again only when it goes back.
-        let needs = way.needs(layout, if run.turns { begin } else { start }, end);
+        let needs = path.needs(layout, if run.turns { begin } else { start }, end);
         // What it stands on it holds already; another may hold what a doubt that has grown since would add to that.
         let taken_from = if runs.is_empty() { start } else { begin };
-        let taken = way.reservation(layout, taken_from, end);
+        let taken = path.reservation(layout, taken_from, end);
         let mut granted = MovementAuthority {
             turns: run.turns,
-            way,
+            path,
             start,
             stop,
             begin,
@@ -144,7 +144,7 @@ pub(super) fn granted(
         let lies_otherwise =
             |need: &TurnoutNeed| known().any(|known| known.turnout == need.turnout && known.leg != need.leg);
         if granted
-            .way
+            .path
             .trailed(layout, stop - room.behind - room.overrun, end)
             .any(|need| lies_otherwise(&need))
         {
@@ -168,37 +168,37 @@ fn contradicts(layout: &Layout, needs: &[TurnoutNeed]) -> bool {
 
 /// The whole way of a run and where on it the run begins. What is behind the train is what was ahead of it before it
 /// turned around.
-fn way_of(
+fn path_of(
     layout: &Layout,
     turnouts: &TurnoutStates,
     run: &Run,
     before: Option<&MovementAuthority>,
     begins: &Start,
-) -> Option<(Way, Length)> {
+) -> Option<(Path, Length)> {
     let room = begins.room;
-    let (mut way, start) = match before {
+    let (mut path, start) = match before {
         None => {
             let behind = room.behind + run.start.offset;
-            Way::around(layout, turnouts, run.start, &begins.came, behind, Length::ZERO)
+            Path::around(layout, turnouts, run.start, &begins.came, behind, Length::ZERO)
         }
         Some(before) => {
-            let mut way = Way::default();
+            let mut path = Path::default();
             let stops_on = run.start.edge.twin();
-            let beyond: Vec<_> = before.way.edges().rev().take_while(|edge| *edge != stops_on).collect();
-            beyond.iter().for_each(|edge| way.push(layout, edge.twin()));
-            let start = way.length() + run.start.offset;
-            way.push(layout, run.start.edge);
-            (way, start)
+            let beyond: Vec<_> = before.path.edges().rev().take_while(|edge| *edge != stops_on).collect();
+            beyond.iter().for_each(|edge| path.push(layout, edge.twin()));
+            let start = path.length() + run.start.offset;
+            path.push(layout, run.start.edge);
+            (path, start)
         }
     };
-    let way = {
-        way.cut_after(run.start.edge);
-        run.edges.iter().skip(1).for_each(|edge| way.push(layout, *edge));
+    let path = {
+        path.cut_after(run.start.edge);
+        run.edges.iter().skip(1).for_each(|edge| path.push(layout, *edge));
         let stop = stop_on(layout, run, start)?;
-        way.reach(layout, turnouts, stop + room.overrun + room.front);
-        way
+        path.reach(layout, turnouts, stop + room.overrun + room.front);
+        path
     };
-    Some((way, start))
+    Some((path, start))
 }
 
 /// Where a run ends on the way on which it begins at a point.
@@ -217,6 +217,6 @@ pub(super) fn standing(
     came: &OccupiedPath,
     room: ClearanceEnvelope,
 ) -> Reservation {
-    let (way, at) = Way::around(layout, turnouts, place, came, room.behind, room.ahead);
-    way.reservation(layout, at - room.behind, at + room.ahead)
+    let (path, at) = Path::around(layout, turnouts, place, came, room.behind, room.ahead);
+    path.reservation(layout, at - room.behind, at + room.ahead)
 }

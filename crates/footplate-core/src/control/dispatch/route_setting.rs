@@ -6,10 +6,12 @@ use alloc::vec::Vec;
 use crate::control::drive::{Order, Refusal};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Leg, TurnoutNeed};
+use crate::track::{Leg, NodeKind, TurnoutNeed};
+use crate::units::Length;
 
 use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
+use super::path::edge_from;
 use super::turnout_command::{SURE, TurnoutCommand};
 
 /// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
@@ -18,6 +20,14 @@ const MOVES: TimeSpan = TimeSpan::from_ms(350);
 const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 /// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
+
+/// A turnout whose unknown position leaves open where the train before it, or on it, is.
+pub(super) struct UnknownTurnout {
+    turnout: TurnoutId,
+    train: TrainId,
+    /// Whether the train is at rest before it, clear of it.
+    pub(super) is_clear: bool,
+}
 
 impl Dispatcher {
     /// Throws what the present run of a train needs; whether all of it lies right by now.
@@ -31,7 +41,17 @@ impl Dispatcher {
         let needs: Vec<TurnoutNeed> =
             run.needs.iter().filter(|need| !self.gives_way(now, train, need, &anchors)).copied().collect();
         let wanted = self.with_partners(&needs);
-        let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(|need| !self.is_sure(*need)).collect();
+        let mut frozen = anchors;
+        if !train.seen_since_start {
+            frozen.extend(train.kept.turnouts());
+        }
+        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
+        held_down.extend(&frozen);
+        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
+        // A turnout under the train stays as it is, however sure that is.
+        let stays = |need: &TurnoutNeed| held_down.contains(&need.turnout) && lies(need);
+        let is_missing = |need: &TurnoutNeed| !self.is_sure(*need) && !stays(need);
+        let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(is_missing).collect();
         if missing.is_empty() {
             let ready = ready.unwrap_or(if now == since { now } else { now + MOVES });
             if ready > now {
@@ -39,12 +59,6 @@ impl Dispatcher {
             }
             return ready <= now;
         }
-        let mut frozen = anchors;
-        if !train.seen_since_start {
-            frozen.extend(train.kept.turnouts());
-        }
-        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
-        held_down.extend(&frozen);
         if self.is_in_its_own_way(now, id, &missing, &held_down) {
             return false;
         }
@@ -147,6 +161,58 @@ impl Dispatcher {
         self.commanded
             .get(&need.turnout)
             .is_some_and(|commanded| commanded.leg == need.leg && commanded.times >= SURE)
+    }
+
+    /// Sets turnouts of unknown position that keep trains at rest from having a place: one on the hop that a train is on
+    /// leaves open which track that leads to. Straight does as well as curved.
+    ///
+    /// # Errors
+    /// A train may be on such a turnout.
+    pub(super) fn set_unknown_turnouts(&mut self, now: Timestamp) -> Result<(), Refusal> {
+        let rests = self.trains.values().filter(|train| train.rests());
+        let unknown: Vec<UnknownTurnout> =
+            rests.filter_map(|train| self.unknown_turnout_ahead(now, train.id)).collect();
+        if let Some(UnknownTurnout { turnout, train, .. }) = unknown.iter().find(|unknown| !unknown.is_clear)
+        {
+            return Err(Refusal::TurnoutUnknown { turnout: *turnout, train: *train });
+        }
+        for UnknownTurnout { turnout, train, .. } in unknown {
+            if self.is_being_thrown(now, turnout) {
+                continue;
+            }
+            self.watchdog.order(now, Order::Turnout { turnout, curved: false })?;
+            self.throwing.insert(turnout, (train, now));
+            let layout = self.watchdog.driver().layout();
+            if let Some(train) = self.trains.get_mut(&train) {
+                train.held.take_turnout(layout, turnout);
+            }
+        }
+        Ok(())
+    }
+
+    /// The first turnout of unknown position on the hop that a train is on; `None` where the train has a place, or none is
+    /// the reason that it has not.
+    pub(super) fn unknown_turnout_ahead(&self, now: Timestamp, train: TrainId) -> Option<UnknownTurnout> {
+        let driver = self.watchdog.driver();
+        let located = driver.locate(train, now).filter(|_| driver.position(train, now).is_none())?;
+        let front = located.at.way + self.room(now, self.trains.get(&train)?).ahead;
+        let (layout, turnouts) = (driver.layout(), driver.turnouts());
+        let (mut node, mut distance) = (located.at.node, Length::ZERO);
+        for _ in 0..layout.edges().len() {
+            if let NodeKind::Branch(turnout) = layout.node(node)?.kind
+                && turnouts.get(turnout).is_none()
+            {
+                return Some(UnknownTurnout {
+                    turnout,
+                    train,
+                    is_clear: located.at_rest && front < distance,
+                });
+            }
+            let edge = layout.edge(edge_from(layout, turnouts, node)?)?;
+            distance += edge.length;
+            node = edge.to;
+        }
+        None
     }
 
     /// A turnout has been told how to lie.

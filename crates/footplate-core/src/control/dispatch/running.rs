@@ -1,7 +1,8 @@
 //! Running a course, run by run: turnouts, turning around, the run itself, and rest.
 
-use crate::control::drive::THERE;
-use crate::control::drive::{Aim, DriveNotice, Order, Refusal, StopOrder};
+use crate::control::Notice;
+use crate::control::drive::AT_TARGET;
+use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, TurnoutNeed};
@@ -11,9 +12,8 @@ use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::itinerary::SHORTEST_RUN;
 use super::movement_authority::{MovementAuthority, SLACK};
-use super::notice::DispatchNotice;
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
 
 /// What could not be done is not tried again for so long.
 const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
@@ -39,11 +39,11 @@ impl Dispatcher {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed, .. } if self.watchdog.driver().stands(id, now) => {
+                State::Halting { confirmed, .. } if self.watchdog.driver().is_at_rest(id, now) => {
                     self.halted(now, id, confirmed);
                 }
                 State::Lost
-                    if self.watchdog.driver().stands(id, now)
+                    if self.watchdog.driver().is_at_rest(id, now)
                         && self.watchdog.driver().position(id, now).is_some() =>
                 {
                     self.halted(now, id, true);
@@ -51,24 +51,34 @@ impl Dispatcher {
                 State::Lost if self.watchdog.driver().position(id, now).is_some() => {
                     self.found_by_hand(now, id);
                 }
+                State::Lost if self.is_forgotten(now, id) => self.watchdog.lose(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
                 State::Resting
-                    if self.is_somewhere(id) && self.watchdog.driver().position(id, now).is_none() =>
+                    if self.is_somewhere(id)
+                        && self.watchdog.driver().position(id, now).is_none()
+                        && !self.unknown_turnout_ahead(now, id).is_some_and(|unknown| unknown.is_clear) =>
                 {
                     self.set_state(id, State::Lost);
-                    self.say(DispatchNotice::HeldAsUnknown { train: id });
+                    self.say(Notice::ReservedAsUnknown { train: id });
                 }
                 _ => {}
             }
         }
     }
 
-    /// A train was not seen where it should have been, and there is no way on which it could be found: a person has to say
-    /// where it stands.
+    /// Whether a train is lost and nothing looks for it.
+    fn is_forgotten(&self, now: Timestamp, id: TrainId) -> bool {
+        self.watchdog.is_watching()
+            && !self.watchdog.is_in_danger(id)
+            && self.watchdog.driver().locate(id, now).is_none()
+    }
+
+    /// A sensor did not report a train where it should have, and no path leads to where one could: the watchdog locates it
+    /// again; without one, a person has to say where it is.
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
         self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
-        self.say(DispatchNotice::HeldAsUnknown { train: id });
+        self.say(Notice::ReservedAsUnknown { train: id });
     }
 
     /// A train is turned around: nothing has reported it since.
@@ -117,7 +127,7 @@ impl Dispatcher {
     /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
     /// stand on another edge than was planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let turned = self.watchdog.driver().reversed_position(id, now)?;
         let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
@@ -146,13 +156,13 @@ impl Dispatcher {
         let place = self.watchdog.driver().position(id, now);
         let from = run.start - room.behind;
         let found = located.zip(place).and_then(|(located, place)| {
-            let at = run.way.find(place, from)?;
-            let limit = run.way.place(run.limit)?;
+            let at = run.path.find(place, from)?;
+            let limit = run.path.place(run.limit)?;
             let limit = self.watchdog.driver().way_point_ahead(id, located.at, limit)?;
-            let stop = run.way.place(run.stop)?;
+            let stop = run.path.place(run.stop)?;
             let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
             // The way may go round to a place at which it stands already.
-            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
@@ -165,7 +175,7 @@ impl Dispatcher {
         // Where a train only turns around or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round };
-        self.watchdog.set_limit(now, id, Some(limit));
+        self.watchdog.set_end_of_authority(now, id, Some(limit));
         let taken = self.watchdog.order(now, Order::Stop(stop));
         let retried = |_| self.watchdog.order(now, Order::Stop(StopOrder { step: None, ..stop }));
         match if step.is_some() { taken.or_else(retried) } else { taken } {
@@ -189,7 +199,7 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
             // It is not where it should be: nothing that was planned from there holds.
@@ -201,7 +211,7 @@ impl Dispatcher {
         }
         if train.course.is_empty() {
             train.state = State::Resting;
-            self.watchdog.set_limit(now, id, None);
+            self.watchdog.set_end_of_authority(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
             self.arrived(now, id, error);
         } else {
@@ -228,9 +238,9 @@ impl Dispatcher {
             train.not_before = now + AFTER_HALT;
             train.unobstructed_s = None;
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         if !is_sure {
-            self.say(DispatchNotice::HeldAsUnknown { train: id });
+            self.say(Notice::ReservedAsUnknown { train: id });
         } else if confirmed {
             self.stand(now, id);
         }
@@ -242,7 +252,7 @@ impl Dispatcher {
     fn forgive(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get_mut(&id).and_then(|train| train.last_run.take()) else { return };
         let Some(rest) = self.watchdog.driver().position(id, now) else { return };
-        let error = run.way.find(rest, run.start).map(|at| at - run.stop);
+        let error = run.path.find(rest, run.start).map(|at| at - run.stop);
         if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
             self.arrived(now, id, Some(error));
         }
@@ -254,8 +264,8 @@ impl Dispatcher {
         let Some((train, place)) = self.trains.get(&id).zip(place) else { return false };
         let room = self.room(now, train);
         let (layout, turnouts) = (self.watchdog.driver().layout(), self.watchdog.driver().turnouts());
-        let (way, at) = Way::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
-        let mut trailed = way.trailed(layout, at - room.behind, at + room.ahead);
+        let (path, at) = Path::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
+        let mut trailed = path.trailed(layout, at - room.behind, at + room.ahead);
         trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
     }
 
@@ -269,11 +279,11 @@ impl Dispatcher {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let room = self.room(now, train);
         // The way may come round to where it began.
-        let Some(at) = run.way.find(place, rear) else { return };
+        let Some(at) = run.path.find(place, rear) else { return };
         let layout = self.watchdog.driver().layout();
         // What was let go is somebody else's by now.
         let from = (at - room.behind).max(rear);
-        let mut held = self.reserved(run.way.reservation(layout, from, (at + room.ahead).min(run.end)));
+        let mut held = self.reserved(run.path.reservation(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
         let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|_| is_free) {
@@ -293,12 +303,12 @@ impl Dispatcher {
             train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         self.hold_again(now, id);
-        self.say(DispatchNotice::Withdrawn { train: id, why });
+        self.say(Notice::Withdrawn { train: id, why });
         // Whoever asked for it has to know.
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
-            self.give_up_journey(id, self.no_way(id));
+            self.give_up_journey(id, self.unreachable(id));
         }
     }
 
@@ -307,7 +317,7 @@ impl Dispatcher {
         let Some(train) = self.trains.get_mut(&id) else { return };
         train.withdrawn = 0;
         if let Some(asked) = train.asked.take() {
-            self.say(DispatchNotice::Drive(DriveNotice::GivenUp { order: asked.order, train: id, why }));
+            self.say(Notice::GivenUp { order: asked.order, train: id, why });
         }
     }
 
@@ -330,7 +340,7 @@ impl Dispatcher {
         if let Some(asked) = train.asked.take_if(|asked| Some(asked.order) == granted_for) {
             let took = now - asked.since;
             train.caution = 1.0;
-            self.say(DispatchNotice::Arrived { order: asked.order, train: id, error, took });
+            self.say(Notice::Arrived { order: asked.order, train: id, error, took });
         }
     }
 
@@ -365,9 +375,9 @@ impl Dispatcher {
         let State::Running { order, rear, .. } = train.state else { return true };
         let Some(run) = train.course.front() else { return true };
         let layout = self.watchdog.driver().layout();
-        let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
+        let Some(at) = run.path.find_node(layout, contact, rear) else { return false };
         // It may have been somebody else, or nobody.
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);

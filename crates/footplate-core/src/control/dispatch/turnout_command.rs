@@ -17,7 +17,13 @@ pub(super) struct TurnoutCommand {
 }
 
 impl TurnoutCommand {
-    /// A turnout of which somebody knows how it lies.
+    /// A turnout that is remembered to lie so, or did before a train came elsewhere: it is commanded again before it is
+    /// relied on.
+    pub(super) const fn remembered(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: 0, last: now }
+    }
+
+    /// A turnout of which a train has shown how it lies.
     pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
         Self { leg, times: SURE, last: now }
     }

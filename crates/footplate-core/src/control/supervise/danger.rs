@@ -13,9 +13,9 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::meeting::{rails, rails_within};
-use super::notice::WatchdogNotice;
 use super::recovery::{DOUBTED, Recovery};
 use super::watchdog::{Power, Watchdog};
+use crate::control::Notice;
 
 /// Trains stand this long after the power went off; they need a third of a second from top speed.
 const DEAD_AFTER: TimeSpan = TimeSpan::from_s(2.0);
@@ -51,7 +51,7 @@ impl Watchdog {
         self.dangers.insert(train, Recovery::new(now, model, why, interrupted));
         let stopped = self.hold_what_could_meet(now);
         let interrupted = interrupted.map(|(_, order)| order);
-        self.say(WatchdogNotice::Danger { train, why, stopped, interrupted });
+        self.say(Notice::Danger { train, why, stopped, interrupted });
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
@@ -60,7 +60,8 @@ impl Watchdog {
         let others: Vec<TrainId> = self.driver.trains().collect();
         let mut stopped = Vec::new();
         for other in others {
-            let moves = !self.driver.stands(other, now) || self.driver.commanded(other) > SpeedStep::STAND;
+            let moves =
+                !self.driver.is_at_rest(other, now) || self.driver.commanded(other) > SpeedStep::STAND;
             let is_known = self.dangers.contains_key(&other) || self.held.contains_key(&other);
             if moves && !is_known && self.could_meet(now, other) {
                 self.hold(now, other);
@@ -134,13 +135,13 @@ impl Watchdog {
             at.way += -(BODY + CLEAR);
             Some(at)
         });
-        self.driver.set_limit(now, train, limit);
+        self.driver.set_end_of_authority(now, train, limit);
     }
 
     /// Takes the power from the track: the last thing that stops a train.
     pub(super) fn power_off(&mut self, now: Timestamp, for_train: TrainId) {
         if self.power == Power::On {
-            self.say(WatchdogNotice::PowerOff { train: for_train });
+            self.say(Notice::PowerOff { train: for_train });
             self.cut_power(now);
         }
     }
@@ -152,7 +153,7 @@ impl Watchdog {
         // Everything stops, and decoders forget: what is commanded now is what they hear when they have power again.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
-            let moved = !self.driver.stands(train, now);
+            let moved = !self.driver.is_at_rest(train, now);
             let located = self.driver.locate(train, now);
             if moved && !self.dangers.contains_key(&train) && !self.held.contains_key(&train) {
                 let order = self.standing.remove(&train);
@@ -174,7 +175,7 @@ impl Watchdog {
         if now - since >= DEAD_AFTER && commanded && !self.is_silent() && !self.is_switched_off {
             self.power = Power::On;
             self.command(Command::PowerOn);
-            self.say(WatchdogNotice::PowerOn);
+            self.say(Notice::PowerOn);
         }
     }
 

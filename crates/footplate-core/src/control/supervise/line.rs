@@ -34,7 +34,8 @@ impl Watchdog {
                 self.silent = Some(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
-                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.stands(train, now) {
+                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now)
+                    {
                         self.raise(now, train, Alarm::LinkSilent);
                     }
                 }

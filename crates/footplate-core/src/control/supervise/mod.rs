@@ -22,7 +22,6 @@ mod consistency_monitor;
 mod danger;
 mod line;
 mod meeting;
-mod notice;
 mod recovery;
 mod remeasuring;
 mod stops;
@@ -31,5 +30,4 @@ mod watchdog;
 
 pub use alarm::Alarm;
 pub use line::LinkNews;
-pub use notice::{Outcome, WatchdogNotice};
 pub use watchdog::Watchdog;

@@ -12,9 +12,9 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::notice::{Outcome, WatchdogNotice};
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
+use crate::control::{Notice, Outcome};
 
 /// How far a train may be off its model in speed and stops until it has been measured again, as ln: engines differ by up to
 /// a half in the middle of their speeds, but at the step where one of them barely crawls another runs three times as fast.
@@ -184,7 +184,7 @@ impl Watchdog {
         if !self.permits_all && !self.permitted.remove(&train) {
             if !asked {
                 self.set_phase(train, Phase::Waiting { asked: true }, now);
-                self.say(WatchdogNotice::AsksToCrawl { train });
+                self.say(Notice::AsksToCreep { train });
             }
             return;
         }
@@ -196,7 +196,7 @@ impl Watchdog {
             None => self.driver.lose(now, train),
         }
         self.keep_clear(now, train);
-        self.say(WatchdogNotice::Crawls { train, step: crawl });
+        self.say(Notice::Creeps { train, step: crawl });
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.by = now + FOUND_WITHIN;
         }
@@ -246,8 +246,8 @@ impl Watchdog {
             Phase::Crawling { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
                 // Two contacts that follow each other say which way it runs.
-                if self.driver.felt_hop(train, seen, node).is_some() {
-                    self.say(WatchdogNotice::Found { train });
+                if self.driver.hop_length(train, seen, node).is_some() {
+                    self.say(Notice::Located { train });
                     self.measure(now, train);
                 } else {
                     self.crawl(now, train, step, Some(node));
@@ -257,7 +257,7 @@ impl Watchdog {
                 recovery.phase = Phase::Crawling { step, pushed: now, seen: Some(node) };
             }
             Phase::Measuring { mut trial, from } => {
-                let hop = trial.last().and_then(|last| self.driver.felt_hop(train, last, node));
+                let hop = trial.last().and_then(|last| self.driver.hop_length(train, last, node));
                 trial.pass(node, passed.window, hop);
                 recovery.phase = Phase::Measuring { trial, from };
                 if trial.is_over() {
@@ -265,7 +265,7 @@ impl Watchdog {
                     let ratio = trial.ratio(&recovery.base);
                     recovery.ratios.extend(ratio);
                     if let Some(MeasuredRatio { step, ratio, deviation }) = ratio {
-                        self.say(WatchdogNotice::Measured { train, step, ratio, deviation });
+                        self.say(Notice::SpeedMeasured { train, step, ratio, deviation });
                     }
                     self.measure(now, train);
                 }
@@ -351,7 +351,7 @@ impl Watchdog {
         recovery.phase = Phase::Turning { step };
         recovery.by = now + STANDS_WITHIN;
         // Behind it is where it came from.
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         self.issue(now, Order::Reverse { train, then: step });
     }
 
@@ -374,11 +374,11 @@ impl Watchdog {
     /// It stands and is known again.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         if let Some(monitor) = self.monitors.get_mut(&train) {
             monitor.place();
         }
-        self.say(WatchdogNotice::Recovered { train, outcome, took: now - recovery.began });
+        self.say(Notice::Recovered { train, outcome, took: now - recovery.began });
         if self.dangers.is_empty() {
             let held = core::mem::take(&mut self.held);
             let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));
@@ -397,8 +397,8 @@ impl Watchdog {
         let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
         let resumed = if can_go_on { self.order(now, order).ok() } else { None };
         match resumed {
-            Some(order) => self.say(WatchdogNotice::Resumed { train, interrupted: Some(id), order }),
-            None => self.say(WatchdogNotice::Dropped { train, order }),
+            Some(order) => self.say(Notice::Resumed { train, interrupted: Some(id), order }),
+            None => self.say(Notice::Cancelled { train, order }),
         }
     }
 
@@ -416,9 +416,9 @@ impl Watchdog {
         };
         recovery.phase = Phase::GivenUp;
         let order = recovery.interrupted.take();
-        self.say(WatchdogNotice::NeedsPerson { train, while_it });
+        self.say(Notice::NeedsOperator { train, while_it });
         if let Some((_, order)) = order {
-            self.say(WatchdogNotice::Dropped { train, order });
+            self.say(Notice::Cancelled { train, order });
         }
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }

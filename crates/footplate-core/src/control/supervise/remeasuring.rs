@@ -12,10 +12,10 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::notice::{Outcome, WatchdogNotice};
 use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
+use crate::control::{Notice, Outcome};
 
 /// A ratio no further from 1 than this is none: what a run differs from the next, three times.
 const SAME: f64 = 0.02;
@@ -124,7 +124,7 @@ impl Watchdog {
         let seen = passed.short.zip(passed.late).zip(speed).filter(|_| passed.missed == 0);
         let Some(((short, [_, uncertain]), speed)) = seen else { return self.end_rescaled(now, train) };
         let deviation = (speed * uncertain).max(Length::from_mm(1.0));
-        self.say(WatchdogNotice::StopChecked { train, beyond: short, deviation });
+        self.say(Notice::StopChecked { train, beyond: short, deviation });
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         if short.abs() > deviation * ANOTHER_STOP {
             return self.next_lesson(now, train);

@@ -3,7 +3,7 @@
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
-use crate::control::drive::{DriveNotice, Driver, Order, OrderId, Refusal};
+use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
 use crate::ids::{SpeedStep, TrainId};
@@ -15,9 +15,9 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::consistency_monitor::ConsistencyMonitor;
-use super::notice::WatchdogNotice;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
+use crate::control::Notice;
 
 /// Times to rest are foreseen to this part, ...
 const REST_PART: f64 = 1.3;
@@ -37,7 +37,7 @@ pub(super) enum Power {
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     pub(super) driver: Driver,
-    queue: VecDeque<Output<WatchdogNotice>>,
+    queue: VecDeque<Output<Notice>>,
     pub(super) monitors: BTreeMap<TrainId, ConsistencyMonitor>,
     pub(super) stops: Stops,
     pub(super) power: Power,
@@ -132,10 +132,10 @@ impl Watchdog {
         }
     }
 
-    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
         if !self.dangers.contains_key(&train) {
-            self.driver.set_limit(now, train, limit);
+            self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
         }
     }
@@ -152,17 +152,27 @@ impl Watchdog {
             // A hand was at the track: nothing that waited sets off by itself.
             for (train, order) in core::mem::take(&mut self.held) {
                 if let Some((_, order)) = order {
-                    self.say(WatchdogNotice::Dropped { train, order });
+                    self.say(Notice::Cancelled { train, order });
                 }
             }
         }
         self.drain(now);
     }
 
-    /// See [`Driver::lose`].
+    /// The place of a train was wrong: it is unknown from now on. A watched train is stopped and located again.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.driver.lose(now, train);
+        self.lost(now, train);
         self.drain(now);
+    }
+
+    fn lost(&mut self, now: Timestamp, train: TrainId) {
+        self.monitors.entry(train).or_default().lose();
+        if self.dangers.get(&train).is_some_and(Recovery::is_active) {
+            self.recovering_lost(now, train);
+        } else {
+            self.raise(now, train, Alarm::Lost);
+        }
     }
 
     /// See [`Driver::count_from_behind`].
@@ -277,7 +287,7 @@ impl Watchdog {
         Some(id)
     }
 
-    pub(super) fn say(&mut self, notice: WatchdogNotice) {
+    pub(super) fn say(&mut self, notice: Notice) {
         self.queue.push_back(Output::Notice(notice));
     }
 
@@ -332,24 +342,18 @@ impl Watchdog {
         }
     }
 
-    fn hear(&mut self, now: Timestamp, notice: DriveNotice) {
+    fn hear(&mut self, now: Timestamp, notice: Notice) {
         match &notice {
-            DriveNotice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
-            DriveNotice::Lost { train } => {
-                self.monitors.entry(*train).or_default().lose();
+            Notice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
+            Notice::Lost { train } => {
                 let train = *train;
-                self.say(WatchdogNotice::Drive(notice));
-                if self.dangers.get(&train).is_some_and(Recovery::is_active) {
-                    self.recovering_lost(now, train);
-                } else {
-                    self.raise(now, train, Alarm::Lost);
-                }
-                return;
+                self.say(notice);
+                return self.lost(now, train);
             }
-            DriveNotice::Unexplained { sensor, .. } if self.is_watching => {
+            Notice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_stand(*train, now)
-                        && self.driver.contact_ahead(*train, now) == Some(*sensor)
+                        && self.driver.sensor_ahead(*train, now) == Some(*sensor)
                 };
                 let stray = self.driver.trains().find(stray);
                 if let Some(train) = stray {
@@ -357,7 +361,7 @@ impl Watchdog {
                     self.power_off(now, train);
                 }
             }
-            DriveNotice::Done(finished) => {
+            Notice::Done(finished) => {
                 if self.own.remove(&finished.order).is_some() {
                     return self.recovering_done(now, finished.train, finished.order, None);
                 }
@@ -378,7 +382,7 @@ impl Watchdog {
                     self.standing.remove(&finished.train);
                 }
             }
-            DriveNotice::GivenUp { order, train, why } => {
+            Notice::GivenUp { order, train, why } => {
                 if self.own.remove(order).is_some() {
                     return self.recovering_done(now, *train, *order, Some(why));
                 }
@@ -388,21 +392,21 @@ impl Watchdog {
                 }
                 self.standing.remove(train);
             }
-            DriveNotice::Replaced { order, train }
+            Notice::Replaced { order, train }
                 if self.own.contains_key(order) || self.resumes() && self.is_held(*train) =>
             {
                 self.own.remove(order);
                 return;
             }
-            DriveNotice::Planned(planned) if self.own.contains_key(&planned.order) => return,
-            DriveNotice::TrackEnds { train, .. } | DriveNotice::AtLimit { train } => {
+            Notice::Planned(planned) if self.own.contains_key(&planned.order) => return,
+            Notice::TrackEnds { train, .. } | Notice::AuthorityEnds { train } => {
                 let train = *train;
                 self.standing.remove(&train);
                 self.recovering_blocked(now, train);
             }
             _ => {}
         }
-        self.say(WatchdogNotice::Drive(notice));
+        self.say(notice);
     }
 
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
@@ -427,7 +431,8 @@ impl Watchdog {
         self.permits_all && self.is_watching
     }
 
-    pub(super) const fn is_watching(&self) -> bool {
+    /// Whether it brings back trains that are not as they were.
+    pub(in crate::control) const fn is_watching(&self) -> bool {
         self.is_watching
     }
 
@@ -444,7 +449,7 @@ impl Watchdog {
 }
 
 impl Machine for Watchdog {
-    type Notice = WatchdogNotice;
+    type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         if let EventKind::Speed { train, step } = event.kind {
@@ -466,7 +471,7 @@ impl Machine for Watchdog {
         self.act(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<WatchdogNotice>> {
+    fn poll_output(&mut self) -> Option<Output<Notice>> {
         self.queue.pop_front()
     }
 

@@ -6,6 +6,7 @@ use super::filters::{Filters, Pool};
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
+use super::reach::Reach;
 use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
 use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
@@ -84,6 +85,10 @@ pub(in super::super) struct Bank {
     pub(super) side: f64,
     /// Whether each wheel has been turned up to the speed of the train.
     pub(super) touches: [Touch; 2],
+    /// Time since one of them was (s).
+    pub(super) since_touch: f64,
+    /// How far the train may be from wheels that lost the rail together.
+    reach: Reach,
     /// What came out of the last period.
     speed: f64,
     acceleration: f64,
@@ -109,6 +114,8 @@ impl Bank {
             acted: 0.0,
             side: 1.0,
             touches: [Touch::new(); 2],
+            since_touch: f64::INFINITY,
+            reach: Reach::new(),
             speed,
             acceleration: 0.0,
             variance,
@@ -138,6 +145,7 @@ impl Bank {
         self.acceleration = -self.acceleration;
         self.trend = -self.trend;
         self.wheels_a = -self.wheels_a;
+        self.reach.reverse();
     }
 
     /// Takes in a period of `t` seconds; how far the train went (m).
@@ -160,8 +168,22 @@ impl Bank {
     }
 
     /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
-    pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        interval(&self.probability, &self.filters, &self.ways, scene, risk, t)
+    pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+        let [likely, way] = interval(&self.probability, &self.filters, &self.ways, scene, risk, t);
+        let wheels = self.compared(scene);
+        let speed = self.reach.widen(
+            likely,
+            scene,
+            &wheels,
+            self.probability.0,
+            (self.since_touch, self.wheels_a),
+            t,
+        );
+        let way = Range {
+            low: way.low + (speed.low - likely.low) * t,
+            high: way.high + (speed.high - likely.high) * t,
+        };
+        [speed, way]
     }
 
     /// Which way wheels that lose their grip turn.
@@ -179,7 +201,7 @@ impl Bank {
         }
     }
 
-    /// Whether both wheels slip, the way they were let to, and have not come back to the train.
+    /// Whether both wheels slip, the way they were let to, and one of them has not come back to the train.
     fn is_away(&self, scene: &Scene) -> bool {
         let [.., slip, creep, _, _, _] = self.probability.0;
         let may = if self.side > 0.0 { scene.slide } else { scene.slip };
@@ -188,7 +210,7 @@ impl Bank {
             self.side * (train - wheel.speed) > AWAY + AWAY_PART * train.abs()
                 || self.side * wheel.acceleration > RETURNS
         };
-        may && slip + creep > 0.5 && scene.wheels.iter().all(away)
+        may && slip + creep > 0.5 && scene.wheels.iter().any(away)
     }
 
     /// The wheels with the ratio of their diameters taken out.
@@ -220,13 +242,13 @@ impl Bank {
         pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
         let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
         let lost = self.lost(scene, wheels, &pool);
-        let found = if lost > 0.0 { BOTH_ROLL * LOST + NOT_ROLLING } else { Lanes::all(1.0) };
+        let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
         let arrives = after_rolling * rolling + after_others * others * found;
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
         self.filters.mix(&pool, share);
-        self.filters.pvv += BOTH_ROLL * share * lost;
+        self.filters.pvv += share * lost;
         self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
         self.probability = next * (1.0 / next.sum());
         // A train at rest stays there.
@@ -238,17 +260,34 @@ impl Bank {
         *paa = *paa * MOVES + STANDS * AT_REST;
     }
 
-    /// Where wheels turn alike at quite another speed than a slide was thought to have, the slide may have been lost, and
-    /// they roll. By how much the variance of the train has to grow for that (m²/s²), so that the leap is paid for once.
-    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> f64 {
-        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
-        let [.., slip, _, _, _, _] = self.probability.0;
-        let leap = (0.5 * (one.speed + other.speed) - pool.v).abs();
+    /// By how much the variance of the train grows (m²/s²) for each hypothesis that begins with a leap of its speed, so that
+    /// the leap is paid for once.
+    ///
+    /// A slide may have been lost where wheels turn alike at quite another speed than it was thought to have: they roll. A
+    /// sensor that was taken for dead may be the one that is right: its wheel rolls, and the other slips or is dead.
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
+        let [.., slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
-        // Less can be wheels that creep alike.
-        let far = larger(FAR * libm::sqrt(pool.pvv + one.variance), most + part * pool.v.abs());
-        // Spinning wheels do turn alike.
-        if self.side > 0.0 && turn && slip > 0.9 && leap > far { leap * leap } else { 0.0 }
+        let leap = |speed: f64, variance: f64, least: f64| {
+            let leap = (speed - pool.v).abs();
+            let far = larger(FAR * libm::sqrt(pool.pvv + variance), least);
+            if leap > far { leap * leap } else { 0.0 }
+        };
+        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
+        // Less can be wheels that creep alike, and spinning wheels do turn alike.
+        let alike = if self.side > 0.0 && turn && slip > 0.9 {
+            leap(0.5 * (one.speed + other.speed), one.variance, most + part * pool.v.abs())
+        } else {
+            0.0
+        };
+        let of_wheel = |wheel: &WheelScene, compared: &Compared| {
+            let counts = wheel.read && !wheel.stuck && wheel.speed.abs() > SILENT;
+            if counts { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
+        };
+        let [first, second] = &scene.wheels;
+        let of_first = if first_dead > 0.9 { of_wheel(first, one) } else { 0.0 };
+        let of_second = if second_dead > 0.9 { of_wheel(second, other) } else { 0.0 };
+        Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
     }
 
     /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have

@@ -91,7 +91,9 @@ pub(super) fn evidence(
     let (one, other) = (of(first, a), of(second, b));
     let [both, first_slips, second_slips, slip, creep, stands, first_dead, second_dead] =
         array::from_fn(|lane| filters.state(lane));
-    let turned = larger(first.counted.abs() / first.pitch, second.counted.abs() / second.pitch);
+    // A count that is stuck says nothing of a train at rest.
+    let turned = |wheel: &WheelScene| if wheel.stuck { 0.0 } else { wheel.counted.abs() / wheel.pitch };
+    let turned = larger(turned(first), turned(second));
     let shaken = larger(turned - SHAKEN, 0.0) * TURNS;
     let of_wheels = Lanes([
         one.rolls(&both) + other.rolls(&both),
@@ -99,7 +101,7 @@ pub(super) fn evidence(
         one.rolls(&second_slips) + other.slips(&second_slips),
         one.slips(&slip) + other.slips(&slip),
         alike(&one, &other, &creep, wheels_a),
-        one.rolls(&stands) + other.rolls(&stands) - shaken,
+        one.rests(&stands) + other.rests(&stands) - shaken,
         one.dead() + other.rolls(&first_dead),
         one.rolls(&second_dead) + other.dead(),
     ]);
@@ -148,6 +150,11 @@ impl Shown<'_> {
         let speed = unusual(y * y / (train.pvv + compared.variance + creep * creep));
         let stuck = if wheel.stuck { STUCK } else { 0.0 };
         -0.5 * self.followed * (speed + self.unsteady(train)) - stuck * self.t
+    }
+
+    /// It rests with the train.
+    fn rests(&self, train: &State) -> f64 {
+        if self.wheel.stuck { 0.0 } else { self.rolls(train) }
     }
 
     /// By how much its acceleration is unlike that of the train.

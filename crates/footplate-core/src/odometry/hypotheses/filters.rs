@@ -9,6 +9,8 @@ use super::lanes::Lanes;
 const PLACE: (f64, f64) = (1e-10, 1e2);
 const SPEED: (f64, f64) = (1e-8, 1e4);
 const ACCELERATION: (f64, f64) = (1e-8, 4.0);
+/// No train accelerates more (m/s²), nor does a wheel of one that rolls.
+const STRONGEST: f64 = 10.0;
 
 /// State and covariance of every hypothesis.
 #[derive(Debug, Clone, Copy)]
@@ -186,13 +188,22 @@ impl Filters {
         self.pra *= kept;
     }
 
-    /// Keeps every variance positive and finite.
+    /// Keeps every variance positive and finite, and every covariance one that these variances can have.
+    ///
+    /// A variance that is cut to its limit takes its covariances with it by the same factor: the matrix stays positive
+    /// definite. Cut alone, it would turn gains around, and the filter would diverge.
     #[inline]
     pub(super) fn keep_sound(&mut self) {
+        let cut = |lanes: Lanes, (_, most): (f64, f64)| (lanes.inverse() * most).at_least(0.0).at_most(1.0);
         let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
+        let (of_r, of_v, of_a) = (cut(self.prr, PLACE), cut(self.pvv, SPEED), cut(self.paa, ACCELERATION));
+        self.prv *= of_r * of_v;
+        self.pra *= of_r * of_a;
+        self.pva *= of_v * of_a;
         self.prr = within(self.prr, PLACE);
         self.pvv = within(self.pvv, SPEED);
         self.paa = within(self.paa, ACCELERATION);
+        self.a = self.a.at_least(-STRONGEST).at_most(STRONGEST);
     }
 
     /// The train has turned round.

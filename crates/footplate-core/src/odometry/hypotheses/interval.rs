@@ -11,7 +11,7 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// The diameters are not off by their whole tolerance both at once; this part holds 99.99 % of two that are even over it.
 const TOLERANCE: f64 = 0.993;
 /// Creepage of rolling wheels under full effort (part of the speed).
-const CREEPAGE: f64 = 0.012;
+const CREEPAGE: f64 = 0.005;
 /// Hypotheses in which no wheel tells the speed.
 const COASTS: [bool; 8] = [false, false, false, true, true, false, false, false];
 

@@ -11,6 +11,7 @@ mod filters;
 mod interval;
 mod lanes;
 mod rates;
+mod reach;
 mod scene;
 mod slides;
 mod touch;

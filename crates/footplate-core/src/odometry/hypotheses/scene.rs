@@ -5,8 +5,9 @@ use crate::odometry::wheels::Range;
 /// One wheelset in one period, in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct WheelScene {
-    /// How far it turned (m).
+    /// How far it turned (m), and how much of that was not read in the period.
     pub(in super::super) counted: f64,
+    pub(in super::super) late: f64,
     /// Its count was read.
     pub(in super::super) read: bool,
     /// Its count has stood still, not at zero, for longer than that of a wheel does beside one whose count moves.

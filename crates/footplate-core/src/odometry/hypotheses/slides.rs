@@ -5,7 +5,7 @@
 use super::bank::Bank;
 use super::evidence::{CREEP, Compared, SILENT};
 use super::filters::State;
-use super::scene::Scene;
+use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
 /// The hypotheses in which both wheels slip, each in its own manner and alike.
@@ -77,10 +77,12 @@ impl Bank {
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
         let scales = self.scales(scene);
+        self.since_touch += t;
         for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
-            let speed = touch.follow(wheel.counted * scale / t, train.a, t);
+            let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
             let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
-            if !wheel.read || speed.abs() < SILENT {
+            self.since_touch = if has_reached { 0.0 } else { self.since_touch };
+            if !wheel.read || wheel.stuck || speed.abs() < SILENT {
                 continue;
             }
             let y = speed - train.v;
@@ -96,7 +98,8 @@ impl Bank {
 /// Wheels that creep alike creep by what they can, and accelerate with the train.
 fn creep_alike(train: &mut State, scene: &Scene, [a, b]: &[Compared; 2], side: f64, t: f64) {
     let [first, second] = &scene.wheels;
-    let nearest = match (first.read, second.read) {
+    let tells = |wheel: &WheelScene| wheel.read && !wheel.stuck;
+    let nearest = match (tells(first), tells(second)) {
         (true, true) => side * larger(side * a.speed, side * b.speed),
         (false, true) => b.speed,
         (true, false) => a.speed,

@@ -34,6 +34,8 @@ pub struct Turn {
     pub quality: Quality,
     /// By how many pulses it may be wrong, beyond the one that every count may be.
     pub doubt: f64,
+    /// Those of its pulses that were not read in the period: they belong to the one before, or are only expected.
+    pub late: f64,
 }
 
 /// What the tachometer is expected to say, in signed pulses of the period.
@@ -73,6 +75,9 @@ pub struct Tachometer {
     unread: f64,
     /// What was taken away from the last sample as a spike.
     withheld: f64,
+    /// The last sample surprised and was passed on: the next is no spike, whatever it says. Withheld again, it would feed
+    /// the expectation that it surprised.
+    passes: bool,
     /// The sensor is wired the wrong way round: 1 or −1.
     wiring: f64,
     contradictions: u32,
@@ -91,6 +96,7 @@ impl Tachometer {
             assumed: 0.0,
             unread: 0.0,
             withheld: 0.0,
+            passes: false,
             wiring: 1.0,
             contradictions: 0,
             last_way: 0.0,
@@ -115,13 +121,23 @@ impl Tachometer {
                 self.assumed += expected.pulses;
                 self.unread += periods;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
             Increment::Restarted => {
                 self.assumed = 0.0;
                 self.unread = 0.0;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
         };
         self.assumed = 0.0;
@@ -129,21 +145,27 @@ impl Tachometer {
         let surprise = pulses - expected.pulses;
         if surprise <= expected.more && surprise >= -expected.fewer {
             self.withheld = 0.0;
+            self.passes = false;
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
             let unusual =
                 if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
             let either_way = self.turned_round || heading.disputed;
             let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
-            return Turn { pulses, quality, doubt };
+            return Turn { pulses, quality, doubt, late: 0.0 };
         }
-        if self.withheld * surprise > 0.0 {
-            let believed = pulses + self.withheld;
+        if self.passes || self.withheld * surprise > 0.0 {
+            let late = self.withheld;
             self.withheld = 0.0;
-            return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
+            self.passes = true;
+            let doubt = surprise.abs() + 1.0;
+            return Turn { pulses: pulses + late, quality: Quality::Ok, doubt, late };
         }
         let stand_in = libm::round(expected.pulses);
         self.withheld = pulses - stand_in;
-        Turn { pulses: stand_in, quality: Quality::Substituted, doubt: expected.more.max(expected.fewer) }
+        let doubt = expected.more.max(expected.fewer);
+        // A stand-in that is larger than what was read may be an expectation that ran ahead.
+        let late = if self.withheld * heading.way < 0.0 { -self.withheld } else { 0.0 };
+        Turn { pulses: stand_in, quality: Quality::Substituted, doubt, late }
     }
 
     /// Signed pulses since the last reading, if they can be a count.

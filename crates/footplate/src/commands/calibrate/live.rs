@@ -19,7 +19,7 @@ use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
-use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};
+use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -32,7 +32,7 @@ use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{ServedAt, Showing};
+use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
@@ -111,6 +111,7 @@ impl Session<'_> {
         let pace = if self.serve.is_some() { Speed::Times(1.0) } else { Speed::Unpaced };
         match self.link {
             Address::Simulated(simulated) => {
+                self.check_store()?;
                 let mut link = open_simulated(simulated, &real, pace)?;
                 // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
                 for other in simulated.trains.iter().filter(|other| **other != self.train) {
@@ -119,15 +120,26 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
                 let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
                 let opened = store.as_ref().map(stop).transpose()?.flatten();
                 drop(store);
+                self.check_store()?;
                 let link = opened.map_or_else(|| open(self.link, &real, pace), Ok)?;
                 self.drive(&written, link, output)
             }
         }
+    }
+
+    /// Nothing is written to a damaged store: it would bury what can still be salvaged.
+    fn check_store(&self) -> anyhow::Result<()> {
+        let Some(path) = self.store.filter(|path| path.exists()) else { return Ok(()) };
+        Ok(Store::open(path)?.check()?)
     }
 
     fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -135,7 +147,8 @@ impl Session<'_> {
         let store = || self.store.map(Path::to_path_buf);
         let dashboard = self.serve.map(|at| open_dashboard(at, on, store())).transpose()?;
         let link = ObservedLink::new(link, dashboard.as_ref().map(|dashboard| Arc::clone(&dashboard.line)));
-        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, link.now()));
+        let showing =
+            dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
         let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
         let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
@@ -231,7 +244,7 @@ impl Session<'_> {
             replay.runs, self.train
         );
         let mut fit = replay.fit;
-        if let KeptModel::Model(model) = KeptModel::of_store(layout, &store, self.train, now())? {
+        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())? {
             // Which steps do not move it follows from what was tried, not from the events alone.
             let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
             for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {

@@ -1,7 +1,7 @@
-//! Notices of the driver and the dispatcher as people read them.
+//! Formats the notices of driver, watchdog and dispatcher as one line of text each.
 
 use footplate_core::control::{
-    DispatchNotice, DriveNotice, Driver, Finished, Order, PlannedArrival, PlannedStop, Refusal,
+    Driver, Finished, Notice, Order, Outcome, PlannedArrival, PlannedStop, Refusal,
 };
 use footplate_core::track::Landmark;
 use footplate_core::tracking::{DueContact, PassedContact};
@@ -9,7 +9,7 @@ use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
 
-/// Knows the names of things.
+/// Formats notices with the names of the layout and with times since the session began.
 pub(in crate::commands) struct NoticeFormatter<'d> {
     pub(in crate::commands) driver: &'d Driver,
     pub(in crate::commands) began: Timestamp,
@@ -47,14 +47,14 @@ impl NoticeFormatter<'_> {
         format!("{:9.3} s", (time - self.began).as_s())
     }
 
-    /// A place to the millimetre.
+    /// A place as sensor and offset, rounded to a millimetre.
     pub(super) fn place(&self, at: Landmark) -> String {
         let name = self.driver.layout().node_name(at.node);
         let mm = at.offset.as_mm().round();
         if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") }
     }
 
-    /// One line on where a train is.
+    /// Position and speed of a train, with 95 % intervals.
     pub(super) fn whereabouts(&self, train: TrainId, now: Timestamp) -> String {
         let Some(located) = self.driver.locate(train, now) else {
             return format!("train {train}: position unknown; run it over a sensor first");
@@ -64,14 +64,14 @@ impl NoticeFormatter<'_> {
         let moves = if located.at_rest {
             "at rest".to_owned()
         } else {
-            let (speed, doubt) =
+            let (speed, half_speed) =
                 (located.speed.as_mm_per_s(), HALF_95 * located.speed_uncertainty.as_mm_per_s());
-            format!("{speed:.0} \u{b1} {doubt:.0} mm/s at step {}", located.step)
+            format!("{speed:.0} \u{b1} {half_speed:.0} mm/s at step {}", located.step)
         };
         format!("train {train}: {place} \u{b1} {half:.0} mm (95 %), {moves}")
     }
 
-    /// Where all trains are, for a line that is looked at while something else is written.
+    /// Position and speed of all trains in one short line, for the line above the prompt.
     pub(super) fn status(&self, now: Timestamp) -> String {
         let train = |train: TrainId| {
             let Some(located) = self.driver.locate(train, now) else { return format!("{train} ?") };
@@ -83,62 +83,62 @@ impl NoticeFormatter<'_> {
         self.driver.trains().map(train).collect::<Vec<_>>().join(", ")
     }
 
-    /// A notice as one line, if there is anything to say.
-    pub(in crate::commands) fn line(&self, notice: &DriveNotice) -> Option<String> {
+    /// A notice as one line; `None` if another notice or the result of the order already says it.
+    pub(in crate::commands) fn line(&self, notice: &Notice) -> Option<String> {
         Some(match notice {
-            DriveNotice::Passed { train, passed, next } => self.passed(*train, passed, next.as_ref()),
-            DriveNotice::Planned(plan) => self.planned(plan),
-            DriveNotice::Overshoots { train, by, .. } => {
+            Notice::Passed { train, passed, next } => self.passed(*train, passed, next.as_ref()),
+            Notice::Planned(plan) => self.planned(plan),
+            Notice::Overshoots { train, by, .. } => {
                 format!(
                     "train {train} comes to rest about {:.0} mm beyond the target: it was closer than \
                      estimated",
                     by.as_mm()
                 )
             }
-            DriveNotice::Paced(line) => format!(
+            Notice::Paced(line) => format!(
                 "{}  train {} holds {:.0} mm/s from here on",
                 self.at(line.time),
                 line.train,
                 line.speed.as_mm_per_s()
             ),
-            DriveNotice::Arrives(plan) => self.arrives(plan),
-            DriveNotice::HeldBack { train, leader, .. } => {
+            Notice::Arrives(plan) => self.arrives(plan),
+            Notice::HeldBack { train, leader, .. } => {
                 format!(
                     "train {train} is held back: it would come too close to train {leader}, or the \
                      position of that train is unknown"
                 )
             }
-            DriveNotice::Restrained { train, step, zone, limit } => format!(
+            Notice::SpeedLimited { train, step, zone, limit } => format!(
                 "train {train} runs at step {step}: zone {zone} allows {:.0} mm/s",
                 limit.as_mm_per_s()
             ),
-            DriveNotice::Done(finished) => self.done(finished)?,
-            DriveNotice::Thrown { turnout, curved, .. } => {
+            Notice::Done(finished) => self.done(finished)?,
+            Notice::TurnoutThrown { turnout, curved, .. } => {
                 format!("turnout {turnout} set {}", leg(*curved))
             }
-            DriveNotice::TurnoutLiesOtherwise { turnout, curved, train } => {
+            Notice::TurnoutMismatch { turnout, curved, train } => {
                 format!("turnout {turnout} is {}: train {train} took that leg", leg(*curved))
             }
-            DriveNotice::Overdue { train, sensor, by } => format!(
+            Notice::Overdue { train, sensor, by } => format!(
                 "train {train} should have passed {} {:.1} s ago: a missed detection, or the train has \
                  stopped",
                 self.sensor(*sensor),
                 by.as_s()
             ),
-            DriveNotice::TrackEnds { train, end } => {
+            Notice::TrackEnds { train, end } => {
                 let end = self.driver.layout().node_name(*end);
                 format!("train {train} stopped: the track ends at {end}")
             }
-            DriveNotice::AtLimit { train } => {
+            Notice::AuthorityEnds { train } => {
                 format!("train {train} stopped: the track ahead is not reserved for it")
             }
-            DriveNotice::Lost { train } => {
+            Notice::Lost { train } => {
                 format!(
                     "position of train {train} lost, train stopped: check the train, then run it \
                          over a sensor"
                 )
             }
-            DriveNotice::Ambiguous { sensor, time, likeliest, or } => {
+            Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let or = or.map_or_else(|| "by no train at all".into(), |other| format!("by train {other}"));
                 format!(
                     "{}  {} was reported by train {likeliest} or {or}: the next reports decide",
@@ -146,30 +146,22 @@ impl NoticeFormatter<'_> {
                     self.sensor(*sensor)
                 )
             }
-            DriveNotice::ContactStuck { sensor } => format!(
+            Notice::SensorStuck { sensor } => format!(
                 "{} reports repeatedly where no train can be: it is ignored until it behaves",
                 self.sensor(*sensor)
             ),
-            DriveNotice::ContactBehaves { sensor } => {
+            Notice::SensorRestored { sensor } => {
                 format!("{} has behaved for a while and is used again", self.sensor(*sensor))
             }
-            DriveNotice::Unexplained { sensor, time } => format!(
+            Notice::Unexplained { sensor, time } => format!(
                 "{}  {} reported, but no train can have been there",
                 self.at(*time),
                 self.sensor(*sensor)
             ),
-            DriveNotice::Unconfirmed { command } => format!("not confirmed as sent: {command}"),
-            // Whoever replaced it knows; what was given up is said with the order it was.
-            DriveNotice::Replaced { .. } | DriveNotice::GivenUp { .. } => return None,
-        })
-    }
-
-    /// What the dispatcher has to say, if people want to know.
-    pub(super) fn dispatched(&self, notice: &DispatchNotice) -> Option<String> {
-        Some(match notice {
-            DispatchNotice::Drive(notice) => return self.line(notice),
-            DispatchNotice::Watch(notice) => notice.to_string(),
-            DispatchNotice::RouteSet { train, takes, turns } => {
+            Notice::Unconfirmed { command } => format!("not confirmed as sent: {command}"),
+            // The result of the order says both.
+            Notice::Replaced { .. } | Notice::GivenUp { .. } => return None,
+            Notice::RouteSet { train, takes, turns } => {
                 let turns = match turns {
                     0 => String::new(),
                     1 => ", reversing once".to_owned(),
@@ -177,40 +169,41 @@ impl NoticeFormatter<'_> {
                 };
                 format!("route set for train {train}: about {:.0} s{turns}", takes.as_s())
             }
-            DispatchNotice::Waits { train, on } => {
+            Notice::Waits { train, on } => {
                 format!("train {train} waits for track that is reserved for {}", trains(on))
             }
-            DispatchNotice::Deadlock { train, moves } if moves.is_empty() => {
+            Notice::Deadlock { train, moves } if moves.is_empty() => {
                 format!(
                     "train {train} is in a deadlock that no train can resolve from its place: one \
                          is sent elsewhere"
                 )
             }
-            DispatchNotice::Deadlock { train, moves } => {
+            Notice::Deadlock { train, moves } => {
                 format!("train {train} is in a deadlock: {} makes room", trains(moves))
             }
-            DispatchNotice::StepsAside { train, makes_room_for, to } => {
+            Notice::StepsAside { train, makes_room_for, to } => {
                 format!("train {train} moves to {} to make room for train {makes_room_for}", self.place(*to))
             }
-            // That has been said with the refusal.
-            DispatchNotice::Withdrawn { why: Some(Refusal::Unreachable { .. }), .. } => return None,
-            DispatchNotice::Withdrawn { train, why } => {
+            // The refusal of the order has said that already.
+            Notice::Withdrawn { why: Some(Refusal::Unreachable { .. }), .. } => return None,
+            Notice::Withdrawn { train, why } => {
                 let why = why.as_ref().map_or_else(String::new, |why| format!(": {why}"));
                 format!("train {train} does not start yet{why}; Footplate tries again")
             }
-            DispatchNotice::Arrived { train, took, .. } => {
+            Notice::Arrived { train, took, .. } => {
                 format!("train {train} has arrived after {:.1} s", took.as_s())
             }
-            DispatchNotice::Diverged { train, stopped } if stopped.is_empty() => {
+            Notice::Diverged { train, stopped } if stopped.is_empty() => {
                 format!("train {train} left its reserved route: stopped")
             }
-            DispatchNotice::Diverged { train, stopped } => format!(
+            Notice::Diverged { train, stopped } => format!(
                 "train {train} left its reserved route: stopped, with the trains it could meet: {}",
                 trains(stopped)
             ),
-            DispatchNotice::HeldAsUnknown { train } => {
+            Notice::ReservedAsUnknown { train } => {
                 format!("no train is sent onto track where train {train} may be")
             }
+            other => return supervised(other),
         })
     }
 
@@ -285,7 +278,56 @@ impl NoticeFormatter<'_> {
     }
 }
 
-/// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
+/// A notice of the watchdog as one line; `None` for other notices.
+fn supervised(notice: &Notice) -> Option<String> {
+    Some(match notice {
+        Notice::Danger { train, why, stopped, .. } if stopped.is_empty() => {
+            format!("train {train} stopped: {why}")
+        }
+        Notice::Danger { train, why, stopped, .. } => format!(
+            "train {train} stopped: {why}; also stopped, because they could meet it: {}",
+            trains(stopped)
+        ),
+        Notice::PowerOff { train } => format!("track power off: train {train} may not have stopped"),
+        Notice::PowerOn => "track power on; all trains are commanded to stop".to_owned(),
+        Notice::AsksToCreep { train } => format!("train {train} is waiting for clearance to creep"),
+        Notice::Creeps { train, step } => {
+            format!("train {train} creeps at step {step} until two sensors confirm its position")
+        }
+        Notice::Located { train } => format!("train {train} is located again"),
+        Notice::SpeedMeasured { train, step, ratio, deviation } => format!(
+            "train {train} runs at {:.1} % (± {:.1} %) of its calibrated speed at step {step}",
+            100.0 * ratio,
+            100.0 * HALF_95 * deviation
+        ),
+        Notice::StopChecked { train, beyond, deviation } => format!(
+            "train {train} came to rest {:.0} mm beyond the prediction (± {:.0} mm)",
+            beyond.as_mm(),
+            HALF_95 * deviation.as_mm()
+        ),
+        Notice::Recovered { train, outcome, took } => {
+            let found = match outcome {
+                Outcome::Rescaled { ratio } => {
+                    format!("it runs at {:.0} % of its calibrated speeds", 100.0 * ratio)
+                }
+                Outcome::LearntAnew => "it is another engine, and was calibrated anew".to_owned(),
+                _ => "its model is unchanged".to_owned(),
+            };
+            format!("recovery took {:.0} s; train {train} is back in service: {found}", took.as_s())
+        }
+        Notice::Resumed { train, .. } => format!("train {train} resumes its command"),
+        Notice::Cancelled { train, .. } => {
+            format!("the command of train {train} was cancelled; send it again")
+        }
+        Notice::NeedsOperator { train, while_it } => format!(
+            "position of train {train} lost: recovery failed {while_it}; check the train, then enter \
+             `place {train} at ...`, or run it over a sensor if no other train is near"
+        ),
+        _ => return None,
+    })
+}
+
+/// Warns that the stops of a train missed their intervals too often; `by` is the standard deviation that was added.
 pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
     format!(
         "stops of train {train} miss their intervals: the intervals are ±{:.0} mm wider from now on; if \
@@ -295,7 +337,7 @@ pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
     )
 }
 
-/// Trains one after the other, as in a sentence.
+/// Lists trains as in a sentence: `train 24, train 58`.
 pub(super) fn trains(trains: &[TrainId]) -> String {
     let trains: Vec<String> = trains.iter().map(|train| format!("train {train}")).collect();
     if trains.is_empty() { "no train that can move".to_owned() } else { trains.join(", ") }

@@ -1,0 +1,459 @@
+//! The line to the station, which loses, delays, garbles and breaks; and what a guardian sees of the program behind it.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::time::Duration;
+
+use footplate_core::{TimeSpan, Timestamp, TrainId};
+use footplate_eval::seeds::Choice;
+
+use super::life::{Death, Life, Spell};
+use super::plan::{Planned, Trouble};
+use crate::link::{Bequest, FromSimulated, Guardian, Heard, Link, Lost, SimulatedStation};
+use crate::runtime::{WillLine, written};
+
+/// A guardian takes a program for dead that drives trains and says nothing for so long.
+pub(super) const LATE: TimeSpan = TimeSpan::from_ms(500);
+/// How often people are asked: seldom enough that a story of minutes takes a second.
+const PATIENCE: TimeSpan = TimeSpan::from_ms(25);
+/// How often the truth is looked at while trains are being stopped.
+const LOOK: TimeSpan = TimeSpan::from_ms(5);
+
+/// The station of a story, which all its lives speak to.
+pub(super) type SharedStation<'l> = Rc<RefCell<SimulatedStation<'l>>>;
+
+/// Who of those that look at the line is still there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Holder {
+    Guardian,
+    /// The guardian is dead, and the program has not noticed.
+    Nobody,
+    /// The program itself.
+    Program,
+}
+
+/// The line as the program sees it.
+pub(super) struct FaultyLine<'l> {
+    station: SharedStation<'l>,
+    life: Rc<Life>,
+    trains: Vec<TrainId>,
+    choice: Choice,
+    began: Timestamp,
+    troubles: Vec<Planned>,
+    /// Troubles that begin at one moment, and have.
+    begun: Vec<bool>,
+    arrivals: VecDeque<(Timestamp, Heard)>,
+    holder: Holder,
+    is_open: bool,
+    has_datagrams: bool,
+    has_answered: bool,
+    after_death: Duration,
+    /// What the guardian knows.
+    pub(super) will: Option<Vec<u8>>,
+    runs: bool,
+    /// When all trains had been commanded to stop, or had no power, while somebody was stopping them.
+    pub(super) stopped_at: Option<Timestamp>,
+    /// What happened, for people.
+    pub(super) told: Vec<(Timestamp, String)>,
+}
+
+impl<'l> FaultyLine<'l> {
+    pub(super) fn new(
+        station: SharedStation<'l>,
+        life: Rc<Life>,
+        trains: &[TrainId],
+        troubles: &[Planned],
+        choice: Choice,
+    ) -> Self {
+        let began = station.borrow().now();
+        let has_datagrams = matches!(&*station.borrow(), SimulatedStation::Z21(_) | SimulatedStation::Can(_));
+        Self {
+            station,
+            life,
+            trains: trains.to_vec(),
+            choice,
+            began,
+            begun: vec![false; troubles.len()],
+            troubles: troubles.to_vec(),
+            arrivals: VecDeque::new(),
+            holder: Holder::Guardian,
+            is_open: true,
+            has_datagrams,
+            has_answered: false,
+            after_death: Duration::ZERO,
+            will: None,
+            runs: false,
+            stopped_at: None,
+            told: Vec::new(),
+        }
+    }
+
+    fn tell(&mut self, words: impl Into<String>) {
+        let now = self.time();
+        self.told.push((now, words.into()));
+    }
+
+    fn time(&self) -> Timestamp {
+        self.station.borrow().now()
+    }
+
+    /// The time since this life began, as troubles count it.
+    pub(super) fn age(&self) -> Timestamp {
+        Timestamp::ZERO + (self.time() - self.began)
+    }
+
+    fn now_in<T>(&self, pick: impl Fn(Trouble) -> Option<T>) -> Option<T> {
+        let age = self.age();
+        self.troubles
+            .iter()
+            .filter(|planned| planned.spell.covers(age))
+            .find_map(|planned| pick(planned.trouble))
+    }
+
+    pub(super) fn is_cut(&self) -> bool {
+        self.now_in(|trouble| (trouble == Trouble::Cut).then_some(())).is_some()
+    }
+
+    /// The spells, in the world's time, in which no command reaches the station.
+    pub(super) fn unreachable(&self) -> Vec<Spell> {
+        let cuts = self.troubles.iter().filter(|planned| planned.trouble == Trouble::Cut);
+        let at = |time: Timestamp| self.began + (time - Timestamp::ZERO);
+        cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
+    }
+
+    pub(super) fn is_orphan(&self) -> bool {
+        self.life.death() == Some(Death::GuardianKilled)
+    }
+
+    /// Lets things begin that happen at one moment.
+    fn happen(&mut self) {
+        for at in 0..self.troubles.len() {
+            let Planned { trouble, spell } = self.troubles[at];
+            if self.begun[at] || self.age() < spell.from {
+                continue;
+            }
+            self.begun[at] = true;
+            self.tell(format!("{trouble:?} for {:.2} s", (spell.until - spell.from).as_s()));
+            match trouble {
+                Trouble::Cut => {
+                    self.arrivals.clear();
+                    if !self.has_datagrams {
+                        self.is_open = false;
+                        self.arrivals
+                            .push_back((self.time(), Heard::Lost(Lost("the line is cut".to_owned()))));
+                    }
+                }
+                Trouble::StationOff => self.switch_station_off(spell.until - spell.from),
+                Trouble::Hang if !self.life.is_over() => self.hang(spell.until - spell.from),
+                _ => {}
+            }
+        }
+        if self.is_orphan() && self.holder == Holder::Guardian {
+            self.holder = Holder::Nobody;
+            self.tell("the guardian is killed");
+        }
+    }
+
+    fn switch_station_off(&mut self, dark_for: TimeSpan) {
+        match &mut *self.station.borrow_mut() {
+            SimulatedStation::Marklin(station) => station.restart(dark_for),
+            SimulatedStation::DccEx(board) => board.restart(),
+            SimulatedStation::Z21(station) => station.restart(),
+            SimulatedStation::Can(station) => station.restart(),
+            SimulatedStation::LocoNet(station) => station.restart(),
+        }
+    }
+
+    /// The program stands still. Its guardian ends it if that is too long while trains run.
+    fn hang(&mut self, span: TimeSpan) {
+        let until = self.time() + span;
+        let is_watched = self.holder == Holder::Guardian && self.runs;
+        let late = if is_watched { self.time() + LATE } else { until };
+        self.advance(until.min(late));
+        if late < until {
+            self.tell("the guardian ends a program that hangs");
+            self.life.end(Death::Hangs);
+        }
+    }
+
+    /// Lets the world go on; what the station says waits for the program.
+    fn advance(&mut self, until: Timestamp) {
+        while self.time() < until {
+            let heard = self.station.borrow_mut().advance(until);
+            if let Some(heard) = heard {
+                self.hear(heard);
+            }
+        }
+    }
+
+    /// What the station says arrives, sooner or later, if it does.
+    fn hear(&mut self, heard: FromSimulated) {
+        if self.is_cut() || !self.is_open {
+            return;
+        }
+        let delay = self.now_in(|trouble| match trouble {
+            Trouble::Delay(delay) => Some(delay),
+            _ => None,
+        });
+        let at = self.time() + delay.unwrap_or(TimeSpan::ZERO);
+        // Nothing overtakes.
+        let at = self.arrivals.back().map_or(at, |(last, _)| at.max(*last));
+        match heard {
+            FromSimulated::Cts(up) => self.arrivals.push_back((at, Heard::Cts(up))),
+            FromSimulated::Bytes(bytes) => {
+                for byte in bytes {
+                    if let Some(byte) = self.passed(byte) {
+                        self.arrivals.push_back((at, Heard::Byte(byte)));
+                    }
+                }
+            }
+            FromSimulated::Datagram(_, datagram) => {
+                if let Some(datagram) = self.passed_datagram(datagram) {
+                    self.arrivals.push_back((at, Heard::Datagram(datagram)));
+                }
+            }
+        }
+        self.has_answered = true;
+    }
+
+    fn happens(&mut self, percent: Option<f64>) -> bool {
+        percent.is_some_and(|percent| self.choice.between(0.0, 100.0) < percent)
+    }
+
+    fn rates(&self) -> (Option<f64>, Option<f64>) {
+        let noise = self.now_in(|trouble| match trouble {
+            Trouble::Noise(percent) => Some(percent),
+            _ => None,
+        });
+        let loss = self.now_in(|trouble| match trouble {
+            Trouble::Loss(percent) => Some(percent),
+            _ => None,
+        });
+        (noise, loss)
+    }
+
+    /// A byte after its way over the line.
+    fn passed(&mut self, byte: u8) -> Option<u8> {
+        let (noise, loss) = self.rates();
+        if self.happens(loss) {
+            return None;
+        }
+        Some(if self.happens(noise) {
+            byte ^ (1 << (self.choice.between(0.0, 8.0) as u8).min(7))
+        } else {
+            byte
+        })
+    }
+
+    /// A datagram comes whole or not at all: the network checks it.
+    fn passed_datagram(&mut self, datagram: Vec<u8>) -> Option<Vec<u8>> {
+        let (noise, loss) = self.rates();
+        (!self.happens(loss) && !self.happens(noise)).then_some(datagram)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        if self.has_datagrams {
+            if !self.is_cut()
+                && let Some(bytes) = self.passed_datagram(bytes.to_vec())
+            {
+                self.station.borrow_mut().write(&bytes);
+            }
+            return Ok(());
+        }
+        if self.is_cut() || !self.is_open {
+            self.is_open = false;
+            return Err(Lost("the line is cut".to_owned()));
+        }
+        let bytes: Vec<u8> = bytes.iter().filter_map(|byte| self.passed(*byte)).collect();
+        self.station.borrow_mut().write(&bytes);
+        Ok(())
+    }
+
+    /// Whether no train is commanded to run, or none can.
+    pub(super) fn all_stopped(&self) -> bool {
+        let station = self.station.borrow();
+        let world = station.world();
+        let stands = |train: &TrainId| {
+            world.truth().train(*train).is_none_or(|truth| truth.commanded.get() == 0 || truth.is_wrecked)
+        };
+        !world.is_powered() || self.trains.iter().all(stands)
+    }
+
+    fn dead() -> Lost {
+        Lost("this program is dead".to_owned())
+    }
+}
+
+impl Link for FaultyLine<'_> {
+    fn now(&self) -> Timestamp {
+        self.time()
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        if !self.life.step() {
+            return Err(Self::dead());
+        }
+        self.happen();
+        match self.holder {
+            _ if self.life.is_over() => Err(Self::dead()),
+            Holder::Nobody => Err(Lost("the guardian has died".to_owned())),
+            Holder::Guardian | Holder::Program => self.put(bytes),
+        }
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        if !self.life.step() {
+            return Heard::Lost(Self::dead());
+        }
+        loop {
+            self.happen();
+            if self.life.is_over() {
+                return Heard::Lost(Self::dead());
+            }
+            if self.holder == Holder::Nobody {
+                return Heard::Lost(Lost("the guardian has died".to_owned()));
+            }
+            let now = self.time();
+            if self.arrivals.front().is_some_and(|(at, _)| *at <= now)
+                && let Some((_, heard)) = self.arrivals.pop_front()
+            {
+                return heard;
+            }
+            if !self.is_open && !self.has_datagrams {
+                return Heard::Lost(Lost("the line is gone".to_owned()));
+            }
+            if now >= until {
+                return Heard::Nothing;
+            }
+            let due = self.arrivals.front().map(|(at, _)| *at);
+            let begins = self.troubles.iter().zip(&self.begun).filter(|(_, begun)| !**begun);
+            let begins = begins.map(|(planned, _)| self.began + (planned.spell.from - Timestamp::ZERO)).min();
+            let next = [due, begins].into_iter().flatten().fold(until, Timestamp::min).max(now);
+            let heard = self.station.borrow_mut().advance(next);
+            if let Some(heard) = heard {
+                self.hear(heard);
+            }
+        }
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.station.borrow().cts()
+    }
+
+    fn patience(&self) -> TimeSpan {
+        PATIENCE
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        if self.life.is_over() {
+            return Err(Self::dead());
+        }
+        if self.holder == Holder::Nobody {
+            self.holder = Holder::Program;
+        }
+        if self.is_cut() && !self.has_datagrams {
+            return Err(Lost("the line is cut".to_owned()));
+        }
+        self.arrivals.clear();
+        self.is_open = true;
+        Ok(())
+    }
+
+    fn real_time(&self) -> Duration {
+        Duration::from_secs_f64((self.time() - Timestamp::ZERO).as_s()) + self.after_death
+    }
+
+    fn pause(&mut self, span: Duration) {
+        if self.life.is_over() {
+            // Its loop ends, while the world stands still.
+            self.after_death += span;
+            return;
+        }
+        self.advance(self.time() + TimeSpan::from_s(span.as_secs_f64()));
+        self.happen();
+    }
+
+    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
+        (self.holder == Holder::Guardian && !self.life.is_over()).then_some(self)
+    }
+}
+
+impl Guardian for FaultyLine<'_> {
+    fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
+        if !self.life.step() {
+            return Err(Self::dead());
+        }
+        self.will = Some(written(will, 1.0));
+        Ok(())
+    }
+
+    fn note_running(&mut self, runs: bool) -> Result<(), Lost> {
+        if !self.life.step() {
+            return Err(Self::dead());
+        }
+        self.runs = runs;
+        Ok(())
+    }
+
+    fn say_goodbye(&mut self) -> Result<(), Lost> {
+        if !self.life.step() {
+            return Err(Self::dead());
+        }
+        (self.runs, self.will) = (false, None);
+        Ok(())
+    }
+}
+
+/// The same line when the guardian uses it.
+impl WillLine for FaultyLine<'_> {
+    fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    fn open(&mut self) -> Result<(), Lost> {
+        if self.is_cut() && !self.has_datagrams {
+            return Err(Lost("the line is cut".to_owned()));
+        }
+        self.is_open = true;
+        Ok(())
+    }
+
+    fn close(&mut self) {
+        self.is_open = false;
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        self.put(bytes)
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.station.borrow().cts()
+    }
+
+    fn pause(&mut self, span: Duration) {
+        let until = self.time() + TimeSpan::from_s(span.as_secs_f64());
+        while self.time() < until {
+            self.advance(until.min(self.time() + LOOK));
+            self.happen();
+            if self.stopped_at.is_none() && self.all_stopped() {
+                self.stopped_at = Some(self.time());
+            }
+        }
+        self.arrivals.clear();
+    }
+
+    fn has_answered(&self) -> bool {
+        !self.has_datagrams || self.has_answered
+    }
+
+    fn expect_answer(&mut self) {
+        self.has_answered = false;
+    }
+
+    fn gives_up(&self) -> bool {
+        false
+    }
+
+    fn say(&self, _: &str) {}
+}

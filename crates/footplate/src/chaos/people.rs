@@ -1,0 +1,243 @@
+//! Who sends trains to places, helps them, and sees whether anything is as it must not be.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice};
+use footplate_core::track::{Landmark, Layout};
+use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
+use footplate_eval::seeds::Choice;
+use footplate_eval::traffic::{HAND, is_on_reserved_track, place_by_hand};
+use footplate_wire::{CommandError, LinkNotice};
+
+use super::disk::FaultyDisk;
+use super::life::{Death, Life};
+use super::line::SharedStation;
+use crate::runtime::{Attendant, Recorder, Wish};
+
+/// How often the truth is compared with what trains hold.
+const LOOK: TimeSpan = TimeSpan::from_ms(50);
+/// A person comes to the help of a train after this long, and switches the power on again.
+const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
+/// All trains at rest for so long although one wants to be somewhere, and nothing that a person was told: stuck. Twice the
+/// time that the dispatcher takes to resolve a deadlock.
+const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
+const TRIES: usize = 100;
+
+/// What must not be, and what is counted.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Seen {
+    pub(super) arrivals: u32,
+    pub(super) alarms: u32,
+    /// Track that trains entered without a reservation, of so many grants.
+    pub(super) intrusions: Vec<(Timestamp, TrainId)>,
+    pub(super) grants: u32,
+    /// Nothing moved although it should have, and nobody was told.
+    pub(super) stuck: Option<Timestamp>,
+    pub(super) told: Vec<(Timestamp, String)>,
+}
+
+/// People at the railway, in one life of the program.
+pub(super) struct People<'p, 'l> {
+    pub(super) layout: &'l Layout,
+    pub(super) station: SharedStation<'l>,
+    pub(super) trains: &'p [TrainId],
+    pub(super) choice: &'p mut Choice,
+    pub(super) life: Rc<Life>,
+    pub(super) disk: Rc<RefCell<FaultyDisk>>,
+    pub(super) ends: Timestamp,
+    pub(super) seen: Seen,
+    is_inside: BTreeMap<TrainId, bool>,
+    /// Trains that a person was told to look after, and since when.
+    troubled: BTreeMap<TrainId, Timestamp>,
+    without_power: Option<Timestamp>,
+    is_silent: bool,
+    moved: Timestamp,
+    looked: Timestamp,
+    has_sent: bool,
+    mishaps: usize,
+    news: Vec<LinkNews>,
+    pub(super) trouble: Option<String>,
+}
+
+impl<'p, 'l> People<'p, 'l> {
+    pub(super) fn new(
+        layout: &'l Layout,
+        station: SharedStation<'l>,
+        trains: &'p [TrainId],
+        choice: &'p mut Choice,
+        life: Rc<Life>,
+        disk: Rc<RefCell<FaultyDisk>>,
+        lasts: TimeSpan,
+    ) -> Self {
+        let now = station.borrow().now();
+        let mishaps = station.borrow().world().mishaps().len();
+        Self {
+            layout,
+            station,
+            trains,
+            choice,
+            life,
+            disk,
+            ends: now + lasts,
+            seen: Seen::default(),
+            is_inside: BTreeMap::new(),
+            troubled: BTreeMap::new(),
+            without_power: None,
+            is_silent: false,
+            moved: now,
+            looked: now,
+            has_sent: false,
+            mishaps,
+            news: Vec::new(),
+            trouble: None,
+        }
+    }
+
+    fn tell(&mut self, now: Timestamp, words: String) {
+        self.seen.told.push((now, words));
+    }
+
+    fn alarm(&mut self, now: Timestamp, train: TrainId) {
+        self.seen.alarms += 1;
+        self.troubled.entry(train).or_insert(now);
+    }
+
+    fn send(&mut self, now: Timestamp, dispatcher: &mut Dispatcher, train: TrainId) {
+        let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
+        for _ in 0..TRIES {
+            let Some(node) = self.choice.of(&sensors).copied() else { return };
+            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let longest = length.map_or(0.0, |edge| edge.length.as_mm());
+            let offset = Length::from_mm(self.choice.between(0.0, longest));
+            if dispatcher.go(now, train, Journey::to(Landmark { node, offset })).is_ok() {
+                return;
+            }
+        }
+    }
+
+    fn look(&mut self, now: Timestamp, dispatcher: &mut Dispatcher) {
+        self.looked = now;
+        let station = Rc::clone(&self.station);
+        let station = station.borrow();
+        let world = station.world();
+        for train in self.trains {
+            let is_inside = is_on_reserved_track(self.layout, world, dispatcher, *train);
+            if self.is_inside.insert(*train, is_inside) == Some(true) && !is_inside {
+                self.seen.intrusions.push((now, *train));
+                self.tell(now, format!("train {train} is on track that is not reserved for it"));
+            }
+            if world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_none()) {
+                self.moved = now;
+            }
+            // A person looks where it stands, and says so.
+            if self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
+                self.troubled.remove(train);
+                let stands = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_some());
+                if stands && let Some(at) = place_by_hand(self.layout, world, *train) {
+                    dispatcher.place(now, *train, at, HAND);
+                    self.tell(now, format!("a person says where train {train} is"));
+                }
+            }
+        }
+        if self.without_power.is_some_and(|since| now - since >= HELP_AFTER) {
+            self.without_power = None;
+            dispatcher.switch_power(now, true);
+            self.tell(now, "a person switches the power on".to_owned());
+        }
+        let wants = self.trains.iter().any(|train| dispatcher.journey(*train).is_some());
+        let is_explained = !self.troubled.is_empty() || self.without_power.is_some() || self.is_silent;
+        if is_explained || !wants {
+            self.moved = now;
+        }
+        if now - self.moved >= STUCK_AFTER && self.seen.stuck.is_none() {
+            self.seen.stuck = Some(now);
+        }
+    }
+}
+
+impl Attendant<Dispatcher> for People<'_, '_> {
+    fn hear(&mut self, now: Timestamp, notice: Notice) {
+        if !matches!(notice, Notice::Planned(_) | Notice::Passed { .. } | Notice::Waits { .. }) {
+            self.tell(now, format!("{notice:?}"));
+        }
+        match notice {
+            Notice::Arrived { .. } => {
+                self.seen.arrivals += 1;
+                self.has_sent = false;
+            }
+            Notice::RouteSet { .. } => self.seen.grants += 1,
+            Notice::ReservedAsUnknown { train }
+            | Notice::NeedsOperator { train, .. }
+            | Notice::AsksToCreep { train }
+            | Notice::Lost { train } => self.alarm(now, train),
+            Notice::PowerOff { .. } => {
+                self.seen.alarms += 1;
+                self.without_power.get_or_insert(now);
+            }
+            Notice::Recovered { train, .. } => {
+                self.troubled.remove(&train);
+            }
+            Notice::GivenUp { .. } => self.has_sent = false,
+            _ => {}
+        }
+    }
+
+    fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
+        self.tell(now, format!("line: {notice}"));
+        match notice {
+            LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => self.is_silent = true,
+            LinkNotice::Answers => self.is_silent = false,
+            LinkNotice::PowerLost | LinkNotice::Restarted => {
+                self.without_power.get_or_insert(now);
+            }
+            _ => {}
+        }
+        self.seen.alarms += u32::from(notice.news().is_some());
+        self.news.extend(notice.news());
+    }
+
+    fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
+        self.tell(now, format!("{command:?} was refused: {error}"));
+    }
+
+    fn read(&mut self, words: &str) {
+        let now = self.station.borrow().now();
+        self.tell(now, words.to_owned());
+    }
+
+    fn attend(&mut self, now: Timestamp, dispatcher: &mut Dispatcher) -> Wish {
+        if !self.life.step() || self.life.death() == Some(Death::GuardianKilled) {
+            return Wish::Finish;
+        }
+        for news in self.news.drain(..) {
+            dispatcher.handle_link(now, news);
+        }
+        if let Err(error) = self.disk.borrow_mut().advance(now) {
+            self.trouble = Some(format!("{error:#}"));
+            return Wish::Finish;
+        }
+        if !std::mem::replace(&mut self.has_sent, true) {
+            for train in self.trains {
+                if dispatcher.journey(*train).is_none() {
+                    self.send(now, dispatcher, *train);
+                }
+            }
+        }
+        if now - self.looked >= LOOK {
+            self.look(now, dispatcher);
+        }
+        let has_mishap = self.station.borrow().world().mishaps().len() > self.mishaps;
+        if now >= self.ends || has_mishap { Wish::Finish } else { Wish::GoOn }
+    }
+}
+
+/// The same disk for the loop that records and the people who look at it.
+pub(super) struct SharedDisk(pub(super) Rc<RefCell<FaultyDisk>>);
+
+impl Recorder for SharedDisk {
+    fn record(&mut self, events: &[footplate_core::Event]) -> anyhow::Result<()> {
+        self.0.borrow_mut().record(events)
+    }
+}

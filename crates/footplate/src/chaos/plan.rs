@@ -1,0 +1,125 @@
+//! What a seed draws: a station, trains, what fails when, and how each life of the program ends.
+
+use footplate_core::{TimeSpan, Timestamp};
+use footplate_eval::seeds::Choice;
+
+use super::life::{Death, Spell};
+use crate::link::StationKind;
+use crate::session_journal::IfUnkept;
+
+/// Lives of the program in one story, at most.
+const MOST_LIVES: usize = 3;
+/// A life that is not cut short lasts so long (s of track time). The last one begins when all that fails has failed, and shows
+/// whether trains get going again.
+const LASTS_S: [f64; 2] = [15.0, 60.0];
+const LAST_LIFE_S: f64 = 240.0;
+/// Failures begin within this part of a life.
+const TROUBLES_WITHIN: f64 = 0.8;
+/// Steps of a life in which it may die: a loop makes some 100 a second.
+const STEPS_PER_S: f64 = 100.0;
+const MOST_TROUBLES: usize = 5;
+
+/// What goes wrong on the line, the disk or a clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Trouble {
+    /// Nothing passes; a line of bytes notices.
+    Cut,
+    /// Of 100 bytes or datagrams so many are garbled.
+    Noise(f64),
+    /// Of 100 bytes or datagrams so many vanish.
+    Loss(f64),
+    /// What the station says arrives this much later.
+    Delay(TimeSpan),
+    /// The station is off, forgets everything, and starts again.
+    StationOff,
+    /// The program stands still, as a computer does that is asleep or swaps.
+    Hang,
+    /// No byte can be written.
+    DiskFull,
+    /// Each commit takes so long.
+    DiskSlow(TimeSpan),
+    /// The computer's calendar jumps.
+    Calendar(TimeSpan),
+}
+
+/// One trouble, and when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Planned {
+    pub(super) trouble: Trouble,
+    /// From the beginning of the life, as times of a clock that stands at zero there.
+    pub(super) spell: Spell,
+}
+
+/// One life.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PlannedLife {
+    pub(super) lasts: TimeSpan,
+    pub(super) ends: Option<(u64, Death)>,
+    pub(super) troubles: Vec<Planned>,
+    pub(super) if_unkept: IfUnkept,
+}
+
+/// All that a seed draws before the world begins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Plan {
+    pub(super) station: StationKind,
+    pub(super) lives: Vec<PlannedLife>,
+}
+
+impl Plan {
+    pub(super) fn draw(choice: &mut Choice) -> Self {
+        const KINDS: [StationKind; 4] =
+            [StationKind::Marklin, StationKind::DccEx, StationKind::Z21, StationKind::MarklinCan];
+        let station = choice.of(&KINDS).copied().unwrap_or_default();
+        let count = 1 + below(choice, MOST_LIVES);
+        let lives = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
+        Self { station, lives }
+    }
+}
+
+impl PlannedLife {
+    fn draw(choice: &mut Choice, is_last: bool) -> Self {
+        let lasts_s = choice.between(LASTS_S[0], LASTS_S[1]);
+        let count = below(choice, MOST_TROUBLES + 1);
+        let troubles = (0..count).map(|_| Planned::draw(choice, lasts_s)).collect();
+        let dies_at = choice.between(1.0, STEPS_PER_S * lasts_s) as u64;
+        let death = match below(choice, 5) {
+            0 | 1 => Death::Killed,
+            2 => Death::Hangs,
+            3 => Death::GuardianKilled,
+            _ => Death::PowerCut(TimeSpan::from_s(choice.between(0.5, 20.0))),
+        };
+        let ends = (!is_last).then_some((dies_at, death));
+        let if_unkept = if below(choice, 2) == 0 { IfUnkept::Stop } else { IfUnkept::GoOn };
+        let lasts_s = if is_last { lasts_s + LAST_LIFE_S } else { lasts_s };
+        Self { lasts: TimeSpan::from_s(lasts_s), ends, troubles, if_unkept }
+    }
+}
+
+impl Planned {
+    fn draw(choice: &mut Choice, lasts_s: f64) -> Self {
+        let from_s = choice.between(0.0, TROUBLES_WITHIN * lasts_s);
+        let (trouble, for_s) = match below(choice, 10) {
+            0 | 1 => (Trouble::Cut, choice.between(0.05, 9.0)),
+            2 => (Trouble::Noise(choice.between(0.1, 5.0)), choice.between(0.5, 15.0)),
+            3 => (Trouble::Loss(choice.between(0.1, 5.0)), choice.between(0.5, 15.0)),
+            4 => (Trouble::Delay(ms(choice, 5.0, 300.0)), choice.between(0.5, 15.0)),
+            5 => (Trouble::StationOff, choice.between(0.2, 6.0)),
+            6 => (Trouble::Hang, choice.between(0.01, 0.7)),
+            7 => (Trouble::DiskFull, choice.between(0.2, 20.0)),
+            8 => (Trouble::DiskSlow(ms(choice, 20.0, 3_000.0)), choice.between(1.0, 30.0)),
+            // Up to a day forward or back.
+            _ => (Trouble::Calendar(TimeSpan::from_s(choice.between(-86_400.0, 86_400.0))), lasts_s),
+        };
+        let from = Timestamp::from_s(from_s);
+        Self { trouble, spell: Spell { from, until: from + TimeSpan::from_s(for_s) } }
+    }
+}
+
+fn ms(choice: &mut Choice, from: f64, to: f64) -> TimeSpan {
+    TimeSpan::from_s(1e-3 * choice.between(from, to))
+}
+
+fn below(choice: &mut Choice, count: usize) -> usize {
+    (choice.between(0.0, count as f64) as usize).min(count - 1)
+}

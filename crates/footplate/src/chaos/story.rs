@@ -1,0 +1,431 @@
+//! All lives of one seed, and what came of them.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::rc::Rc;
+
+use anyhow::Context;
+use footplate_core::control::{Dispatcher, Driver};
+use footplate_core::model::MotionModel;
+use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
+use footplate_eval::seeds::Choice;
+use footplate_eval::testbed::PreparedTrains;
+use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
+use footplate_sim::{
+    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
+    VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
+};
+use footplate_store::Store;
+
+use super::disk::FaultyDisk;
+use super::life::{Death, Life, Spell};
+use super::line::{FaultyLine, LATE, SharedStation};
+use super::people::{People, Seen, SharedDisk};
+use super::plan::{Plan, PlannedLife};
+use crate::commands::stop_all;
+use crate::link::{Address, Link, SimulatedStation, StationKind, StationSession, open_session};
+use crate::runtime::{Ended, Runtime, carry_out};
+
+/// Trains of every story.
+const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(1)];
+/// Track time in which each was calibrated.
+const BUDGET: TimeSpan = TimeSpan::from_ms(120_000);
+/// So many stories are told of the same trains and rails.
+const STORIES_A_STAGE: u64 = 32;
+/// Where trains stand past a contact in the beginning.
+const PAST: Length = Length::from_mm(150.0);
+const TRIES: usize = 1_000;
+/// Stops are on the line and heard within this after a death, as long as the line is there (issue of trust).
+const STOPPED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
+/// From a byte on the line until a decoder has heard it: the refresh of the slowest station, with a margin.
+const HEARD_WITHIN: TimeSpan = TimeSpan::from_ms(500);
+/// Until trains that are commanded to stop have stopped.
+const BRAKES_WITHIN: TimeSpan = TimeSpan::from_ms(4_000);
+/// The calendar of the computer when a story begins; any other would do.
+const CALENDAR: Timestamp = Timestamp::from_s(1.7e9);
+
+/// Trains and rails that were drawn and calibrated once, for stories to begin with.
+pub(crate) struct Stage<'l> {
+    number: u64,
+    layout: &'l Layout,
+    world: LivingLayout<'l>,
+    models: BTreeMap<TrainId, MotionModel>,
+}
+
+impl<'l> Stage<'l> {
+    /// The number of the stage of a seed.
+    pub(crate) const fn number_of(seed: u64) -> u64 {
+        seed / STORIES_A_STAGE
+    }
+
+    /// Draws trains and rails, and calibrates the trains.
+    ///
+    /// # Errors
+    /// When there is no room for the trains on the layout.
+    pub(crate) fn set(layout: &'l Layout, number: u64) -> anyhow::Result<Self> {
+        let switches = LivingSwitches::well_kept();
+        let rehearsal = PreparedTrains::prepare(layout, number, &TRAINS, &switches, BUDGET)?;
+        let (world, models) = (rehearsal.world().clone(), rehearsal.models.clone());
+        Ok(Self { number, layout, world, models })
+    }
+}
+
+/// What came of a seed.
+#[derive(Debug, Default)]
+pub(crate) struct Fate {
+    pub(crate) seed: u64,
+    /// Track time, in s.
+    pub(crate) seconds: f64,
+    pub(crate) lives: u32,
+    pub(crate) deaths: u32,
+    pub(crate) arrivals: u32,
+    pub(crate) alarms: u32,
+    pub(crate) grants: u32,
+    pub(crate) intrusions: u32,
+    /// Mishaps while no command could reach the station.
+    pub(crate) out_of_reach: u32,
+    /// From each death until all trains were stopped, in ms.
+    pub(crate) stopped_ms: Vec<f64>,
+    /// What must not be.
+    pub(crate) failures: Vec<String>,
+    /// What happened, when.
+    pub(crate) told: Vec<(Timestamp, String)>,
+}
+
+/// Tells the story of a seed. `store` is where its store will be; nothing is there.
+///
+/// # Errors
+/// When the store of a new session cannot be made, or there is no room for the trains.
+pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Result<Fate> {
+    let mut choice = Choice::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let plan = Plan::draw(&mut choice);
+    let mut world = stage.world.clone();
+    put_trains(stage, &mut world, &mut choice)?;
+    let mut teller = Teller {
+        stage,
+        address: format!("sim:track-a?station={}", name_of(plan.station))
+            .parse()
+            .map_err(anyhow::Error::msg)?,
+        station: Rc::new(RefCell::new(station_of(plan.station, world, stage.number))),
+        store,
+        choice,
+        fate: Fate { seed, ..Fate::default() },
+    };
+    let began = teller.now();
+    teller.note(format!("a {}", name_of(plan.station)));
+    for life in &plan.lives {
+        teller.live(life)?;
+        if !teller.fate.failures.is_empty() {
+            break;
+        }
+    }
+    teller.fate.seconds = (teller.now() - began).as_s();
+    teller.fate.told.sort_by_key(|(at, _)| *at);
+    Ok(teller.fate)
+}
+
+const fn name_of(kind: StationKind) -> &'static str {
+    match kind {
+        StationKind::Marklin => "marklin",
+        StationKind::DccEx => "dcc-ex",
+        StationKind::Z21 => "z21",
+        StationKind::MarklinCan => "marklin-can",
+        StationKind::LocoNet => "loconet",
+    }
+}
+
+fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> SimulatedStation<'_> {
+    match kind {
+        StationKind::Marklin => VirtualStation::new(world, seed, StationSwitches::default()).into(),
+        StationKind::DccEx => VirtualBoard::new(world, seed, BoardSwitches::default()).into(),
+        StationKind::Z21 => VirtualZ21::new(world, seed, Z21Switches::default()).into(),
+        StationKind::MarklinCan => VirtualCentralStation::new(world, seed, CanSwitches::default()).into(),
+        StationKind::LocoNet => VirtualLocoNet::new(world, seed, LocoNetSwitches::default()).into(),
+    }
+}
+
+/// Puts trains where none is in another's way, off the turnouts.
+fn put_trains(stage: &Stage<'_>, world: &mut LivingLayout<'_>, choice: &mut Choice) -> anyhow::Result<()> {
+    let layout = stage.layout;
+    let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+    let turnouts: TurnoutStates = layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
+    for (nth, train) in TRAINS.iter().enumerate() {
+        let mut is_put = false;
+        for _ in 0..TRIES {
+            let Some(node) = choice.of(&sensors).copied() else { break };
+            let at = footplate_core::track::Landmark { node, offset: PAST };
+            let Ok(position) = layout.locate(at, &turnouts) else { continue };
+            if world.place(*train, position, footplate_sim::living::End::Nose).is_err() {
+                continue;
+            }
+            let dispatcher = dispatcher_of(stage, world, &TRAINS[..=nth]);
+            let held = dispatcher.holds(*train);
+            let is_apart = TRAINS[..nth]
+                .iter()
+                .all(|other| dispatcher.holds(*other).zip(held).is_some_and(|(one, two)| !one.meets(two)));
+            if is_apart && held.is_some_and(|held| held.turnouts().next().is_none()) {
+                is_put = true;
+                break;
+            }
+            world.lift(*train);
+        }
+        is_put.then_some(()).with_context(|| format!("there is no room for train {train}"))?;
+    }
+    Ok(())
+}
+
+/// What a program is told by people when it begins: where trains are, and how turnouts lie.
+fn dispatcher_of(stage: &Stage<'_>, world: &LivingLayout<'_>, trains: &[TrainId]) -> Dispatcher {
+    let layout = stage.layout;
+    let turnouts: TurnoutStates =
+        layout.turnouts().filter_map(|(turnout, _)| Some((turnout, world.lies(turnout)?))).collect();
+    let mut driver = Driver::new(layout.clone(), turnouts);
+    for train in trains {
+        if let Some(model) = stage.models.get(train) {
+            driver.add_train(model.clone());
+            if let Some(at) = place_by_hand(layout, world, *train) {
+                driver.place(world.now(), *train, at, HAND);
+            }
+        }
+    }
+    let mut dispatcher = Dispatcher::watched(world.now(), driver);
+    for train in trains {
+        dispatcher.set_lengths(world.now(), *train, LENGTHS);
+    }
+    dispatcher
+}
+
+/// What is the same in all lives of a story.
+struct Teller<'s, 'l> {
+    stage: &'s Stage<'l>,
+    address: Address,
+    station: SharedStation<'l>,
+    store: &'s Path,
+    choice: Choice,
+    fate: Fate,
+}
+
+impl<'l> Teller<'_, 'l> {
+    fn now(&self) -> Timestamp {
+        self.station.borrow().now()
+    }
+
+    fn note(&mut self, words: String) {
+        let now = self.now();
+        self.fate.told.push((now, words));
+    }
+
+    fn fail(&mut self, words: String) {
+        self.note(format!("FAILED: {words}"));
+        self.fate.failures.push(words);
+    }
+
+    /// The calendar of the computer.
+    fn calendar(&self) -> Timestamp {
+        CALENDAR + (self.now() - Timestamp::ZERO)
+    }
+
+    fn session(&self, line: &dyn Link) -> anyhow::Result<StationSession> {
+        open_session(&self.address, line, self.stage.layout)
+    }
+
+    /// Commands all trains to stop that the last life left running, as the program does before anything else.
+    fn stop_left_running(&mut self) -> anyhow::Result<()> {
+        if !self.store.exists() {
+            return Ok(());
+        }
+        let Some(unfinished) = Store::open(self.store)?.unfinished_session()? else { return Ok(()) };
+        let began = self.now();
+        let life = Rc::new(Life::new(None));
+        let mut line = FaultyLine::new(Rc::clone(&self.station), life, &TRAINS, &[], Choice::new(0));
+        let session = self.session(&line)?;
+        let closing = stop_all(&mut line, session, unfinished.trains);
+        if !line.all_stopped() {
+            // The end of a session takes its time; stops come first in it.
+            self.fail(format!("trains of the session before were not stopped at the start: {closing}"));
+        }
+        let took = (self.now() - began).as_ms();
+        self.note(format!("the next start stopped all trains and took {took:.0} ms"));
+        Ok(())
+    }
+
+    /// One life, and what its guardian does after it.
+    fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
+        self.stop_left_running()?;
+        self.await_rest();
+        let mishaps = self.station.borrow().world().mishaps().len();
+        self.fate.lives += 1;
+        let life = Rc::new(Life::new(planned.ends));
+        self.note(format!(
+            "a life of {:.0} s begins, which ends by {:?}",
+            planned.lasts.as_s(),
+            planned.ends
+        ));
+        let calendar = self.calendar();
+        let disk = FaultyDisk::begin(
+            self.store,
+            &TRAINS,
+            Rc::clone(&life),
+            &planned.troubles,
+            planned.if_unkept,
+            self.now(),
+            calendar,
+        )?;
+        let disk = Rc::new(RefCell::new(disk));
+        let mut dispatcher = dispatcher_of(self.stage, self.station.borrow().world(), &TRAINS);
+        let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
+        let mut line =
+            FaultyLine::new(Rc::clone(&self.station), Rc::clone(&life), &TRAINS, &planned.troubles, noise);
+        let session = self.session(&line)?;
+        let mut recorder = SharedDisk(Rc::clone(&disk));
+        let mut people = People::new(
+            self.stage.layout,
+            Rc::clone(&self.station),
+            &TRAINS,
+            &mut self.choice,
+            Rc::clone(&life),
+            Rc::clone(&disk),
+            planned.lasts,
+        );
+        let mut runtime = Runtime::new(&mut line, session, Some(&mut recorder), None);
+        let ended = runtime.run(&mut dispatcher, &mut people);
+        let began = self.station.borrow().now();
+        // A program that is alive stops its trains, whatever ended its loop.
+        let closing = runtime.close();
+        drop(runtime);
+        let (seen, trouble) = (std::mem::take(&mut people.seen), people.trouble.take());
+        drop(people);
+        drop(recorder);
+        let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
+        self.fate.told.append(&mut line.told);
+        self.count(seen);
+        let ended = match ended {
+            Ok(Ended::Finished) => "finished".to_owned(),
+            Ok(ended) => ended.to_string(),
+            Err(error) => format!("{error:#}"),
+        };
+        let (death, steps) = (life.death(), life.steps());
+        self.note(format!("the loop ended after {steps} steps ({death:?}): {ended}; {closing}"));
+        if let Some(trouble) = trouble {
+            self.fail(format!("the journal failed: {trouble}"));
+        }
+        let unreachable = line.unreachable();
+        self.check_mishaps(mishaps, &unreachable);
+        self.bury(death, began, &mut line, disk)
+    }
+
+    fn count(&mut self, mut seen: Seen) {
+        self.fate.told.append(&mut seen.told);
+        self.fate.arrivals += seen.arrivals;
+        self.fate.alarms += seen.alarms;
+        self.fate.grants += seen.grants;
+        self.fate.intrusions += seen.intrusions.len() as u32;
+        if let Some(at) = seen.stuck {
+            self.fail(format!("stuck without an alarm at {:.2} s", at.as_s()));
+        }
+    }
+
+    /// What trains have come to. While no command reaches the station, and until trains have stopped after that, nobody could
+    /// have done anything about it.
+    fn check_mishaps(&mut self, before: usize, unreachable: &[Spell]) {
+        let mishaps: Vec<_> = self.station.borrow().world().mishaps().iter().skip(before).copied().collect();
+        for mishap in mishaps {
+            let is_helpless =
+                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(mishap.at);
+            if unreachable.iter().any(is_helpless) {
+                self.note(format!("out of reach: {:?} of {:?}", mishap.kind, mishap.train));
+                self.fate.out_of_reach += 1;
+                continue;
+            }
+            self.fail(format!("{:?} of {:?} at {:.2} s", mishap.kind, mishap.train, mishap.at.as_s()));
+        }
+    }
+
+    /// What happens after a program has ended, in order or not.
+    fn bury(
+        &mut self,
+        death: Option<Death>,
+        began: Timestamp,
+        line: &mut FaultyLine<'l>,
+        disk: FaultyDisk,
+    ) -> anyhow::Result<()> {
+        self.fate.deaths += u32::from(death.is_some());
+        let kept = match death {
+            None | Some(Death::GuardianKilled) => disk.finish(),
+            Some(Death::Killed | Death::Hangs) => disk.die(),
+            Some(Death::PowerCut(_)) => disk.lose_power(&mut self.choice),
+        };
+        if let Err(error) = kept {
+            self.fail(format!("{error:#}"));
+        }
+        let allowed = STOPPED_WITHIN + HEARD_WITHIN;
+        match death {
+            Some(Death::PowerCut(dark)) => {
+                // The line is without anybody; trains run on.
+                let until = self.now() + dark;
+                while self.now() < until {
+                    let _ = self.station.borrow_mut().advance(until);
+                }
+                return Ok(());
+            }
+            Some(Death::Hangs) => wait(line, LATE),
+            // The program has stopped its trains itself.
+            Some(Death::GuardianKilled) => {
+                if !line.all_stopped() && !line.is_cut() {
+                    self.fail("trains run after their guardian was killed".to_owned());
+                }
+                return Ok(());
+            }
+            Some(Death::Killed) | None => {}
+        }
+        let Some(will) = line.will.take() else { return Ok(()) };
+        // While the line is cut nobody can be stopped.
+        let mut since = began;
+        if line.all_stopped() {
+            line.stopped_at = Some(since);
+        }
+        while line.is_cut() {
+            wait(line, TimeSpan::from_ms(50));
+            since = self.now();
+        }
+        let is_said = carry_out(line, &will);
+        self.fate.told.append(&mut line.told);
+        match line.stopped_at {
+            Some(at) => {
+                let took = (at - since).max(TimeSpan::ZERO);
+                self.fate.stopped_ms.push(took.as_ms());
+                self.note(format!("all trains were stopped after {:.0} ms", took.as_ms()));
+                if took > allowed {
+                    self.fail(format!("trains were stopped only {:.0} ms after a death", took.as_ms()));
+                }
+            }
+            None => self.fail(format!("trains were not stopped after a death (said: {is_said})")),
+        }
+        Ok(())
+    }
+
+    /// A person waits until nothing moves before the next life begins.
+    fn await_rest(&mut self) {
+        let mut station = self.station.borrow_mut();
+        let until = station.now() + TimeSpan::from_s(20.0);
+        loop {
+            let rests = |train: &TrainId| {
+                station.world().truth().train(*train).is_none_or(|truth| truth.at_rest_since.is_some())
+            };
+            if TRAINS.iter().all(rests) || station.now() >= until {
+                return;
+            }
+            let next = station.now() + TimeSpan::from_ms(50);
+            while station.now() < next {
+                let _ = station.advance(next);
+            }
+        }
+    }
+}
+
+fn wait(line: &mut FaultyLine<'_>, span: TimeSpan) {
+    use crate::runtime::WillLine;
+    WillLine::pause(line, std::time::Duration::from_secs_f64(span.as_s()));
+}

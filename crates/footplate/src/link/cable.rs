@@ -1,0 +1,242 @@
+//! The line to a station outside this process: a serial port, a connection or datagrams, with the clock of this computer.
+//!
+//! A thread of its own waits for what arrives, so that the program can wait for that and for the time at once, to a
+//! fraction of a millisecond.
+
+use std::fmt::{Display, Formatter, Result as FmtResult};
+use std::io::Write;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use footplate_core::{TimeSpan, Timestamp};
+use serialport::StopBits;
+
+use super::address::SerialAddress;
+use super::board_address::BoardAddress;
+use super::can_address::{CanAddress, CanPlace};
+use super::datagrams::{Correspondent, exchange_datagrams};
+use super::line::PERSON_MS;
+use super::loconet_address::LocoNetAddress;
+use super::port::Port;
+use super::stream::{SerialFormat, connect, open_device};
+use super::z21_address::Z21Address;
+use super::{Heard, Link, Lost};
+use crate::clock::Stopwatch;
+
+/// The speed of the interface's line (Märklin).
+const MARKLIN_BAUD: u32 = 2400;
+/// The speed of a DCC-EX board's serial port.
+const DCC_EX_BAUD: u32 = 115_200;
+/// The speed of a serial CAN adapter.
+const ADAPTER_BAUD: u32 = 115_200;
+
+/// Where a line is and how its bytes are sent.
+#[derive(Debug, Clone)]
+pub(crate) struct Cable {
+    place: Place,
+    /// How many times faster than real time the station's clock runs.
+    speed: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Place {
+    Stream(Port, SerialFormat),
+    Datagrams(Correspondent),
+}
+
+impl From<&SerialAddress> for Cable {
+    fn from(address: &SerialAddress) -> Self {
+        let SerialAddress { port, cts, speed, .. } = address.clone();
+        let format = SerialFormat { baud: MARKLIN_BAUD, stop_bits: StopBits::Two, cts };
+        Self { place: Place::Stream(port, format), speed }
+    }
+}
+
+impl From<&BoardAddress> for Cable {
+    fn from(address: &BoardAddress) -> Self {
+        let BoardAddress { port, speed, .. } = address.clone();
+        let format = SerialFormat { baud: DCC_EX_BAUD, stop_bits: StopBits::One, cts: Some(false) };
+        Self { place: Place::Stream(port, format), speed }
+    }
+}
+
+impl From<&Z21Address> for Cable {
+    fn from(address: &Z21Address) -> Self {
+        let Z21Address { host, port, speed, .. } = address.clone();
+        Self { place: Place::Datagrams(Correspondent { host, port, receive_at: None }), speed }
+    }
+}
+
+impl From<&CanAddress> for Cable {
+    fn from(address: &CanAddress) -> Self {
+        let place = match address.place.clone() {
+            // An adapter on USB runs as fast as it can, whatever is set.
+            CanPlace::Line(port) => {
+                let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
+                Place::Stream(port, format)
+            }
+            CanPlace::Datagrams { host, port, receive_at } => {
+                Place::Datagrams(Correspondent { host, port, receive_at: Some(receive_at) })
+            }
+        };
+        Self { place, speed: address.speed }
+    }
+}
+
+impl From<&LocoNetAddress> for Cable {
+    fn from(address: &LocoNetAddress) -> Self {
+        let LocoNetAddress { port, speed, .. } = address.clone();
+        // Servers are reached over TCP, where no format matters.
+        let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
+        Self { place: Place::Stream(port, format), speed }
+    }
+}
+
+/// This computer's end of an open cable.
+pub(crate) struct CableEnd {
+    /// Where bytes are put on the line; with datagrams, each call of `write` sends one. Dropped, it closes the line.
+    pub(crate) writer: Box<dyn Write + Send>,
+    /// Whether the station's hand-shake line is up; `None` where there is none that could be read.
+    pub(crate) cts: Option<bool>,
+}
+
+/// What arrives over a cable.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Arrival<'a> {
+    /// Bytes from the station: one whole datagram, where it sends datagrams.
+    Bytes(&'a [u8]),
+    /// The hand-shake line is up or down now.
+    Cts(bool),
+    /// The line is gone; why.
+    Lost(&'a str),
+}
+
+impl Cable {
+    /// How many times faster than real time the station's clock runs.
+    pub(crate) const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Whether bytes are exchanged in datagrams, which may be lost without notice.
+    pub(crate) const fn has_datagrams(&self) -> bool {
+        matches!(self.place, Place::Datagrams(_))
+    }
+
+    /// Opens it. What arrives is given to `deliver` on a thread of its own, until that answers `false`.
+    ///
+    /// # Errors
+    /// When the port cannot be opened.
+    pub(crate) fn open(
+        &self,
+        deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
+    ) -> Result<CableEnd, Lost> {
+        match &self.place {
+            Place::Stream(Port::Tcp { host, port }, _) => connect(host, *port, deliver),
+            Place::Stream(Port::Device(path), format) => open_device(path, format, deliver),
+            Place::Datagrams(correspondent) => exchange_datagrams(correspondent, deliver),
+        }
+    }
+}
+
+impl Display for Cable {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        match &self.place {
+            Place::Stream(port, _) => port.fmt(f),
+            Place::Datagrams(correspondent) => correspondent.fmt(f),
+        }
+    }
+}
+
+/// A line that this process holds itself.
+pub(crate) struct CableLink {
+    cable: Cable,
+    /// `None` while it is opened again: two ends cannot hold one port.
+    line: Option<Line>,
+    stopwatch: Stopwatch,
+}
+
+/// What is new when a line is opened again.
+struct Line {
+    end: CableEnd,
+    arrivals: Receiver<Heard>,
+}
+
+impl CableLink {
+    /// Opens a line.
+    ///
+    /// # Errors
+    /// When the port cannot be opened.
+    pub(crate) fn open(cable: impl Into<Cable>) -> Result<Self, Lost> {
+        let cable = cable.into();
+        Ok(Self { line: Some(open(&cable)?), cable, stopwatch: Stopwatch::start() })
+    }
+
+    fn is_gone(&self) -> Lost {
+        Lost(format!("`{}` is gone", self.cable))
+    }
+}
+
+fn open(cable: &Cable) -> Result<Line, Lost> {
+    let (sender, arrivals) = channel();
+    let (name, has_datagrams) = (cable.to_string(), cable.has_datagrams());
+    let end = cable.open(move |arrival| {
+        let sent = match arrival {
+            Arrival::Bytes(bytes) if has_datagrams => sender.send(Heard::Datagram(bytes.to_vec())),
+            Arrival::Bytes(bytes) => bytes.iter().try_for_each(|byte| sender.send(Heard::Byte(*byte))),
+            Arrival::Cts(up) => sender.send(Heard::Cts(up)),
+            Arrival::Lost(why) => sender.send(Heard::Lost(Lost(format!("`{name}` is gone: {why}")))),
+        };
+        sent.is_ok()
+    })?;
+    Ok(Line { end, arrivals })
+}
+
+impl Link for CableLink {
+    fn now(&self) -> Timestamp {
+        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+        let Some(line) = &mut self.line else { return Err(self.is_gone()) };
+        let written = line.end.writer.write_all(bytes).and_then(|()| line.end.writer.flush());
+        written.map_err(|error| Lost(format!("cannot write to `{}`: {error}", self.cable)))
+    }
+
+    fn wait(&mut self, until: Timestamp) -> Heard {
+        let span_s = (until - self.now()).as_s() / self.cable.speed;
+        let Some(line) = &mut self.line else { return Heard::Lost(self.is_gone()) };
+        let heard = match line.arrivals.try_recv() {
+            Ok(arrival) => Ok(arrival),
+            Err(_) if span_s <= 0.0 => return Heard::Nothing,
+            Err(_) => line.arrivals.recv_timeout(Duration::from_secs_f64(span_s)),
+        };
+        match heard {
+            Ok(heard) => {
+                if let Heard::Cts(up) = heard {
+                    line.end.cts = Some(up);
+                }
+                heard
+            }
+            Err(RecvTimeoutError::Timeout) => Heard::Nothing,
+            Err(RecvTimeoutError::Disconnected) => Heard::Lost(self.is_gone()),
+        }
+    }
+
+    fn cts(&self) -> Option<bool> {
+        self.line.as_ref().and_then(|line| line.end.cts)
+    }
+
+    fn patience(&self) -> TimeSpan {
+        TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed)
+    }
+
+    fn real_time(&self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
+    fn reopen(&mut self) -> Result<(), Lost> {
+        self.line = None;
+        self.line = Some(open(&self.cable)?);
+        Ok(())
+    }
+}
