@@ -21,7 +21,7 @@ use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path::KnownTrack;
 use super::refusal::Refusal;
-use super::task::Phase;
+use super::task::TaskPhase;
 use super::turnout_guard::train_on;
 
 /// A sensor that reports again within this time was occupied all along: wheels bounce, and no second train follows so
@@ -383,7 +383,7 @@ impl Driver {
     pub(super) fn update_line_requests(&mut self, now: Timestamp) {
         let plans = || {
             self.trains.values().filter_map(|train| match train.task?.phase {
-                Phase::Running { plan } => plan,
+                TaskPhase::Running { plan } => plan,
                 _ => None,
             })
         };

@@ -24,7 +24,7 @@ use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::path::RestrictedStretch;
-use super::task::{Destination, Goal, Phase};
+use super::task::{Destination, Goal, TaskPhase};
 use crate::control::Notice;
 
 /// Probability of entering a zone earlier than assumed, and of being faster in it, each. The probabilities for the
@@ -240,7 +240,7 @@ impl DrivenTrain {
     /// the faster step.
     fn can_settle_at(&self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep) -> bool {
         let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };
-        let is_running = matches!(self.task.map(|task| task.phase), Some(Phase::Running { .. }));
+        let is_running = matches!(self.task.map(|task| task.phase), Some(TaskPhase::Running { .. }));
         let located = self.located(context, now);
         is_running && located.is_some_and(|located| self.settles_before(context, &located, at, step))
     }

@@ -11,7 +11,7 @@ use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path::{circuit_length, recount_from};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::stop_planning::name;
-use crate::control::drive::task::{Destination, Goal, Phase, Task};
+use crate::control::drive::task::{Destination, Goal, Task, TaskPhase};
 use crate::control::{Notice, PlannedArrival};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
@@ -147,7 +147,7 @@ impl DrivenTrain {
         let starts = arriving.start.map(|step| (arriving.since, step));
         let profile = arriving.plan.map(|plan| ArrivalProfile::new(plan, arriving.begins()));
         out.notify(Notice::Arrives(PlannedArrival { order, train, by, starts, profile }));
-        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Arrive(Box::new(arriving)), self.usable_steps(), now));
         self.follows_plan(context, now, out);
     }
@@ -323,7 +323,7 @@ impl DrivenTrain {
     /// Continues as an ordinary stop.
     fn hand_over_to_stop(&mut self, task: Task, destination: Destination) {
         let goal = Goal::RestAt(destination);
-        self.task = Some(Task { goal, phase: Phase::Running { plan: None }, ..task });
+        self.task = Some(Task { goal, phase: TaskPhase::Running { plan: None }, ..task });
     }
 
     /// Measures the target again after a detection; gives up if no path leads there.

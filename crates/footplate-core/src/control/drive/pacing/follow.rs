@@ -18,7 +18,7 @@ use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path::distance_between;
 use crate::control::drive::refusal::Refusal;
-use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
@@ -118,7 +118,7 @@ impl DrivenTrain {
         if is_short {
             return Err(Refusal::GapTooShort { leader, shortest });
         }
-        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
         let following = Following {
             leader,
             gap,

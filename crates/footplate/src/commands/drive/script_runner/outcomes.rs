@@ -7,7 +7,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
-use super::ScriptRunner;
+use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::formatter::{promises_broken, trains, verb};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
@@ -100,18 +100,19 @@ impl ScriptRunner {
             Notice::GivenUp { order, train, why } => {
                 self.promises.remove(order);
                 self.rests.remove(train);
-                match self.pending.remove(order) {
-                    Some(step) if self.is_retried(&step, why) => {
-                        self.say(format!("`{}` waits: {why}", step.text));
-                        self.steps.push_front(Step { is_retry: true, ..step });
-                    }
-                    Some(step) => self.refuse(now, &step, why),
-                    None => {}
+                if let Some(step) = self.pending.remove(order) {
+                    self.cancelled(now, step, why);
                 }
             }
-            Notice::Replaced { order, .. } => {
+            Notice::Replaced { order, train } => {
                 self.promises.remove(order);
-                self.pending.remove(order);
+                let step = self.pending.remove(order);
+                // No other line of a script replaces such a command: the recovery of its train did.
+                if let Some(step) =
+                    step.filter(|step| self.source == CommandSource::Script && ends_at_rest(step))
+                {
+                    self.cancelled(now, step, &Refusal::InDanger { train: *train });
+                }
             }
             // The fit restarts from what the recovery measured: earlier events belong to the train as it was before.
             Notice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
@@ -140,6 +141,16 @@ impl ScriptRunner {
         let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
         let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
         self.outputs.push_back(Output::Notice(SessionMessage::Ended(Ended { achieved, ..ended })));
+    }
+
+    /// What a line asked for was cancelled: a script tries it again once the train can be driven, or the line is refused.
+    fn cancelled(&mut self, now: Timestamp, step: Step, why: &Refusal) {
+        if self.is_retried(&step, why) {
+            self.say(format!("`{}` waits: {why}", step.text));
+            self.steps.push_front(Step { is_retry: true, ..step });
+        } else {
+            self.refuse(now, &step, why);
+        }
     }
 
     fn done(&mut self, finished: &Finished) {
@@ -205,4 +216,9 @@ impl ScriptRunner {
             self.say(line);
         }
     }
+}
+
+/// Whether what a line asks for ends with its train at rest.
+const fn ends_at_rest(step: &Step) -> bool {
+    matches!(step.instruction, Instruction::Order(Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }))
 }
