@@ -74,7 +74,7 @@ pub(in super::super) struct Bank {
     /// How far each hypothesis puts the train ahead of the estimate (m).
     ahead: Lanes,
     /// How far the train ran in the last period by each hypothesis (m).
-    ways: Lanes,
+    distances: Lanes,
     /// First over second wheel speed when both roll, less 1, and its variance.
     pub(super) ratio: f64,
     ratio_variance: f64,
@@ -110,7 +110,7 @@ impl Bank {
             probability: Lanes([0.9, 1e-3, 1e-3, 1e-6, 1e-9, 0.1, LEAST, LEAST]),
             filters,
             ahead: Lanes::all(0.0),
-            ways: Lanes::all(0.0),
+            distances: Lanes::all(0.0),
             ratio: 0.0,
             beyond: 0.0,
             ratio_variance: variances.iter().sum(),
@@ -161,9 +161,9 @@ impl Bank {
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
         self.mix(scene, &wheels, t);
-        let (ways, surprise) = self.run(scene, t);
-        self.ahead += ways;
-        self.ways = ways;
+        let (distances, surprise) = self.run(scene, t);
+        self.ahead += distances;
+        self.distances = distances;
         self.pull(scene, &wheels, t);
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
         let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
@@ -172,10 +172,10 @@ impl Bank {
         self.summed_up(scene.top_speed)
     }
 
-    /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
+    /// Between which speeds (m/s) and distances within the period (m) the train is at this confidence.
     pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        let [likely, way] =
-            interval(&self.probability, &self.filters, &self.ways, scene, (risk, self.beyond), t);
+        let [likely, distance] =
+            interval(&self.probability, &self.filters, &self.distances, scene, (risk, self.beyond), t);
         let wheels = self.compared(scene);
         let speed = self.reach.widen(
             likely,
@@ -185,11 +185,11 @@ impl Bank {
             (self.since_touch, self.wheels_a),
             t,
         );
-        let way = Range {
-            low: way.low + (speed.low - likely.low) * t,
-            high: way.high + (speed.high - likely.high) * t,
+        let distance = Range {
+            low: distance.low + (speed.low - likely.low) * t,
+            high: distance.high + (speed.high - likely.high) * t,
         };
-        [speed, way]
+        [speed, distance]
     }
 
     /// Which way wheels that lose their grip turn.
@@ -325,12 +325,12 @@ impl Bank {
         self.acted += acts;
         self.filters.a += TRUSTS * (EXPECTED * acts);
         let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
-        let ways = self.filters.run(t, JERK + TRUSTS * unannounced);
-        self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
+        let distances = self.filters.run(t, JERK + TRUSTS * unannounced);
+        self.filters.r += (distances - alpha * counted_1 - beta * counted_2) * trusted;
         let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
         let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
         let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
-        (ways + moved, surprise)
+        (distances + moved, surprise)
     }
 
     /// What the counts of each wheel are multiplied by so that both say the same while both roll.
@@ -363,13 +363,13 @@ impl Bank {
     /// What all hypotheses come to; how far the estimate moved.
     fn summed_up(&mut self, top: f64) -> f64 {
         let p = self.probability;
-        let (v, a, way) = ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
+        let (v, a, distance) = ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
         let dv = self.filters.v - Lanes::all(v);
         self.variance = (p * (self.filters.pvv + dv * dv)).sum();
         self.speed = larger(smaller(v, top), -top);
         self.acceleration = a;
-        self.ahead -= Lanes::all(way);
-        way
+        self.ahead -= Lanes::all(distance);
+        distance
     }
 }
 

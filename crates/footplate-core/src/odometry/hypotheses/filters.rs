@@ -133,7 +133,7 @@ impl Filters {
     #[inline]
     pub(super) fn run(&mut self, t: f64, q: Lanes) -> Lanes {
         let half = 0.5 * t * t;
-        let way = self.v * t + self.a * half;
+        let distance = self.v * t + self.a * half;
         self.v += self.a * t;
         let prv = self.prv + self.pvv * t + self.pva * half;
         let pra = self.pra + self.pva * t + self.paa * half;
@@ -144,7 +144,7 @@ impl Filters {
         self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
         self.pva = pva + q * (t * t * 0.5);
         self.paa += q * t;
-        way
+        distance
     }
 
     /// The counter says that `r` is 0, with variance `variance` where `trusted` is 1; by how much the place moved, and

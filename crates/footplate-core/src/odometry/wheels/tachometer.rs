@@ -57,7 +57,7 @@ pub struct Expected {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
     /// 1 the way in which distance grows, −1 the other.
-    pub way: f64,
+    pub direction: f64,
     /// It is too fast to have turned round: a sensor that says so is wrong.
     pub certain: bool,
     /// The two sensors say different ways, so that neither is believed.
@@ -164,7 +164,7 @@ impl Tachometer {
         self.withheld = pulses - stand_in;
         let doubt = expected.more.max(expected.fewer);
         // A stand-in that is larger than what was read may be an expectation that ran ahead.
-        let late = if self.withheld * heading.way < 0.0 { -self.withheld } else { 0.0 };
+        let late = if self.withheld * heading.direction < 0.0 { -self.withheld } else { 0.0 };
         Turn { pulses: stand_in, quality: Quality::Substituted, doubt, late }
     }
 
@@ -229,16 +229,16 @@ impl Tachometer {
     /// Which way the pulses count, minding a sensor that is wired the wrong way round.
     fn sign(&mut self, direction: Direction, heading: Heading, turned: bool) -> f64 {
         let told = match direction {
-            Direction::Unknown => return heading.way,
+            Direction::Unknown => return heading.direction,
             Direction::Forward => self.wiring,
             Direction::Backward => -self.wiring,
         };
-        if turned { self.believed(told, heading) } else { heading.way }
+        if turned { self.believed(told, heading) } else { heading.direction }
     }
 
     /// Which way a wheel turned that is told to have turned so.
     fn believed(&mut self, told: f64, heading: Heading) -> f64 {
-        if told == heading.way {
+        if told == heading.direction {
             self.contradictions = 0;
             return told;
         }
@@ -249,7 +249,7 @@ impl Tachometer {
                 self.contradictions = 0;
             }
         }
-        if heading.certain || heading.disputed { heading.way } else { told }
+        if heading.certain || heading.disputed { heading.direction } else { told }
     }
 }
 
@@ -291,7 +291,7 @@ mod tests {
 
     use super::*;
 
-    const FORWARD: Heading = Heading { way: 1.0, certain: true, disputed: false };
+    const FORWARD: Heading = Heading { direction: 1.0, certain: true, disputed: false };
     const CALM: Expected = Expected { pulses: 20.0, more: 3.0, fewer: 3.0, rolling: 1.5, most: 60.0 };
 
     fn turns(counts: &[Count]) -> Vec<Turn> {
