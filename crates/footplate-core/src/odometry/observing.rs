@@ -29,7 +29,8 @@ impl Odometer {
             // One of the two has swapped wires; trains that run backward are rarer.
             self.turn();
         }
-        let heading = Heading { direction: self.direction, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
+        let heading =
+            Heading { direction: self.direction, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
         let at = (t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
         let counted =
