@@ -211,4 +211,18 @@ mod tests {
         let alone = after([doubted, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
         assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
     }
+
+    #[test]
+    fn a_sensor_that_counts_at_rest_does_not_have_its_way_once_the_other_is_not_asked() {
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let (speed, limits) = (Range { low: -0.3, high: 30.0 }, Range { low: -1.0, high: 1.0 });
+        let high = |pulses| Counted { at_most: false, ..counted(pulses) };
+        for _ in 0..200 {
+            bounds.moved(speed, speed, limits, &[high(0.0), high(24.0)], 0.05);
+        }
+        // Traction begins: the first wheel may slip and no longer bounds from below.
+        let slips = Counted { at_least: false, ..high(0.0) };
+        let distance = bounds.moved(speed, speed, limits, &[slips, high(24.0)], 0.05);
+        assert!(distance.low < 1.0, "{distance:?}: the train is at rest");
+    }
 }

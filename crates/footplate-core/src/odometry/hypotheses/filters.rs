@@ -245,3 +245,19 @@ pub(super) struct Pool {
     pub(super) paa: f64,
     pub(super) prr: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variance_that_is_cut_takes_its_covariances_with_it() {
+        let mut filters = Filters::new(10.0, 5e4);
+        filters.paa = Lanes::all(40.0);
+        filters.pva = Lanes::all(1400.0);
+        filters.keep_sound();
+        let State { pvv, pva, paa, .. } = filters.state(0);
+        assert_eq!((pvv, paa), (1e4, 4.0));
+        assert!(pva > 0.0 && pva * pva <= pvv * paa, "{pva}");
+    }
+}

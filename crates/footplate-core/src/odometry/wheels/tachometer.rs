@@ -367,4 +367,10 @@ mod tests {
         // At standstill it is now read the right way round.
         assert_eq!(tachometer.read(&reading, 1.0, Heading { certain: false, ..FORWARD }, &CALM).pulses, 20.0);
     }
+
+    #[test]
+    fn a_sensor_that_dies_is_withheld_once_and_then_read() {
+        let pulses: Vec<f64> = turns(&[Count::Pulses(0); 6]).iter().map(|turn| turn.pulses).collect();
+        assert_eq!(pulses, [20.0, -20.0, 0.0, 0.0, 0.0, 0.0]);
+    }
 }
