@@ -1,4 +1,4 @@
-//! What many runs come to: in the middle, and in the worst of them.
+//! Figures over many runs: the median and the worst.
 
 use footplate_store::odometry::{OdometryScore, RunScores};
 
@@ -22,15 +22,15 @@ pub(crate) struct Spread {
     pub(crate) worst: f64,
 }
 
-/// How good an odometer was on a family. Shares without a word about runs are over all periods of all runs.
+/// Figures of an odometer on a family. Shares are over all periods of all runs, unless they name runs.
 pub(crate) struct Figures {
     pub(crate) speed_rms_m_s: Option<Spread>,
     pub(crate) speed_max_m_s: Option<Spread>,
-    /// Amount of the error at the end of the run, in per cent of the way.
+    /// Absolute error at the end of the run, in per cent of the distance.
     pub(crate) distance_end_pct: Option<Spread>,
     pub(crate) speed_width_mean_m_s: Option<Spread>,
     pub(crate) speed_inside_pct: Option<f64>,
-    /// In how many runs the distance never left its interval; absent without one.
+    /// Number of runs whose distance never left its interval; absent without one.
     pub(crate) distance_inside_runs: Option<usize>,
     pub(crate) etcs_speed_violation_pct: Option<f64>,
     /// The same in the worst run.
@@ -42,9 +42,9 @@ pub(crate) struct Figures {
 impl Spread {
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
-        // Not a number comes last, and is the worst.
+        // NaN sorts last, as the worst.
         values.sort_unstable_by(f64::total_cmp);
-        // Of two in the middle, half way between.
+        // Between two in the middle, their mean.
         let middle = |at: usize| values.get(at).copied();
         let median = 0.5 * (middle(values.len().checked_sub(1)? / 2)? + middle(values.len() / 2)?);
         Some(Self { median, worst: *values.last()? })
@@ -70,7 +70,7 @@ impl<'r> Family<'r> {
         self.runs.len()
     }
 
-    /// In how many periods the recommended preset flags a wheel that rolls, in per cent.
+    /// Share of periods in which the recommended preset flags a wheel that rolls (%).
     pub(crate) fn false_flags_pct(&self) -> Option<f64> {
         self.flags.pct()
     }

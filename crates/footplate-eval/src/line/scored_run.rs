@@ -1,4 +1,4 @@
-//! One simulated run through every odometer, and how good each of them was.
+//! One simulated run through every odometer, with their scores.
 
 use footplate_core::odometry::WheelState;
 use footplate_core::{TimeSpan, Timestamp};
@@ -7,18 +7,18 @@ use footplate_store::odometry::{
     OdometryRun, OdometryScore, Preset, Rival, RunContext, RunScores, simulated_rows, simulated_vehicle,
 };
 
-/// How long a wheel has to roll in truth before a flag on it is false: a second until it is trusted again, as vehicles
-/// ask for, and a second for all that lets go of it late.
+/// How long a wheel has to roll before a flag on it is false: a second until it is trusted again, as vehicles require, and a
+/// second of tolerance.
 const ROLLS_FOR: TimeSpan = TimeSpan::from_ms(2000);
 
-/// A way to make speed and distance of counts.
+/// An odometer that is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Odometer {
     Ours(Preset),
     Theirs(Rival),
 }
 
-/// One run and how good every odometer was on it.
+/// One run with the scores of every odometer.
 pub struct ScoredRun {
     /// Which of the families it is of.
     pub family: usize,
@@ -30,7 +30,7 @@ pub struct ScoredRun {
     pub(crate) flags: FalseFlags,
 }
 
-/// In how many periods the recommended preset says that a wheel slips or slides which rolls.
+/// Periods in which the recommended preset flags a wheel that rolls.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FalseFlags {
     periods: u64,
@@ -61,7 +61,7 @@ impl Odometer {
         }
     }
 
-    /// How good it was.
+    /// Its score.
     pub(crate) fn score(self, scores: &RunScores) -> OdometryScore {
         match self {
             Self::Ours(preset) => scores.preset(preset),
@@ -86,7 +86,7 @@ impl FalseFlags {
         self.flagged += other.flagged;
     }
 
-    /// Part of all periods of wheels that roll, in per cent.
+    /// Share of all periods of wheels that roll (%).
     pub(crate) fn pct(self) -> Option<f64> {
         (self.periods > 0).then(|| 100.0 * self.flagged as f64 / self.periods as f64)
     }

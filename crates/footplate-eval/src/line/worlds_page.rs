@@ -1,4 +1,4 @@
-//! Random worlds through every odometer: tables by phase, and the worst ten with seed and mechanism.
+//! Random worlds through every odometer: tables by phase, and the worst ten with seed and notes.
 
 use std::io::{self, Write};
 
@@ -11,13 +11,13 @@ use super::families_page::{one, rounded_down};
 use super::score_json;
 use crate::seeds::{FRESH, seeds_sentence};
 
-/// So many of the worst worlds are named.
+/// Number of the worst worlds that are named.
 const WORST: usize = 10;
-/// After both slipped and roll again, the interval is asked to have its normal width so soon.
+/// The interval should have its normal width so soon after both slipped.
 const NORMAL_WITHIN: TimeSpan = TimeSpan::from_ms(3000);
 const OURS: WorldOdometer = WorldOdometer::Recommended;
 
-/// One world and how good every odometer was on it.
+/// One world with the scores of every odometer.
 pub struct ScoredWorld {
     seed: u64,
     level: LineLevel,
@@ -27,7 +27,7 @@ pub struct ScoredWorld {
 }
 
 impl ScoredWorld {
-    /// Runs and scores the world of a seed, as an operator of a level knows it.
+    /// Runs and scores the world of a seed, as known to an operator of this level.
     ///
     /// # Errors
     /// When its vehicle is one that no railway has.
@@ -130,7 +130,7 @@ impl WorldsPage {
         self.worst().into_iter().try_for_each(|world| write_world(output, world))
     }
 
-    /// Whether a guaranteed interval was left more often than it promises, of worlds whose claims hold.
+    /// Whether the truth left a guaranteed interval more often than it may, in worlds whose claims hold.
     #[must_use]
     pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         LineLevel::ALL.into_iter().filter_map(|level| self.of(level, |world| world.claims_hold)).any(
