@@ -1,4 +1,4 @@
-//! How long things take between the track, the bus and this program.
+//! Delays between the track, the bus and this program.
 //!
 //! The bus carries 16 457 bit/s, ten bits a byte. A message waits for the one before it, for 1.2 ms of silence, and by a throttle's or
 //! detector's priority for up to 1.5 ms more (LocoNet Personal Use Edition, "Network timing"). How long detectors filter their inputs
@@ -18,7 +18,7 @@ pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ns(4 * BUS_BYTE.as_ns
 /// The longest, unless a person says another.
 pub const SENSOR_DELAY_LONGEST: TimeSpan = TimeSpan::from_ms(40);
 
-/// The times that planners need. A command counts as gone when it is handed to the server; the request before it takes up to four
+/// The times for planners. A command counts as sent when it is handed to the server; the request before it takes up to four
 /// messages of 5 ms each, and a tenth more is allowed. A stop may wait for as long behind the slowest report.
 pub const TIME_MODEL: TimeModel = TimeModel {
     command: TimeSpan::ZERO,
@@ -32,7 +32,7 @@ pub const TIME_MODEL: TimeModel = TimeModel {
 pub const USUAL_LINE: UsualLine =
     UsualLine { answers_within: TimeSpan::from_ms(40), repeated_after: REPEATED_AFTER };
 
-/// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
+/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
 ///
 /// `not_before` is the time of the last entry of the recording, whose entries stay in order.
 pub(super) fn occupied(heard: Timestamp, not_before: Timestamp, longest: TimeSpan) -> (Timestamp, TimeSpan) {

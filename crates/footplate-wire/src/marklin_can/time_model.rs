@@ -1,4 +1,4 @@
-//! How long things take between the track, the station and this program.
+//! Delays between the track, the station and this program.
 //!
 //! A station loads all contacts into the S88 bus at once, a cycle apart, shifts out one after the other and reports what has changed
 //! since the cycle before. A report says for how
@@ -27,7 +27,7 @@ pub const NETWORK_SHORTEST: TimeSpan = TimeSpan::from_us(520);
 /// The longest, on a cable or an idle wireless network (chosen; what a network really does is in the doctor's figures).
 pub const NETWORK_LONGEST: TimeSpan = TimeSpan::from_ms(20);
 
-/// The times that planners need. A command counts as gone when its frame is written; frames go 10 ms apart at the most crowded, and
+/// The times for planners. A command counts as sent when its frame is written; frames go 10 ms apart at the most crowded, and
 /// a tenth more is allowed. A report comes behind a cycle, the bits of thirty modules and the network: 200 ms.
 pub const TIME_MODEL: TimeModel = TimeModel {
     command: TimeSpan::ZERO,

@@ -41,7 +41,7 @@ const LOST_SHARE: f64 = 0.01;
 /// Listen to a line: how often sensors are read, and what is lost.
 ///
 /// No train is moved. Power is put on the track; trains that stand stay, and at the end the power is taken off.
-/// The exit status is 1 when more than one reply in a hundred was lost.
+/// The exit status is 1 when more than one reply in a hundred was lost, or the line itself.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -82,14 +82,22 @@ impl Arguments {
         let link = open(&self.link, &layout, Speed::Unpaced)?;
         let session = open_session(&self.link, &link, &layout)?;
         let mut patient = Patient { next: link.now() + COMMAND_EVERY, due: false };
-        let mut ear =
-            Ear { until: link.now() + TimeSpan::from_s(self.seconds), noticed: BTreeMap::new(), lost: 0 };
+        let mut ear = Ear {
+            until: link.now() + TimeSpan::from_s(self.seconds),
+            noticed: BTreeMap::new(),
+            lost: 0,
+            noise: None,
+        };
         let mut runtime = Runtime::new(TappedLink::new(link), session, None, Some(StopFlag::install()));
         let ended = runtime.run(&mut patient, &mut ear)?;
         runtime.close();
         match ended {
             Ended::Finished | Ended::Interrupted => {}
-            Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
+            Ended::LineLost(lost) => {
+                writeln!(output, "line          lost: {lost}")?;
+                return Ok(Outcome::FallsShort);
+            }
+            Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
         }
         let heard =
             Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
@@ -118,6 +126,13 @@ impl Arguments {
     ) -> anyhow::Result<f64> {
         let (reads, lateness) = (interface.module_reads(), interface.reply_lateness());
         let figures = Figures::of(heard.passed, heard.ear.lost);
+        if !figures.has_replies() {
+            let noise = heard.ear.noise.as_ref().map_or_else(String::new, |noise| format!(" ({noise})"));
+            bail!(
+                "no reply to any poll was read{noise}: check that the port belongs to a 6050 or 6051, its speed (2400 baud) and that \
+                 no other program writes to it"
+            );
+        }
         if let Some(plot) = &self.plot {
             plot.write(&figures.picture())?;
         }
@@ -156,7 +171,10 @@ impl Arguments {
         heard: &Heard<'_>,
         output: &mut dyn Write,
     ) -> anyhow::Result<f64> {
-        figures.check().map_err(|check| anyhow!(check))?;
+        // Noise is the best explanation of a station that was not found.
+        figures.check().map_err(|check| {
+            heard.ear.noise.clone().map_or_else(|| anyhow!(check), |noise| anyhow!(noise))
+        })?;
         let answers = figures.answers();
         let line = answers.round_trips();
         if let Some(plot) = &self.plot {
@@ -187,7 +205,7 @@ impl Arguments {
         Ok(answers.lost_share())
     }
 
-    /// Says what the line changes in the times that trains are driven with.
+    /// Prints how the line changes the time model.
     fn advise(&self, line: Option<&RoundTrips>, output: &mut dyn Write) -> anyhow::Result<()> {
         let Some((line, usual)) = line.zip(self.link.station_kind().usual_line()) else { return Ok(()) };
         let (excess, repeats) = (line.excess(usual), line.repeats());
@@ -252,6 +270,8 @@ struct Ear {
     until: Timestamp,
     noticed: BTreeMap<String, usize>,
     lost: usize,
+    /// The notice about unreadable bytes.
+    noise: Option<String>,
 }
 
 impl Ear {
@@ -268,13 +288,16 @@ impl<M: Machine> Attendant<M> for Ear {
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
-            // Which reads are answered is a line of its own, and finding it out loses some.
+            // The kind of reads has its own line in the report, and finding it out loses some replies.
             LinkNotice::Answers | LinkNotice::Identified { .. } => return,
             LinkNotice::Reads(_) => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
                 return;
             }
             LinkNotice::ReplyLost { .. } => self.lost += 1,
+            LinkNotice::Unreadable { .. } | LinkNotice::UnexpectedBytes { .. } => {
+                self.noise = Some(notice.to_string())
+            }
             _ => {}
         }
         *self.noticed.entry(notice.to_string()).or_default() += 1;

@@ -45,7 +45,7 @@ fn read(file: &Path) -> anyhow::Result<MeasuredLines> {
 }
 
 impl MeasuredLine {
-    /// What was measured of a line, if anything was.
+    /// Returns what was measured of a line, if anything.
     ///
     /// # Errors
     /// When the file beside the store cannot be read.
@@ -54,7 +54,7 @@ impl MeasuredLine {
         Ok(read(&file_beside(store))?.lines.remove(&address.place()))
     }
 
-    /// Keeps what was measured of a line in the place of what was known of it; returns the file.
+    /// Replaces what is stored of a line; returns the file.
     ///
     /// # Errors
     /// When the file beside the store cannot be read or written.
@@ -69,7 +69,7 @@ impl MeasuredLine {
 }
 
 impl Address {
-    /// The times of the link behind it, over the line as it was measured.
+    /// Returns the time model of the link over the measured line.
     pub(crate) fn time_model(&self, line: Option<&MeasuredLine>) -> TimeModel {
         let kind = self.station_kind();
         match (line, kind.usual_line()) {
@@ -78,13 +78,13 @@ impl Address {
         }
     }
 
-    /// By how much the line delays reports beyond what is usual, as it was measured.
+    /// Returns how much longer than usual the measured line delays reports.
     pub(crate) fn excess(&self, line: Option<&MeasuredLine>) -> TimeSpan {
         let usual = self.station_kind().usual_line();
         line.zip(usual).map_or(TimeSpan::ZERO, |(line, usual)| line.round_trips.excess(usual))
     }
 
-    /// Where it leads, without what is said of the station there.
+    /// Returns the place of the station, without settings.
     fn place(&self) -> String {
         use super::can_address::CanPlace;
         match self {

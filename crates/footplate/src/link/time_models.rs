@@ -20,7 +20,7 @@ impl Address {
 }
 
 impl StationKind {
-    /// The times of the link over a usual line, as the station's session has them.
+    /// Returns the station's time model, which holds over a usual line.
     pub(crate) const fn time_model(self) -> TimeModel {
         match self {
             Self::Marklin => marklin_serial::TIME_MODEL,
@@ -31,7 +31,7 @@ impl StationKind {
         }
     }
 
-    /// The line for which these times hold; a 6051 is alone on its line, whose pace its session knows.
+    /// Returns the line for which the time model holds; `None` for a 6051, which is alone on its line and polled.
     pub(crate) const fn usual_line(self) -> Option<UsualLine> {
         match self {
             Self::Marklin => None,

@@ -20,14 +20,14 @@ pub(crate) struct Z21Address {
     pub(crate) host: String,
     /// Its port.
     pub(crate) port: u16,
-    /// What it, its sensors and its turnouts are like.
+    /// Settings of the station, its sensors and its turnouts.
     pub(crate) settings: Settings,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 impl Z21Address {
-    /// A station at a place of the network.
+    /// Returns a station at a place in the network.
     ///
     /// # Errors
     /// When no place is named.

@@ -1,4 +1,4 @@
-//! What becomes of the lines that come.
+//! Handles lines from the server.
 
 use alloc::string::String;
 
@@ -159,7 +159,7 @@ impl Client {
         let curved = closed != self.settings.closed_is_straight;
         let before = self.dialogue.hear_of_turnout(turnout, curved);
         if !is_own && before != Some(curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
+            // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
@@ -170,7 +170,7 @@ impl Client {
         match self.sensors.heard(number, is_occupied, !self.opening.is_open()) {
             Change::Occupied => {
                 let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                // It may have become occupied at any time since nothing was heard.
+                // It may have become occupied at any time since the line was silent.
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
                 self.dialogue.report(sensor, latest, width);
             }
