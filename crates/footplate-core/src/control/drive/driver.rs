@@ -248,9 +248,9 @@ impl Driver {
         if context.layout.branch(turnout).is_none() {
             return Err(Refusal::UnknownTurnout { turnout });
         }
-        let lies = context.turnouts.get(turnout) == Some(Leg::from_curved(curved));
+        let is_set = context.turnouts.get(turnout) == Some(Leg::from_curved(curved));
         let on_it = train_on(&self.trains, context, now, turnout);
-        if let Some(train) = on_it.filter(|_| !lies) {
+        if let Some(train) = on_it.filter(|_| !is_set) {
             return Err(Refusal::TurnoutOccupied { turnout, train });
         }
         let partner = context
@@ -413,9 +413,9 @@ impl Machine for Driver {
         match event.kind {
             EventKind::Sensor(report) => self.report(now, event.time, report),
             EventKind::Speed { train, .. } | EventKind::Reverse { train } => {
-                self.association.command_left(&self.trains, context, event);
+                self.association.command_sent(&self.trains, context, event);
                 if let Some(train) = self.trains.get_mut(&train) {
-                    train.command_left(context, now, event, &mut self.outputs);
+                    train.command_sent(context, now, event, &mut self.outputs);
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_sent(now, turnout, curved),
