@@ -314,7 +314,7 @@ impl DrivenTrain {
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
             (TaskPhase::Locating { .. }, _) => {
-                self.resume_to_target(context, now, task.order, destination, out)
+                self.resume_to_target(context, now, task.order, destination, out);
             }
             (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
                 Some(at) => {

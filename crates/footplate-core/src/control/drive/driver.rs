@@ -185,7 +185,7 @@ impl Driver {
             (Order::Reverse { then, .. }, Some(train)) => train.reverse(context, now, id, then, out),
             (Order::Stop(stop), Some(train)) => train.stop_at(context, now, id, &stop, out)?,
             (Order::Move { distance, .. }, Some(train)) => {
-                train.start_move(context, now, id, distance, out)?
+                train.start_move(context, now, id, distance, out)?;
             }
             (Order::Hold { speed, .. }, Some(train)) => train.hold(context, now, id, speed, out)?,
             (Order::Arrive { target, within, .. }, Some(train)) => {
