@@ -6,7 +6,9 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, Event, EventKind, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use crate::farewell::Farewell;
 use crate::locomotives::{Locomotive, Locomotives};
@@ -31,6 +33,8 @@ pub(crate) struct Dialogue<A: Awaited> {
     /// Whether the track is meant to have power, and whether the station has said that it has.
     pub(crate) power: bool,
     pub(crate) is_powered: bool,
+    /// By how much the line may delay a report beyond what is usual for the station.
+    pub(crate) excess: TimeSpan,
     /// When the last message came.
     pub(crate) heard: Timestamp,
     /// The time of the last entry of the recording: entries stay in order.
@@ -62,6 +66,7 @@ impl<A: Awaited> Dialogue<A> {
             turnouts: Vec::new(),
             power: true,
             is_powered: false,
+            excess: TimeSpan::ZERO,
             heard: now,
             last_entry: now,
             farewell: Farewell::default(),
@@ -94,6 +99,12 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn enter(&mut self, time: Timestamp, kind: EventKind) {
         self.last_entry = self.last_entry.max(time);
         self.output.push_back(Transmit::Event(Event { time, kind }));
+    }
+
+    /// A sensor became occupied within a span that ends at `latest`.
+    pub(crate) fn report(&mut self, sensor: SensorId, latest: Timestamp, width: TimeSpan) {
+        let poll_interval = Some(width + self.excess);
+        self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval }));
     }
 
     pub(crate) fn write(&mut self, bytes: Vec<u8>) {

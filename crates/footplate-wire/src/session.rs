@@ -41,6 +41,10 @@ pub trait Session {
     /// do not poll.
     fn watch(&mut self, _sensor: Option<SensorId>) {}
 
+    /// The line may delay a report by so much more than is usual for this kind of station (as measured): sensors may have become
+    /// occupied that much earlier. Without effect on links that poll, as their line is not shared.
+    fn expect_delays(&mut self, _excess: TimeSpan) {}
+
     /// The time has come that was asked for, or it is a good moment to look at the clock anyway.
     fn handle_timeout(&mut self, now: Timestamp);
 

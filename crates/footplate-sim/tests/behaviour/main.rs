@@ -4,6 +4,7 @@ mod continuity;
 mod line_claims;
 mod line_journeys;
 mod line_same_seed;
+mod line_second_integrator;
 mod line_sensors;
 mod line_services;
 mod line_slides;

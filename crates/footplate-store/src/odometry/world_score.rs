@@ -2,14 +2,14 @@
 
 use footplate_core::odometry::wheels::VehicleError;
 use footplate_core::odometry::{Mode, MotionEstimate, Odometer};
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::{Speed, TimeSpan, Timestamp};
 use footplate_sim::line::{LineEventKind, LineRun, LineTruth, WheelTruth};
 
 use super::counted_way::WayCounter;
-use super::oracle::Oracle;
+use super::oracle::{Oracle, hindsight};
 use super::rival::{Rival, RivalOdometer};
 use super::run::{Preset, claim};
-use super::score::{OdometryScore, Scorer};
+use super::score::{Claim, OdometryScore, Scorer};
 use super::simulated::{simulated_rows, simulated_vehicle};
 use crate::tachometer::Truth;
 
@@ -78,11 +78,14 @@ pub enum WorldOdometer {
     RawMax,
     /// One that is told which wheelset slips, and when.
     Oracle,
+    /// One that knows the truth but while both slip, and then the mean acceleration, in hindsight.
+    Hindsight,
 }
 
 impl WorldOdometer {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 5] = [Self::Recommended, Self::Paper, Self::RawMean, Self::RawMax, Self::Oracle];
+    pub const ALL: [Self; 6] =
+        [Self::Recommended, Self::Paper, Self::RawMean, Self::RawMax, Self::Oracle, Self::Hindsight];
 
     /// What it is called in files.
     #[must_use]
@@ -93,6 +96,7 @@ impl WorldOdometer {
             Self::RawMean => "raw_mean",
             Self::RawMax => "raw_max",
             Self::Oracle => "oracle",
+            Self::Hindsight => "hindsight",
         }
     }
 }
@@ -113,8 +117,8 @@ pub struct WorstMoment {
 /// How good every odometer was in every phase, on one world or on many together.
 #[derive(Debug, Clone, Default)]
 pub struct WorldScores {
-    phases: [[Scorer; 5]; 5],
-    whole: [Scorer; 5],
+    phases: [[Scorer; 6]; 5],
+    whole: [Scorer; 6],
     /// Widths of our intervals in normal running (m/s): that of the stated confidence, and the guaranteed one.
     widths: [Vec<f32>; 2],
     normal_after_s: Vec<f32>,
@@ -140,7 +144,9 @@ impl WorldScores {
         let mut seen = Vec::with_capacity(run.samples.len());
         let mut events = run.events.iter().peekable();
         let mut is_faulty = false;
-        for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
+        for (((period, known), truth), in_hindsight) in
+            simulated_rows(run).zip(&run.truth).zip(hindsight(run))
+        {
             while let Some(event) = events.next_if(|event| event.time <= period.time) {
                 match event.what {
                     LineEventKind::FaultBegins => is_faulty = true,
@@ -158,6 +164,7 @@ impl WorldScores {
                 rivals[0].step(&counted),
                 rivals[1].step(&counted),
                 oracle.step(&counted, [first, second && !is_faulty]),
+                Claim::plain(Speed::from_m_per_s(in_hindsight), truth.distance),
             ];
             let of_speed = Truth { distance: None, ..known };
             for ((claim, whole), in_phase) in

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_stops_are_told_by_their_columns() {
+    fn tables_are_recognised_by_their_columns() {
         let speeds = read(&format!("{SPEEDS}24,14,above,557.5,someone,2018\n")).unwrap();
         let [speed] = speeds.as_slice() else { panic!("{speeds:?}") };
         assert_eq!((speed.quantity, speed.train), (PublishedQuantity::Speed, TrainId(24)));
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn errors_name_their_place() {
         for (text, expected) in [
             ("", "is empty"),
             (SPEEDS, "no row"),

@@ -9,7 +9,7 @@ use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
 /// A request is repeated when it was not answered for so long: many times the longest answer (9.1 ms), as the project's own
 /// client library asks of clients.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

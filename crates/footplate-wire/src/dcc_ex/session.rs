@@ -221,6 +221,10 @@ impl Session for Client {
         Ok(())
     }
 
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
+    }
+
     fn handle_timeout(&mut self, now: Timestamp) {
         self.go_on(now);
     }

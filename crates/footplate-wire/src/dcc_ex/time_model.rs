@@ -3,8 +3,10 @@
 //! Measured on firmware 5.6.0 under a cycle-accurate simulator in real time, 8 sensors defined. The source agrees: each sensor
 //! is read every 10 ms at most, and a change counts when the next scan confirms it.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// The shortest time from a sensor being occupied until the host has the message (20 samples; median 16.8 ms).
 pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_us(3_600);
@@ -27,6 +29,10 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     reaction: TimeSpan::from_ms(40),
     report_window: TimeSpan::from_ms(20),
 };
+
+/// The line that these times hold for: answers come within the longest that was measured.
+pub const USUAL_LINE: UsualLine =
+    UsualLine { answers_within: ANSWER_LONGEST, repeated_after: REPEATED_AFTER };
 
 /// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
 ///

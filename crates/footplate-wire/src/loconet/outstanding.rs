@@ -9,7 +9,7 @@ use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
 /// A request is repeated when it was not answered for so long: three messages with their reports take some 30 ms on an idle bus; a busy
 /// bus and a wireless network are given ten times that.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
 
 /// What the station or the server says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,8 +4,10 @@
 //! detector's priority for up to 1.5 ms more (LocoNet Personal Use Edition, "Network timing"). How long detectors filter their inputs
 //! no source says of all; 40 ms leave room for a scan and for a slot's data of 14 bytes before the report.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// One byte on the bus.
 pub const BUS_BYTE: TimeSpan = TimeSpan::from_us(608);
@@ -25,6 +27,10 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     reaction: TimeSpan::from_ms(70),
     report_window: SENSOR_DELAY_LONGEST,
 };
+
+/// The line that these times hold for: answers come within three messages on a bus that others use, too.
+pub const USUAL_LINE: UsualLine =
+    UsualLine { answers_within: TimeSpan::from_ms(40), repeated_after: REPEATED_AFTER };
 
 /// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
 ///

@@ -8,7 +8,7 @@ use super::uid::Uid;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
 /// Stations answer within some milliseconds; 250 to 500 ms are advised.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// A train at 500 mm/s runs 50 mm in this time, and a stop that comes twice does no harm.
 const STOP_REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);

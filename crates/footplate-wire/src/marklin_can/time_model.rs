@@ -6,8 +6,10 @@
 //! changes of one contact are known to lie so far apart, whatever the network did to the reports: where the delay of one is uncertain,
 //! the other one narrows it.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// Contacts of an S88 module.
 pub const CONTACTS_PER_MODULE: u16 = 16;
@@ -33,6 +35,12 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     soonest: TimeSpan::from_ms(11),
     reaction: TimeSpan::from_ms(200),
     report_window: SCAN_EVERY,
+};
+
+/// The line that these times hold for: answers come within what a network takes at the longest, and once more for the way there.
+pub const USUAL_LINE: UsualLine = UsualLine {
+    answers_within: TimeSpan::from_ns(2 * NETWORK_LONGEST.as_ns()),
+    repeated_after: REPEATED_AFTER,
 };
 
 /// The unit of the time that a report carries.

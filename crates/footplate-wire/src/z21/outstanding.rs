@@ -11,7 +11,7 @@ use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
 /// A request is repeated when it was not answered for so long: a datagram may be lost, and stations answer within some
 /// milliseconds. Over a busy wireless network answers take longer now and then; a repetition then does no harm.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,8 +4,10 @@
 //! modules in a cycle of 33 ms (the RS-bus that the R-BUS resembles), so that a change waits for up to one cycle; then the station
 //! sends a datagram. Over a wired network that takes about a millisecond; 40 ms leave some for a busy station.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// The shortest time from a sensor being occupied until the host has the message: a datagram's way.
 pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ms(1);
@@ -22,6 +24,10 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     reaction: TimeSpan::from_ms(50),
     report_window: SENSOR_DELAY_LONGEST,
 };
+
+/// The line that these times hold for: answers come within some milliseconds in the station, and a wired network.
+pub const USUAL_LINE: UsualLine =
+    UsualLine { answers_within: TimeSpan::from_ms(10), repeated_after: REPEATED_AFTER };
 
 /// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
 ///

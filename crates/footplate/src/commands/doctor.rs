@@ -9,10 +9,12 @@ mod z21_figures;
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::control::{Machine, Output};
+use footplate_core::link::RoundTrips;
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
@@ -25,7 +27,10 @@ use self::loconet_figures::LocoNetFigures;
 use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
-use crate::link::{Address, Link, Passed, Speed, StationSession, TappedLink, open, open_session};
+use crate::clock::now;
+use crate::link::{
+    Address, Link, MeasuredLine, Passed, Speed, StationSession, TappedLink, open, open_session,
+};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 
 /// A command now and then, to see what one costs; as rare as commands are when trains are driven.
@@ -56,6 +61,9 @@ pub(crate) struct Arguments {
     /// For how long to listen, in seconds of the station's time.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
+    /// Keep what was measured of the line beside this store, so that `calibrate` and `drive` with the same --store count with it.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
     /// Draw how latencies are spread to this file, SVG or PNG by its ending.
     #[arg(long, value_name = "FILE")]
     plot: Option<PictureFile>,
@@ -150,6 +158,7 @@ impl Arguments {
     ) -> anyhow::Result<f64> {
         figures.check().map_err(|check| anyhow!(check))?;
         let answers = figures.answers();
+        let line = answers.round_trips();
         if let Some(plot) = &self.plot {
             plot.write(&answers.picture())?;
         }
@@ -161,9 +170,45 @@ impl Arguments {
             figures.write_station(output)?;
             answers.write(output)?;
             figures.write_reports(output)?;
+            self.advise(line.as_ref(), output)?;
             heard.ear.write(output)?;
         }
+        if let Some(store) = &self.store {
+            let Some(round_trips) = line else {
+                bail!("too few answers to measure the line: listen longer, such as --seconds 60");
+            };
+            let line = MeasuredLine {
+                measured_at_s: (now() - Timestamp::ZERO).as_ns() / 1_000_000_000,
+                round_trips,
+            };
+            let file = line.keep(&self.link, store)?;
+            eprintln!("kept in {}; `calibrate` and `drive` with this --store count with it", file.display());
+        }
         Ok(answers.lost_share())
+    }
+
+    /// Says what the line changes in the times that trains are driven with.
+    fn advise(&self, line: Option<&RoundTrips>, output: &mut dyn Write) -> anyhow::Result<()> {
+        let Some((line, usual)) = line.zip(self.link.station_kind().usual_line()) else { return Ok(()) };
+        let (excess, repeats) = (line.excess(usual), line.repeats());
+        let within = usual.answers_within.as_ms();
+        if excess == TimeSpan::ZERO && repeats == 0 {
+            writeln!(output, "line          as fast as usual: 99 of 100 answers within {within:.0} ms")?;
+            return Ok(());
+        }
+        writeln!(
+            output,
+            "line          {:.0} ms slower than usual ({within:.0} ms), {:.1} % lost: up to {repeats} repeats of a command",
+            excess.as_ms(),
+            100.0 * line.lost_share()
+        )?;
+        if self.store.is_none() {
+            writeln!(
+                output,
+                "              measure it with --store railway.db, so that trains are driven by it; a cable is better"
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn an_emergency_stop_goes_first_however_many_wait() {
+    fn an_emergency_stop_precedes_all_waiting_requests() {
         let board = Board::new(7);
         for _ in 0..MAX_WAITING {
             drop(board.ask(Request::Line("where".into())).expect("room"));

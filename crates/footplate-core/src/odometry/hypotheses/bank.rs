@@ -36,6 +36,8 @@ const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
 const FOLLOWED_S: f64 = 0.15;
 /// The ratio of the diameters wanders by this much a second (part).
 const RATIO_WANDERS: f64 = 2e-5;
+/// Over how long it is smoothed by how much they differ beyond their tolerances (s).
+const BEYOND_S: f64 = 3.0;
 /// Slower than this it is not learnt (m/s), and creepage under effort disturbs it (part).
 const RATIO_ABOVE: f64 = 3.0;
 const RATIO_CREEPAGE: f64 = 0.008;
@@ -76,6 +78,8 @@ pub(in super::super) struct Bank {
     /// First over second wheel speed when both roll, less 1, and its variance.
     pub(super) ratio: f64,
     ratio_variance: f64,
+    /// By how much the wheels differ beyond what their tolerances allow, smoothed (part).
+    beyond: f64,
     /// Mean acceleration, smoothed (m/s²), and that of the wheels.
     trend: f64,
     wheels_a: f64,
@@ -108,6 +112,7 @@ impl Bank {
             ahead: Lanes::all(0.0),
             ways: Lanes::all(0.0),
             ratio: 0.0,
+            beyond: 0.0,
             ratio_variance: variances.iter().sum(),
             trend: 0.0,
             wheels_a: 0.0,
@@ -169,7 +174,8 @@ impl Bank {
 
     /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
     pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        let [likely, way] = interval(&self.probability, &self.filters, &self.ways, scene, risk, t);
+        let [likely, way] =
+            interval(&self.probability, &self.filters, &self.ways, scene, (risk, self.beyond), t);
         let wheels = self.compared(scene);
         let speed = self.reach.widen(
             likely,
@@ -350,6 +356,8 @@ impl Bank {
         let most = first.tolerance + second.tolerance;
         self.ratio = larger(smaller(self.ratio + gain * measured, most), -most);
         self.ratio_variance *= 1.0 - gain;
+        let differ = larger((measured + self.ratio).abs() - most, 0.0);
+        self.beyond += (differ - self.beyond) * smaller(t / BEYOND_S, 1.0);
     }
 
     /// What all hypotheses come to; how far the estimate moved.

@@ -194,12 +194,16 @@ impl Filters {
     /// definite. Cut alone, it would turn gains around, and the filter would diverge.
     #[inline]
     pub(super) fn keep_sound(&mut self) {
-        let cut = |lanes: Lanes, (_, most): (f64, f64)| (lanes.inverse() * most).at_least(0.0).at_most(1.0);
         let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
-        let (of_r, of_v, of_a) = (cut(self.prr, PLACE), cut(self.pvv, SPEED), cut(self.paa, ACCELERATION));
-        self.prv *= of_r * of_v;
-        self.pra *= of_r * of_a;
-        self.pva *= of_v * of_a;
+        let limits = [(self.prr, PLACE), (self.pvv, SPEED), (self.paa, ACCELERATION)];
+        // Twenty-four divisions that few periods need; they would change nothing in the others.
+        if limits.iter().any(|(lanes, (_, most))| lanes.largest() > *most) {
+            let [of_r, of_v, of_a] =
+                limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
+            self.prv *= of_r * of_v;
+            self.pra *= of_r * of_a;
+            self.pva *= of_v * of_a;
+        }
         self.prr = within(self.prr, PLACE);
         self.pvv = within(self.pvv, SPEED);
         self.paa = within(self.paa, ACCELERATION);

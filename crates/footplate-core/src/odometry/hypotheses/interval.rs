@@ -11,17 +11,17 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// The diameters are not off by their whole tolerance both at once; this part holds 99.99 % of two that are even over it.
 const TOLERANCE: f64 = 0.993;
 /// Creepage of rolling wheels under full effort (part of the speed).
-const CREEPAGE: f64 = 0.005;
+const CREEPAGE: f64 = 0.003;
 /// Hypotheses in which no wheel tells the speed.
 const COASTS: [bool; 8] = [false, false, false, true, true, false, false, false];
 
-/// Speed (m/s) and way of the period (m).
+/// Speed (m/s) and way of the period (m); `beyond` is by how much the wheels differ beyond their tolerances (part).
 pub(super) fn interval(
     p: &Lanes,
     filters: &Filters,
     ways: &Lanes,
     scene: &Scene,
-    risk: f64,
+    (risk, beyond): (f64, f64),
     t: f64,
 ) -> [Range; 2] {
     let part = risk / 8.0;
@@ -42,7 +42,7 @@ pub(super) fn interval(
         }
         let k = libm::sqrt(2.0 * libm::log(w / part));
         let tolerance = if lane == 0 { wide } else { wider };
-        let scale = (tolerance + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
+        let scale = (tolerance + beyond + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
         let off = k * libm::sqrt(pvv) + scale;
         speed = speed.or(Range { low: v - off, high: v + off });
         let drift = if coasts { off } else { scale };

@@ -2,7 +2,7 @@
 
 use alloc::string::String;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
 
 use super::super::line::{Line, SentReport};
 use super::super::message::{Malformed, Message};
@@ -172,7 +172,7 @@ impl Client {
                 let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
                 // It may have become occupied at any time since nothing was heard.
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}

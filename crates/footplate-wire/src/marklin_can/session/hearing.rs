@@ -2,7 +2,7 @@
 
 use alloc::format;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::contacts::News;
 use super::super::frame::Frame;
@@ -256,7 +256,7 @@ impl Client {
             News::Occupied(span) => {
                 let order = Order { not_before: self.dialogue.last_entry, now };
                 let (latest, width) = span.entry(contact, self.settings.scan, order);
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             News::None => {}

@@ -3,7 +3,7 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
 
 use super::super::broadcasts::Broadcasts;
 use super::super::dataset::Datasets;
@@ -214,7 +214,7 @@ impl Client {
                 let free_at = free_at.filter(|_| was_missed);
                 let (latest, width) =
                     occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, free_at);
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}

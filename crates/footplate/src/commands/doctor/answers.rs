@@ -2,7 +2,8 @@
 
 use std::io::Write;
 
-use footplate_core::Timestamp;
+use footplate_core::link::RoundTrips;
+use footplate_core::{TimeSpan, Timestamp};
 
 use super::figures::{histogram, line, quantiles};
 use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape, shares};
@@ -58,6 +59,12 @@ impl Answers {
     /// The share of requests that were not answered.
     pub(super) fn lost_share(&self) -> f64 {
         self.lost as f64 / self.asked.max(1) as f64
+    }
+
+    /// The line that they came over; `None` after too few.
+    pub(super) fn round_trips(&self) -> Option<RoundTrips> {
+        let times: Vec<TimeSpan> = self.times.iter().map(|ms| TimeSpan::from_s(ms / 1e3)).collect();
+        RoundTrips::of(&times, u32::try_from(self.lost).unwrap_or(u32::MAX))
     }
 
     /// Adds its figures to those of a station.
