@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 
 /// An input that takes longer is a finding, too (chosen: none of a few kilobytes takes a tenth of it).
 const SLOW: Duration = Duration::from_secs(5);

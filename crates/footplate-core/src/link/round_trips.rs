@@ -6,7 +6,7 @@
 use crate::link::TimeModel;
 use crate::time::TimeSpan;
 
-/// With fewer answers nothing is said of one in a hundred (chosen).
+/// With fewer answers, the 1 % quantile is not estimated (chosen).
 const FEWEST: usize = 50;
 /// The share of answers that come within the longest time that is counted with.
 const WITHIN: f64 = 0.99;

@@ -213,7 +213,7 @@ fn a_train_keeps_its_end_of_authority_whatever_is_ordered_or_reported() {
             world.dead.extend(world.layout.sensors().map(|(sensor, _)| sensor));
         }
         let limit = WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(2_000.0) };
-        driver.set_limit(world.now, TRAIN, Some(limit));
+        driver.set_end_of_authority(world.now, TRAIN, Some(limit));
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
         world.run(&mut driver, 40.0);
         let beyond = world.beyond_mm("D1+2000mm");
@@ -224,7 +224,7 @@ fn a_train_keeps_its_end_of_authority_whatever_is_ordered_or_reported() {
         let before = world.train().travelled_mm;
         world.run(&mut driver, 20.0);
         assert!(world.train().travelled_mm - before < 60.0, "{} mm", world.train().travelled_mm - before);
-        driver.set_limit(world.now, TRAIN, None);
+        driver.set_end_of_authority(world.now, TRAIN, None);
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(6) }).expect("a step");
         world.run(&mut driver, 5.0);
         assert!(world.train().speed_mm_per_s > 1.0);
@@ -236,7 +236,7 @@ fn a_stop_beyond_the_end_of_authority_ends_before_it() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     let stop = stop_at(&driver, "A1+400mm");
-    driver.set_limit(
+    driver.set_end_of_authority(
         world.now,
         TRAIN,
         Some(WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(1_100.0) }),

@@ -7,10 +7,9 @@ mod instruction;
 mod learning;
 mod parse;
 mod reader;
-mod result_line;
 mod script;
 mod script_runner;
-mod spoken;
+mod session_message;
 mod terminal;
 mod trains;
 mod truth;
@@ -33,11 +32,11 @@ use self::console::{Console, ended, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
 use self::instruction::HELP;
 use self::reader::Known;
-use self::result_line::ResultLine;
 use self::script::read_script;
 use self::script_runner::CommandSource;
 pub(crate) use self::script_runner::ScriptRunner;
-pub(crate) use self::spoken::Spoken;
+use self::session_message::ResultLine;
+pub(crate) use self::session_message::SessionMessage;
 use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{GroundTruth, StartOdometers};
@@ -313,11 +312,11 @@ impl Arguments {
         let mut start_odometers = StartOdometers::default();
         let ending = loop {
             let ending = runtime.run(&mut script_runner, &mut console)?;
-            for spoken in std::mem::take(&mut console.for_scoring) {
-                if let Spoken::Begun(train) = spoken {
+            for message in std::mem::take(&mut console.for_scoring) {
+                if let SessionMessage::Begun(train) = message {
                     start_odometers.note(runtime.link(), train);
                 }
-                if let Some(ended) = ended(&spoken) {
+                if let Some(ended) = ended(&message) {
                     let truth = start_odometers.error(runtime.link(), layout, ended);
                     let result = ResultLine::of(layout, ended, truth);
                     if let Some(dashboard) = dashboard {

@@ -169,7 +169,7 @@ impl Dispatcher {
     fn doubts_a_place(&mut self, now: Timestamp) -> bool {
         self.searches_in_vain += 1;
         let is_unseen = |train: &&DispatchedTrain| {
-            let unseen = self.watchdog.driver().unseen(train.id, now).is_some();
+            let unseen = self.watchdog.driver().missed_sensor(train.id, now).is_some();
             train.is_ready(now) && (unseen || !train.seen_since_start)
         };
         let unseen: Vec<TrainId> = self.trains.values().filter(is_unseen).map(|train| train.id).collect();
@@ -379,7 +379,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
-        let turned = self.watchdog.driver().turned_place_at(stander.place);
+        let turned = self.watchdog.driver().reversed_position_at(stander.place);
         Some(Start {
             place: stander.place,
             room,

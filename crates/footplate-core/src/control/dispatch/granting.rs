@@ -95,9 +95,9 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.watchdog.driver().unseen(id, now).is_none() {
+                if self.watchdog.driver().missed_sensor(id, now).is_none() {
                     self.cannot_go(now, id, self.unreachable(id));
-                } else if !self.begins_to_look_back(id) {
+                } else if !self.begins_to_look_back(id) && !self.looks_ahead(now, id, &start) {
                     self.lose(now, id);
                 }
                 continue;
@@ -188,9 +188,9 @@ impl Dispatcher {
             near.extend(train.held.turnouts());
         }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let is_sure = self.watchdog.driver().unseen(id, now).is_none() || looks_back;
+        let is_sure = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.watchdog.driver().turned_place(id, now).filter(|_| may_turn);
+        let turned = self.watchdog.driver().reversed_position(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         let may_back_away = train.seen_since_turn;
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })

@@ -1,13 +1,11 @@
 //! One train: its position, motion model, last command and task.
 
-use alloc::string::String;
-
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{DueContact, Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
+use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
 use crate::units::Length;
 
 use super::order::OrderId;
@@ -15,7 +13,7 @@ use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
-use super::task::{Destination, Goal, Phase, Task};
+use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
@@ -63,36 +61,6 @@ pub(super) struct DrivenTrain {
     pub(super) passages: Passages,
     /// The timing of the link to the station.
     pub(super) link: TimeModel,
-}
-
-/// What should happen to a train next, as of the last report or command.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Expectation {
-    /// The next detection.
-    pub(super) due: Option<DueContact>,
-    pub(super) since: Timestamp,
-    pub(super) overdue_reported: bool,
-    /// How many sensors in a row should have reported the train and did not.
-    pub(super) missed_in_a_row: u8,
-    /// A sensor that should have reported it, if none has reported it since.
-    pub(super) missed_sensor: Option<SensorId>,
-    /// When it counts as lost unless it is reported before; set once a detection is overdue.
-    pub(super) lost_by: Option<Timestamp>,
-    /// When a stop has to be commanded before the end of the track, and which end that is.
-    pub(super) track_end_stop: Option<(Timestamp, NodeId)>,
-    /// When a stop has to be commanded before the end of authority.
-    pub(super) authority_stop: Option<Timestamp>,
-}
-
-/// The state of a train's speed supervision.
-#[derive(Debug, Clone, Default)]
-pub(super) struct SpeedSupervision {
-    /// The ordered step, while a slower one is commanded.
-    pub(super) wanted: Option<SpeedStep>,
-    /// When the zones around the train are checked next.
-    pub(super) next_check: Option<Timestamp>,
-    /// The zone that was reported to slow the train down.
-    pub(super) reported_zone: Option<String>,
 }
 
 impl DrivenTrain {
@@ -214,7 +182,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let goal = if step == SpeedStep::STAND { Goal::Rest } else { Goal::Run };
-        self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+        self.start_task(Task { order, goal, phase: TaskPhase::Commanding { promise: None } }, out);
         self.command_step(context, now, step, out);
     }
 
@@ -229,16 +197,16 @@ impl DrivenTrain {
     ) {
         let goal = Goal::Reverse(then);
         if self.is_at_rest(context, now) {
-            self.start_task(Task { order, goal, phase: Phase::Turning }, out);
+            self.start_task(Task { order, goal, phase: TaskPhase::Reversing }, out);
             self.send(now, Command::Reverse { train: self.id() }, out);
         } else {
-            self.start_task(Task { order, goal, phase: Phase::Commanding { promise: None } }, out);
+            self.start_task(Task { order, goal, phase: TaskPhase::Commanding { promise: None } }, out);
             self.command_stop(now, out);
         }
     }
 
     /// A command to this train has been sent.
-    pub(super) fn command_left(
+    pub(super) fn command_sent(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -257,7 +225,7 @@ impl DrivenTrain {
                 }
                 self.expect_after_command(context, now);
                 self.pacing_step_sent(event.time);
-                self.step_left(context, now, step, out);
+                self.step_sent(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
                 let rest = self.located_at_rest(context, event.time);
@@ -272,10 +240,15 @@ impl DrivenTrain {
                 self.passages.forget();
                 self.end_authority_here(context, now);
                 self.expect_next(context, now);
-                if let Some(Task { order, goal: Goal::Reverse(then), phase: Phase::Turning }) = self.task {
+                if let Some(Task { order, goal: Goal::Reverse(then), phase: TaskPhase::Reversing }) =
+                    self.task
+                {
                     if then > SpeedStep::STAND {
-                        self.task =
-                            Some(Task { order, goal: Goal::Run, phase: Phase::Commanding { promise: None } });
+                        self.task = Some(Task {
+                            order,
+                            goal: Goal::Run,
+                            phase: TaskPhase::Commanding { promise: None },
+                        });
                         self.command_step(context, now, then, out);
                     } else {
                         self.finish(context, now, order, None, None, out);
@@ -290,14 +263,14 @@ impl DrivenTrain {
         self.located(context, time).filter(|located| located.at_rest)
     }
 
-    fn step_left(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+    fn step_sent(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         let Some(task) = self.task else { return };
         match (task.phase, task.goal) {
-            (Phase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
+            (TaskPhase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
                 self.finish(context, now, task.order, None, None, out);
             }
             // A stop that is sent after a new step has been commanded belongs to the earlier task.
-            (Phase::Commanding { .. } | Phase::Running { .. }, _)
+            (TaskPhase::Commanding { .. } | TaskPhase::Running { .. }, _)
                 if step == SpeedStep::STAND && self.commanded == SpeedStep::STAND =>
             {
                 let rest = self.locator.rest_if_stopped(context, &self.model, now);
@@ -308,16 +281,16 @@ impl DrivenTrain {
                     _ => None,
                 };
                 let promise = promise.or(match task.phase {
-                    Phase::Commanding { promise } => promise,
+                    TaskPhase::Commanding { promise } => promise,
                     _ => None,
                 });
                 let until = rest.map_or(now + REST_UNFORESEEN, |rest| {
                     let takes = (rest.time - now).max(TimeSpan::ZERO);
                     now + TimeSpan::from_s(takes.as_s() * (1.0 + REST_MARGIN_PART)) + REST_MARGIN
                 });
-                self.task = Some(Task { phase: Phase::Settling { promise, until }, ..task });
+                self.task = Some(Task { phase: TaskPhase::Settling { promise, until }, ..task });
             }
-            (Phase::Running { .. }, Goal::RestAt(_)) => self.plan(context, now, out),
+            (TaskPhase::Running { .. }, Goal::RestAt(_)) => self.plan(context, now, out),
             _ => {}
         }
     }
@@ -340,7 +313,9 @@ impl DrivenTrain {
         let Some(task) = self.task else { return };
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
-            (Phase::Finding { .. }, _) => self.resume_to_target(context, now, task.order, destination, out),
+            (TaskPhase::Locating { .. }, _) => {
+                self.resume_to_target(context, now, task.order, destination, out);
+            }
             (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
                 Some(at) => {
                     let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
@@ -367,9 +342,9 @@ impl DrivenTrain {
     /// When it has to be called again without a report.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         let phase = match self.task.map(|task| task.phase) {
-            Some(Phase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
-            Some(Phase::Settling { until, .. }) => Some(until),
-            Some(Phase::Finding { since }) => Some(since + FIND_LIMIT),
+            Some(TaskPhase::Running { plan: Some(plan) }) => Some(plan.leaves - self.link.command),
+            Some(TaskPhase::Settling { until, .. }) => Some(until),
+            Some(TaskPhase::Locating { since }) => Some(since + FIND_LIMIT),
             _ => None,
         };
         let unsent = self.unsent.map(|(_, since)| since + UNCONFIRMED);
@@ -398,14 +373,14 @@ impl DrivenTrain {
 
     fn continue_task(&mut self, context: TrackContext<'_>, now: Timestamp, task: Task, out: &mut Outputs) {
         match task.phase {
-            Phase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
+            TaskPhase::Running { plan: Some(plan) } if plan.leaves - self.link.command <= now => {
                 self.stop_now(now, task, Some(plan.promise), out);
             }
-            Phase::Finding { since } if now - since >= FIND_LIMIT => {
+            TaskPhase::Locating { since } if now - since >= FIND_LIMIT => {
                 let why = Refusal::NotFound { train: self.id(), within: FIND_LIMIT };
                 self.give_up(now, why, out);
             }
-            Phase::Settling { promise, until } if until <= now => {
+            TaskPhase::Settling { promise, until } if until <= now => {
                 self.handle_rest(context, now, task, promise, out);
             }
             _ => {}
@@ -419,7 +394,7 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        self.task = Some(Task { phase: Phase::Commanding { promise }, ..task });
+        self.task = Some(Task { phase: TaskPhase::Commanding { promise }, ..task });
         self.command_stop(now, out);
     }
 
@@ -447,7 +422,7 @@ impl DrivenTrain {
         }
         match task.goal {
             Goal::Reverse(_) => {
-                self.task = Some(Task { phase: Phase::Turning, ..task });
+                self.task = Some(Task { phase: TaskPhase::Reversing, ..task });
                 self.send(now, Command::Reverse { train: self.id() }, out);
             }
             Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),

@@ -6,13 +6,13 @@ use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
-use super::driven_train::{DrivenTrain, Expectation};
+use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::path::{recount_from, track_end};
 use super::refusal::Refusal;
-use super::task::Phase;
+use super::task::{Expectation, TaskPhase};
 use crate::control::Notice;
 
 /// A detection is overdue this long after its 99.7 % bound.
@@ -40,7 +40,7 @@ impl Driver {
     /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
     /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
     /// set. `None` removes the limit.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
             train.set_end_of_authority(context, now, end);
@@ -50,7 +50,7 @@ impl Driver {
 
     /// The end of a train's movement authority.
     #[must_use]
-    pub fn limit(&self, train: TrainId) -> Option<WayPoint> {
+    pub fn end_of_authority(&self, train: TrainId) -> Option<WayPoint> {
         self.trains.get(&train)?.end_of_authority
     }
 }
@@ -184,7 +184,7 @@ impl DrivenTrain {
 
     /// A planned stop already ends before the end of the track.
     fn track_end_stop_time(&self) -> Option<Timestamp> {
-        let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
+        let has_plan = matches!(self.task.map(|task| task.phase), Some(TaskPhase::Running { plan: Some(_) }));
         let (leaves, _) =
             self.expected.track_end_stop.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
         Some(leaves - self.link.command)

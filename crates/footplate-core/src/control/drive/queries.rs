@@ -53,7 +53,7 @@ impl Driver {
     /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
     /// its estimate.
     #[must_use]
-    pub fn unseen(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+    pub fn missed_sensor(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
@@ -113,14 +113,14 @@ impl Driver {
     /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
     /// node behind it: a turnout there must be set for the track under the train.
     #[must_use]
-    pub fn turned_place(&self, train: TrainId, now: Timestamp) -> Option<Position> {
+    pub fn reversed_position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         let at = self.locate(train, now)?.at;
         reversed_position(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// The same for a train that would be at rest at a position, arriving on any path.
     #[must_use]
-    pub fn turned_place_at(&self, place: Position) -> Option<Position> {
+    pub fn reversed_position_at(&self, place: Position) -> Option<Position> {
         reversed_on_current_path(self.track.context(), place)
     }
 

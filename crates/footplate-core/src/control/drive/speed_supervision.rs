@@ -24,7 +24,7 @@ use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
 use super::path::RestrictedStretch;
-use super::task::{Destination, Goal, Phase};
+use super::task::{Destination, Goal, TaskPhase};
 use crate::control::Notice;
 
 /// Probability of entering a zone earlier than assumed, and of being faster in it, each. The probabilities for the
@@ -194,7 +194,7 @@ impl DrivenTrain {
         let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > commanded);
         let lookahead = Lookahead::of(self, now);
         let restrictions = lookahead.restrictions(context, wanted.unwrap_or(commanded));
-        let by = lookahead.slow_down_by(&restrictions, commanded);
+        let by = lookahead.latest_slowdown(&restrictions, commanded);
         let due = by.filter(|(by, _)| *by <= lookahead.start() + MIN_CHECK_INTERVAL);
         let slower =
             due.map(|(_, zone)| (lookahead.fastest_below(&restrictions, commanded, MIN_FASTER_TIME), zone));
@@ -240,7 +240,7 @@ impl DrivenTrain {
     /// the faster step.
     fn can_settle_at(&self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep) -> bool {
         let Some(Goal::RestAt(Destination { at: Some(at), .. })) = self.goal() else { return true };
-        let is_running = matches!(self.task.map(|task| task.phase), Some(Phase::Running { .. }));
+        let is_running = matches!(self.task.map(|task| task.phase), Some(TaskPhase::Running { .. }));
         let located = self.located(context, now);
         is_running && located.is_some_and(|located| self.settles_before(context, &located, at, step))
     }
@@ -388,7 +388,7 @@ impl<'t> Lookahead<'t> {
     }
 
     /// The latest time for a slower step, and the zone that requires it; now for a zone that the train may be in.
-    fn slow_down_by<'g>(
+    fn latest_slowdown<'g>(
         &self,
         restrictions: &[Restriction<'g>],
         commanded: SpeedStep,

@@ -14,7 +14,7 @@ use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path::{circuit_length, distance_between, recount_from, sensors_within, unknown_turnout};
 use super::refusal::Refusal;
-use super::task::{Destination, Goal, Phase, Plan, Task};
+use super::task::{Destination, Goal, StopPlan, Task, TaskPhase};
 use crate::control::{Notice, PlannedStop, Promise};
 
 /// Smallest change of a plan that is reported.
@@ -51,7 +51,7 @@ impl DrivenTrain {
         let located = self.located(context, now).filter(|_| self.missed_sensor().is_none() || !at_rest);
         let Some(located) = located else {
             self.start_task(
-                Task { order, goal: Goal::RestAt(destination), phase: Phase::Finding { since: now } },
+                Task { order, goal: Goal::RestAt(destination), phase: TaskPhase::Locating { since: now } },
                 out,
             );
             if at_rest {
@@ -85,8 +85,11 @@ impl DrivenTrain {
             self.start_towards(context, now, order, &located, destination, false, out)
         });
         if let Err(why) = headed {
-            self.task =
-                Some(Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } });
+            self.task = Some(Task {
+                order,
+                goal: Goal::RestAt(destination),
+                phase: TaskPhase::Running { plan: None },
+            });
             self.give_up(now, why, out);
         }
     }
@@ -130,7 +133,7 @@ impl DrivenTrain {
         at_rest: bool,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        let task = Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } };
+        let task = Task { order, goal: Goal::RestAt(destination), phase: TaskPhase::Running { plan: None } };
         if at_rest {
             let is_at_target = destination.at.is_some_and(|at| {
                 self.beyond(context, located.at, at).is_some_and(|beyond| beyond.abs() <= AT_TARGET)
@@ -269,7 +272,7 @@ impl DrivenTrain {
     /// Measures the target again after a turnout was thrown.
     pub(super) fn turnouts_changed(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         self.expect_next(context, now);
-        let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { .. }, .. }) = self.task
+        let Some(Task { goal: Goal::RestAt(destination), phase: TaskPhase::Running { .. }, .. }) = self.task
         else {
             return;
         };
@@ -288,7 +291,7 @@ impl DrivenTrain {
     /// Plans the stop again. If it is too late, the train stops at once.
     pub(super) fn plan(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         let Some(task) = self.task.filter(|_| self.is_all_sent()) else { return };
-        let (Goal::RestAt(Destination { at: Some(at), aim, .. }), Phase::Running { plan: before }) =
+        let (Goal::RestAt(Destination { at: Some(at), aim, .. }), TaskPhase::Running { plan: before }) =
             (task.goal, task.phase)
         else {
             return;
@@ -301,8 +304,8 @@ impl DrivenTrain {
             CommandTime::At(leaves, rest) => {
                 let Some(promise) = self.promise(context, &rest, at) else { return };
                 let triggers = self.triggers(context, now, leaves);
-                let plan = Plan { leaves, triggers, promise };
-                self.task = Some(Task { phase: Phase::Running { plan: Some(plan) }, ..task });
+                let plan = StopPlan { leaves, triggers, promise };
+                self.task = Some(Task { phase: TaskPhase::Running { plan: Some(plan) }, ..task });
                 let is_reportable = before.is_none_or(|before| {
                     (before.leaves - leaves).abs() >= REPORTABLE_CHANGE || before.triggers[0] != triggers[0]
                 });
@@ -328,7 +331,7 @@ impl DrivenTrain {
         }
     }
 
-    fn planned(&self, context: TrackContext<'_>, order: OrderId, plan: Plan) -> PlannedStop {
+    fn planned(&self, context: TrackContext<'_>, order: OrderId, plan: StopPlan) -> PlannedStop {
         let [trigger, _] = plan.triggers;
         let passes = trigger.and_then(|sensor| {
             let node = context.node_of(sensor)?;

@@ -1,9 +1,11 @@
-//! What a train is doing, and how far it has got.
+//! What a train is doing, what should happen to it next, and the state of its speed supervision.
 
-use crate::ids::{SensorId, SpeedStep};
+use alloc::string::String;
+
+use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::Timestamp;
 use crate::track::Landmark;
-use crate::tracking::WayPoint;
+use crate::tracking::{DueContact, WayPoint};
 
 use super::order::{Aim, OrderId};
 use crate::control::Promise;
@@ -13,7 +15,7 @@ use crate::control::Promise;
 pub(super) struct Task {
     pub(super) order: OrderId,
     pub(super) goal: Goal,
-    pub(super) phase: Phase,
+    pub(super) phase: TaskPhase,
 }
 
 /// The result that the order asks for.
@@ -49,27 +51,57 @@ pub(super) struct Destination {
 
 /// The phase of a task.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Phase {
+pub(super) enum TaskPhase {
     /// The train runs to a sensor to be located.
-    Finding { since: Timestamp },
+    Locating { since: Timestamp },
     /// The train runs; `plan` is the planned stop.
-    Running { plan: Option<Plan> },
+    Running { plan: Option<StopPlan> },
     /// A command, mostly step 0, is waiting to be sent.
     Commanding { promise: Option<Promise> },
     /// Step 0 has been sent; the train comes to rest by this time.
     Settling { promise: Option<Promise>, until: Timestamp },
     /// Reversing has been commanded.
-    Turning,
+    Reversing,
     /// Pacing commands the steps.
     Pacing,
 }
 
 /// A planned stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Plan {
+pub(super) struct StopPlan {
     /// When the last bit of the command shall have been sent.
     pub(super) leaves: Timestamp,
     /// The last two sensors whose reports can still change it, the later one first.
     pub(super) triggers: [Option<SensorId>; 2],
     pub(super) promise: Promise,
+}
+
+/// What should happen to a train next, as of the last report or command.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Expectation {
+    /// The next detection.
+    pub(super) due: Option<DueContact>,
+    pub(super) since: Timestamp,
+    pub(super) overdue_reported: bool,
+    /// How many sensors in a row should have reported the train and did not.
+    pub(super) missed_in_a_row: u8,
+    /// A sensor that should have reported it, if none has reported it since.
+    pub(super) missed_sensor: Option<SensorId>,
+    /// When it counts as lost unless it is reported before; set once a detection is overdue.
+    pub(super) lost_by: Option<Timestamp>,
+    /// When a stop has to be commanded before the end of the track, and which end that is.
+    pub(super) track_end_stop: Option<(Timestamp, NodeId)>,
+    /// When a stop has to be commanded before the end of authority.
+    pub(super) authority_stop: Option<Timestamp>,
+}
+
+/// The state of a train's speed supervision.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SpeedSupervision {
+    /// The ordered step, while a slower one is commanded.
+    pub(super) wanted: Option<SpeedStep>,
+    /// When the zones around the train are checked next.
+    pub(super) next_check: Option<Timestamp>,
+    /// The zone that was reported to slow the train down.
+    pub(super) reported_zone: Option<String>,
 }

@@ -43,8 +43,8 @@ impl DriveBeginning {
     /// The kind of this machine in a store.
     pub(crate) const KIND: &'static str = "drive";
 
-    /// An interactive session without any lines yet, for the given models and fits.
-    pub(crate) fn of_person(
+    /// A session whose script arrives line by line, with trains as an earlier session handed them over.
+    pub(crate) fn line_by_line(
         written: &WrittenLayout,
         turnouts: &TurnoutStates,
         (models, fits): (Vec<MotionModel>, Vec<MotionFit>),
@@ -54,7 +54,7 @@ impl DriveBeginning {
             turnouts: written.legs(turnouts),
             models,
             fits,
-            source: CommandSource::Person,
+            source: CommandSource::Script,
             script: Vec::new(),
             is_complete: false,
             wait_limit_s: None,

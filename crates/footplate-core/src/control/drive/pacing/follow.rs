@@ -18,7 +18,7 @@ use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::path::distance_between;
 use crate::control::drive::refusal::Refusal;
-use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
@@ -118,7 +118,7 @@ impl DrivenTrain {
         if is_short {
             return Err(Refusal::GapTooShort { leader, shortest });
         }
-        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
         let following = Following {
             leader,
             gap,
@@ -254,8 +254,8 @@ impl DrivenTrain {
         let rest = leader.locator.rest_if_stopped(context, &leader.model, stopped);
         let rest = rest.filter(|_| !leader.is_position_uncertain(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
-            let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
-            surely.max(Length::ZERO)
+            let short_of = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
+            short_of.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
         let between = distance_between(context, &self.model, node, from)?;

@@ -4,7 +4,7 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::order::OrderId;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
-use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::control::{Notice, PacedLine};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
@@ -63,7 +63,7 @@ impl DrivenTrain {
             self.model.settles_within(self.commanded, step)
         };
         let holding = Holding { speed, settled: now + settles, line: None };
-        self.start_task(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
         // Near zones, speed supervision relies on the calibrated motion: corrections from repeated runs stay off.
         self.locator.repeat(context.layout.zones().is_empty());

@@ -7,7 +7,7 @@
 use crate::control::drive::command_time::{CommandTime, command_time, spread};
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::task::{Destination, Goal, Phase, Task};
+use crate::control::drive::task::{Destination, Goal, Task, TaskPhase};
 use crate::ids::SpeedStep;
 use crate::model::StandingTimes;
 use crate::time::{TimeSpan, Timestamp};
@@ -34,7 +34,8 @@ impl DrivenTrain {
         now: Timestamp,
         out: &mut Outputs,
     ) {
-        let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { plan }, .. }) = self.task
+        let Some(Task { goal: Goal::RestAt(destination), phase: TaskPhase::Running { plan }, .. }) =
+            self.task
         else {
             return;
         };

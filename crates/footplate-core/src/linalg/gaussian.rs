@@ -1,0 +1,8 @@
+//! A normal distribution of one number.
+
+/// Its mean and variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gaussian {
+    pub(crate) mean: f64,
+    pub(crate) variance: f64,
+}
