@@ -8,8 +8,8 @@ use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use super::counted::{Counted, cut_short};
 use super::hold::{speed, steps, told_the_truth};
 use super::tracked::LOOK;
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often each train is asked.
 const ASKED_EACH: usize = 6;
@@ -94,8 +94,8 @@ pub(super) struct Arrived {
 /// Everything that one train is asked, by everybody.
 pub(super) fn arrive(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Arrived>> {
@@ -133,11 +133,11 @@ pub(super) fn arrive(
 /// One train on its way from target to target.
 struct Trip<'a, 'l> {
     layout: &'l Layout,
-    way: &'a Way,
+    way: &'a LongestCircuit,
     train: TrainId,
     by: By,
     choice: Choice,
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     counted: Counted,
 }
 

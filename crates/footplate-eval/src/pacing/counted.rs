@@ -8,7 +8,7 @@ use footplate_core::control::{
 use footplate_core::{Command, Event, Timestamp, TrainId};
 use footplate_wire::LinkNotice;
 
-use crate::rehearsal::VirtualLine;
+use crate::testbed::VirtualLine;
 
 /// What passes orders on to the driver.
 enum Control {

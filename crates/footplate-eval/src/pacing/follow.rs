@@ -10,8 +10,8 @@ use footplate_sim::living::Truth;
 use super::counted::{Counted, cut_short};
 use super::hold::{speed, steps};
 use super::tracked::{LOOK, Odometer};
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// The leader runs at speeds between these (mm/s), each for a time between those (s).
 const LEADS_AT: [f64; 2] = [200.0, 320.0];
@@ -95,8 +95,8 @@ pub(super) struct Followed {
 
 /// All gaps by everybody, for so long (s). Who goes up or down by steps keeps times.
 pub(super) fn follow(
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     trains: &[TrainId],
     (gaps, lasts): (&[(Kept, f64)], f64),
     choice: &mut Choice,
@@ -121,7 +121,7 @@ pub(super) fn follow(
 
 /// Trains in a row.
 struct Row<'a, 'l> {
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     counted: Counted,
     trains: &'a [TrainId],
     kept: Kept,
@@ -138,7 +138,7 @@ struct Row<'a, 'l> {
 
 impl<'a, 'l> Row<'a, 'l> {
     fn new(
-        stage: Rehearsal<'l>,
+        stage: PreparedTrains<'l>,
         trains: &'a [TrainId],
         (kept, gap): (Kept, f64),
         by: By,

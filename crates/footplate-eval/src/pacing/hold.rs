@@ -10,9 +10,9 @@ use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Times
 
 use super::counted::{Counted, cut_short};
 use super::tracked::{LOOK, Odometer, TrueWay};
-use crate::choice::Choice;
 use crate::driving::known;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// Speeds that are asked for (mm/s).
 const SPEEDS: [f64; 2] = [200.0, 450.0];
@@ -79,8 +79,8 @@ pub(super) struct HoldRecord {
 /// Everything that one train is asked to hold.
 pub(super) fn hold(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Held>> {
@@ -106,8 +106,8 @@ pub(super) fn hold(
 /// A model of a train that knows everything about it, and how long the hops on its way feel.
 pub(super) fn told_the_truth(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
 ) -> anyhow::Result<MotionModel> {
     let sections = SectionIndex::of(layout);
@@ -138,7 +138,7 @@ struct Ideal {
     time: Timestamp,
 }
 
-fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked: f64) -> Held {
+fn held(layout: &Layout, mut stage: PreparedTrains<'_>, train: TrainId, by: By, asked: f64) -> Held {
     let mut held = Held {
         by,
         train,

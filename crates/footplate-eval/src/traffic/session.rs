@@ -10,8 +10,8 @@ use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
 use footplate_wire::LinkNotice;
 
-use crate::choice::Choice;
-use crate::rehearsal::Rehearsal;
+use crate::seeds::Choice;
+use crate::testbed::PreparedTrains;
 
 /// How often the truth is compared with what trains hold.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
@@ -98,7 +98,7 @@ pub struct Tally {
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: Rehearsal<'l>,
+    rehearsal: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
@@ -121,7 +121,7 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
@@ -385,7 +385,7 @@ pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) 
     Some(WayPoint { node: edge.from, way: position.offset * scale })
 }
 
-fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
+fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
     let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
     if by_blocks {

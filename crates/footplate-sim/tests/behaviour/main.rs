@@ -1,4 +1,4 @@
-//! What the simulated world promises, a file a promise.
+//! What the simulator promises: one file for each promise.
 
 mod continuity;
 mod line_claims;

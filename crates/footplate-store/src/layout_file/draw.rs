@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn rails_with_a_speed_restriction_are_drawn_in_another_colour_and_say_so() {
+    fn edges_with_a_speed_restriction_are_coloured_and_labelled() {
         let file = built_in("track-a").unwrap();
         let zone = Zone { name: "C & E".into(), limit: Speed::from_mm_per_s(180.0) };
         let [from, to] = ["C13", "E7"].map(|name| file.layout.node_named(name).unwrap());

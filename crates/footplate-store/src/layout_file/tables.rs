@@ -11,7 +11,7 @@ use super::read::LARGEST_COORDINATE;
 use crate::table::{Column, LastLine, Row, Table, TableError};
 
 /// The most rows of a table: a layout cannot number more nodes.
-const MOST_ROWS: usize = 1 << 16;
+const MAX_ROWS: usize = 1 << 16;
 
 /// The tables of one layout, each with its name in messages.
 #[derive(Debug)]
@@ -156,8 +156,8 @@ fn read_rows<const N: usize, T>(
     };
     let mut rows = Vec::new();
     while let Some(row) = table.next_row()? {
-        if rows.len() == MOST_ROWS {
-            return Err(ImportError::TooManyRows { file: file.to_owned(), limit: MOST_ROWS });
+        if rows.len() == MAX_ROWS {
+            return Err(ImportError::TooManyRows { file: file.to_owned(), limit: MAX_ROWS });
         }
         rows.push(read(row, columns)?);
     }

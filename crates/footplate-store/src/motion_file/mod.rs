@@ -6,10 +6,8 @@
 mod export;
 mod form;
 mod read;
-mod stored;
 
 pub use form::{
     ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
 };
-pub use read::MotionFileError;
-pub use stored::StoredModel;
+pub use read::{MotionFileError, StoredModel};

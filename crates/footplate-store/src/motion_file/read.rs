@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use footplate_core::model::MotionModel;
+use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 
 use super::form::{MOTION_MODEL_VERSION, MotionFile};
@@ -164,6 +166,42 @@ impl MotionFile {
     }
 }
 
+/// A stored motion model.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StoredModel {
+    /// There is none.
+    Nothing,
+    /// A usable model.
+    Model(Box<MotionModel>),
+    /// A model of another version of the formulas. It can be fitted again from the stored events.
+    Outdated,
+}
+
+impl StoredModel {
+    /// The model of a train on a layout as of a date.
+    ///
+    /// # Errors
+    /// The store cannot be read, or its content is not a model.
+    pub fn of_store(
+        layout: &Layout,
+        store: &Store,
+        train: TrainId,
+        at: Timestamp,
+    ) -> Result<Self, MotionFileError> {
+        let file = match MotionFile::of_store(store, train, at) {
+            Ok(file) => file.filter(|file| file.layout == layout.name()),
+            Err(MotionFileError::OtherModel { .. }) => return Ok(Self::Outdated),
+            Err(error) => return Err(error),
+        };
+        Ok(match file.map(|file| file.model(layout)) {
+            None => Self::Nothing,
+            Some(Ok(model)) => Self::Model(Box::new(model)),
+            // Numbers that are not a model today may have been one in their own version.
+            Some(Err(_)) => Self::Outdated,
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use footplate_core::SpeedStep;
@@ -192,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_told_apart_from_one_of_another_version() {
+    fn invalid_models_differ_from_models_of_another_version() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         let other = MotionFile { model_version: "0".to_owned(), ..file() };

@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_of_the_pen_is_a_difference() {
+    fn a_misprint_is_a_difference() {
         // Given five teams within a few percent, and one that wrote a digit too many,
         let figures = [("a", 200.0), ("b", 210.0), ("c", 2000.0), ("d", 205.0), ("e", 208.0), ("f", 203.0)]
             .map(|(team, value)| speed(8, value, team));
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn without_others_or_a_train_of_ours_there_is_nothing_to_compare() {
+    fn one_team_or_foreign_trains_give_nothing_to_compare() {
         let one = [speed(8, 200.0, "a"), speed(9, 300.0, "a")];
         assert_eq!(CrossCheck::of(&ours(8, 1.0, 0.1), &one), Err(NothingToCompare::OneTeam));
         let two = [speed(8, 200.0, "a"), speed(8, 220.0, "b")];

@@ -113,7 +113,7 @@ fn figure(
         None => PublishedQuantity::Speed,
         Some(column) => PublishedQuantity::Stop(row.read(
             column,
-            "command, gate, or nothing where the team does not say",
+            "command, gate, or empty if the team does not state it",
             counted,
         )?),
     };
@@ -126,7 +126,7 @@ fn figure(
         step: row.read(step, "a throttle step from 1", |text| {
             text.parse().ok().and_then(SpeedStep::new).filter(|step| *step > SpeedStep::STAND)
         })?,
-        approach: row.read(approach, "below, above, or nothing where the team does not say", |text| {
+        approach: row.read(approach, "below, above, or empty if the team does not state it", |text| {
             match text {
                 "below" => Some(Approach::Below),
                 "above" => Some(Approach::Above),
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_stops_are_told_by_their_columns() {
+    fn tables_are_recognised_by_their_columns() {
         let speeds = read(&format!("{SPEEDS}24,14,above,557.5,someone,2018\n")).unwrap();
         let [speed] = speeds.as_slice() else { panic!("{speeds:?}") };
         assert_eq!((speed.quantity, speed.train), (PublishedQuantity::Speed, TrainId(24)));
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn errors_name_their_place() {
         for (text, expected) in [
             ("", "is empty"),
             (SPEEDS, "no row"),

@@ -1,9 +1,8 @@
 //! The error statistics of one forecaster over a selection of detections.
 
-use footplate_core::TimeSpan;
+use footplate_core::{HALF_95, TimeSpan};
 
-use super::coverage::Coverage;
-use super::reference::ReferenceForecaster;
+use super::comparison::ReferenceForecaster;
 use super::scored_hit::ScoredHit;
 
 /// The levels of the intervals whose coverage is counted.
@@ -104,6 +103,35 @@ fn quantile(sorted: &[f64], part: f64) -> Option<f64> {
     Some(low + (high - low) * place.fract())
 }
 
+/// A count of reports inside intervals of one level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// The stated probability of the intervals, 0 to 1.
+    pub level: f64,
+    /// Reports inside.
+    pub inside: usize,
+    /// All reports, at least one.
+    pub of: usize,
+}
+
+impl Coverage {
+    /// The share inside.
+    #[must_use]
+    pub fn fraction(self) -> f64 {
+        self.inside as f64 / self.of as f64
+    }
+
+    /// The 95 % interval of the true probability: the score interval (Wilson, 1927), which remains valid for small
+    /// counts and near 0 and 1, unlike the normal approximation.
+    #[must_use]
+    pub fn plausible(self) -> (f64, f64) {
+        let (n, p, z) = (self.of as f64, self.fraction(), HALF_95);
+        let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+        let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+        ((middle - half).max(0.0), (middle + half).min(1.0))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use footplate_core::link::{ContactWindow, UniformNormal};
@@ -142,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_figures_are_those_worked_out_by_hand() {
+    fn scores_match_a_hand_calculation() {
         // Given reports 5 ms early and 10, 20, 30, 60 ms late, and one without a forecast,
         let hits = [Some(-5), Some(10), Some(20), Some(30), Some(60), None].map(hit);
         let score = ForecastScore::of(hits.iter());
@@ -159,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_is_measured_where_we_are_and_at_our_speed() {
+    fn a_reference_is_scored_on_common_detections() {
         let hits = [Some(10), None].map(hit);
         let reference = ForecastScore::of_reference(hits.iter(), ReferenceForecaster::LastLap);
         assert_eq!((reference.hits, reference.scored, reference.coverage), (2, 1, None));
@@ -183,5 +211,17 @@ mod tests {
         // 0.9 · 10 = place 9 of eleven.
         let eleven: Vec<f64> = (0..11).map(f64::from).collect();
         assert_eq!(quantile(&eleven, 0.9), Some(9.0));
+    }
+
+    #[test]
+    fn the_interval_is_wilsons() {
+        // Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662, 15 of 148 gives 0.0624 to 0.1605,
+        // 0 of 20 gives 0 to 0.1611.
+        for (inside, of, low, high) in
+            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611)]
+        {
+            let (found_low, found_high) = Coverage { level: 0.5, inside, of }.plausible();
+            assert!((found_low - low).abs() < 5e-5 && (found_high - high).abs() < 5e-5, "{inside} of {of}");
+        }
     }
 }

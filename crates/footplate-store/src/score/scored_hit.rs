@@ -3,7 +3,7 @@
 use footplate_core::tracking::{Hit, Phase};
 use footplate_core::{RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::reference::ReferenceForecaster;
+use super::comparison::ReferenceForecaster;
 
 /// A passage and the forecasts of its report.
 ///

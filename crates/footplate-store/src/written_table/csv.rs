@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use super::cell::Cell;
+use super::writer::Cell;
 use crate::decimal::push_unscaled;
 
 /// The size of the write buffer (bytes).

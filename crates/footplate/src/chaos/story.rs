@@ -10,8 +10,8 @@ use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_eval::choice::Choice;
-use footplate_eval::rehearsal::Rehearsal;
+use footplate_eval::seeds::Choice;
+use footplate_eval::testbed::PreparedTrains;
 use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
 use footplate_sim::{
     BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
@@ -66,7 +66,7 @@ impl<'l> Stage<'l> {
     /// When there is no room for the trains on the layout.
     pub(crate) fn set(layout: &'l Layout, number: u64) -> anyhow::Result<Self> {
         let switches = LivingSwitches::well_kept();
-        let rehearsal = Rehearsal::prepare(layout, number, &TRAINS, &switches, BUDGET)?;
+        let rehearsal = PreparedTrains::prepare(layout, number, &TRAINS, &switches, BUDGET)?;
         let (world, models) = (rehearsal.world().clone(), rehearsal.models.clone());
         Ok(Self { number, layout, world, models })
     }

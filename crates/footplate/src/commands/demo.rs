@@ -1,6 +1,5 @@
 //! `footplate demo`: calibrates two unknown trains of a simulated layout and stops them at given places.
 
-mod beginning;
 mod calibrating;
 mod driving;
 mod outcome;
@@ -25,8 +24,8 @@ use crate::clock::{local, now};
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::Speed;
 use crate::session_journal::{IfUnkept, SessionJournal, WhenFull};
-pub(crate) use beginning::TourBeginning;
 use driving::Tour;
+pub(crate) use driving::TourBeginning;
 use railway::{Railway, SharedRecord};
 use running_demo::Demo;
 use screen::{Manner, Screen};
@@ -83,15 +82,15 @@ impl Default for Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let on = WrittenLayout::named("track-a")?;
-        let layout = &on.layout;
+        let written = WrittenLayout::named("track-a")?;
+        let layout = &written.layout;
         let screen = Screen::new(output, if self.json { Manner::Json } else { Manner::Text });
         let is_watched = screen.is_watched();
         let dashboard = match &self.serve {
-            Some(at) => Some(open_dashboard(at, &on, self.store.clone())?),
+            Some(at) => Some(open_dashboard(at, &written, self.store.clone())?),
             // Another program may use the default port.
-            None if is_watched => open_dashboard(&ServedAt::USUAL, &on, self.store.clone())
-                .or_else(|_| open_dashboard(&ServedAt::ANY, &on, self.store.clone()))
+            None if is_watched => open_dashboard(&ServedAt::USUAL, &written, self.store.clone())
+                .or_else(|_| open_dashboard(&ServedAt::ANY, &written, self.store.clone()))
                 .ok(),
             None => None,
         };
@@ -109,7 +108,7 @@ impl Arguments {
         let mut dice = Dice::new(self.seed);
         let mut turnouts = TurnoutStates::unknown();
         for train in TRAINS {
-            turnouts = turn(&mut demo, &on, train, &turnouts, &mut dice)?;
+            turnouts = turn(&mut demo, &written, train, &turnouts, &mut dice)?;
         }
         demo.end()?;
         self.conclude(&mut demo)
@@ -176,7 +175,7 @@ impl Arguments {
 /// rails, so the other train is off the layout meanwhile.
 fn turn(
     demo: &mut Demo<'_, '_, '_>,
-    on: &WrittenLayout,
+    written: &WrittenLayout,
     train: TrainId,
     turnouts: &TurnoutStates,
     dice: &mut Dice,
@@ -185,10 +184,10 @@ fn turn(
         demo.begin_run(train);
     }
     demo.railway.put_down(train)?;
-    let known = calibrating::calibrate(demo, on, train, turnouts)?;
+    let known = calibrating::calibrate(demo, written, train, turnouts)?;
     if let Some(known) = &known {
-        demo.models.push(MotionFile::of(&on.layout, known.fit.model(), Some(now())));
-        Tour::new(demo, on, train, known)?.run(demo, known, STOPS, dice)?;
+        demo.models.push(MotionFile::of(&written.layout, known.fit.model(), Some(now())));
+        Tour::new(demo, written, train, known)?.run(demo, known, STOPS, dice)?;
     }
     demo.railway.lift(train);
     demo.set_idle(train, "is done");

@@ -7,10 +7,9 @@ mod instruction;
 mod learning;
 mod parse;
 mod reader;
-mod result_line;
 mod script;
 mod script_runner;
-mod spoken;
+mod session_message;
 mod terminal;
 mod trains;
 mod truth;
@@ -26,17 +25,18 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
+use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
 use self::console::{Console, ended, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
 use self::instruction::HELP;
 use self::reader::Known;
-use self::result_line::ResultLine;
 use self::script::read_script;
 use self::script_runner::CommandSource;
 pub(crate) use self::script_runner::ScriptRunner;
-pub(crate) use self::spoken::Spoken;
+use self::session_message::ResultLine;
+pub(crate) use self::session_message::SessionMessage;
 use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{GroundTruth, StartOdometers};
@@ -48,7 +48,7 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::witness::Witnessed;
@@ -117,6 +117,11 @@ pub(crate) struct Railway {
 impl Railway {
     pub(super) const fn link(&self) -> &Address {
         &self.link
+    }
+
+    /// What the doctor measured of the line.
+    fn line(&self) -> anyhow::Result<Option<MeasuredLine>> {
+        MeasuredLine::of(&self.link, self.store.as_deref())
     }
 }
 
@@ -223,7 +228,7 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
-            link: self.railway.link.time_model(),
+            link: self.railway.link.time_model(self.railway.line()?.as_ref()),
         })
     }
 
@@ -276,7 +281,8 @@ impl Arguments {
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
-        let session = open_session(&self.railway.link, &link, layout)?;
+        let mut session = open_session(&self.railway.link, &link, layout)?;
+        session.expect_delays(self.railway.link.excess(self.railway.line()?.as_ref()));
         let sits_at_terminal = self.is_drawn();
         let drawn = || Board::new(now().as_ns());
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));
@@ -306,11 +312,11 @@ impl Arguments {
         let mut start_odometers = StartOdometers::default();
         let ending = loop {
             let ending = runtime.run(&mut script_runner, &mut console)?;
-            for spoken in std::mem::take(&mut console.for_scoring) {
-                if let Spoken::Begun(train) = spoken {
+            for message in std::mem::take(&mut console.for_scoring) {
+                if let SessionMessage::Begun(train) = message {
                     start_odometers.note(runtime.link(), train);
                 }
-                if let Some(ended) = ended(&spoken) {
+                if let Some(ended) = ended(&message) {
                     let truth = start_odometers.error(runtime.link(), layout, ended);
                     let result = ResultLine::of(layout, ended, truth);
                     if let Some(dashboard) = dashboard {

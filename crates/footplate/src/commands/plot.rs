@@ -3,8 +3,6 @@
 mod drawing;
 mod file;
 mod picture;
-mod shares;
 
 pub(super) use file::PictureFile;
-pub(super) use picture::{Ink, Layer, Panel, Picture, Shape};
-pub(super) use shares::{SHOWN, shares};
+pub(super) use picture::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};

@@ -173,7 +173,7 @@ impl Board {
         match request {
             Request::EmergencyStop => waiting.push_front(PendingRequest { request, answer }),
             Request::Line(_) if waiting.len() < MAX_WAITING => {
-                waiting.push_back(PendingRequest { request, answer })
+                waiting.push_back(PendingRequest { request, answer });
             }
             Request::Line(_) => return Err(TooMany),
         }
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn an_emergency_stop_goes_first_however_many_wait() {
+    fn an_emergency_stop_precedes_all_waiting_requests() {
         let board = Board::new(7);
         for _ in 0..MAX_WAITING {
             drop(board.ask(Request::Line("where".into())).expect("room"));

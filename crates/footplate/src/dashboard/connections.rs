@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_newly_is_answered_and_who_has_asked_is_kept_before_the_silent() {
+    fn new_connections_are_accepted_and_idle_ones_closed_first() {
         served(FEW, async |at| {
             let mut asking = TcpStream::connect(at).await.expect("a connection");
             assert!(ask(&mut asking).await);
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn who_sends_no_whole_header_in_time_is_cut_off() {
+    fn incomplete_headers_time_out() {
         served(Limits { header_within: Duration::from_millis(100), ..FEW }, async |at| {
             let mut slow = TcpStream::connect(at).await.expect("a connection");
             slow.write_all(b"GET / HTTP/1.1\r\nHo").await.expect("a part of a header");

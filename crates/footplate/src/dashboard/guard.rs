@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_loopback_the_token_is_asked_for() {
+    fn other_machines_need_the_token() {
         let token = Token::chosen("0123456789abcdef").expect("16 characters");
         let guard = Guard::new("0.0.0.0:8417".parse().expect("an address"), Some(token));
         let get = |bearer: &str| {

@@ -126,8 +126,8 @@ impl CalibrationFollower {
             known == turnouts && driver.trains().all(|other| other == train)
         };
         let driver = self.driver.take().filter(is_same);
-        let anew = || (turnouts.clone(), Driver::new(self.layout.clone(), turnouts.clone()));
-        let (_, driver) = self.driver.insert(driver.unwrap_or_else(anew));
+        let new_driver = || (turnouts.clone(), Driver::new(self.layout.clone(), turnouts.clone()));
+        let (_, driver) = self.driver.insert(driver.unwrap_or_else(new_driver));
         driver.add_located(calibrator.fit().model().clone(), calibrator.locator().clone());
         driver
     }

@@ -30,16 +30,16 @@ pub(super) struct Calibrated {
 /// Calibrates a train; `None` if it could not be located.
 pub(super) fn calibrate(
     demo: &mut Demo<'_, '_, '_>,
-    on: &WrittenLayout,
+    written: &WrittenLayout,
     train: TrainId,
     turnouts: &TurnoutStates,
 ) -> anyhow::Result<Option<Calibrated>> {
     let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or(SpeedStep::STAND);
     let settings = CalibratorSettings::default();
     let budget = settings.budget;
-    let beginning = CalibrationBeginning::new(on, settings, MotionFit::new(train, highest), turnouts);
+    let beginning = CalibrationBeginning::new(written, settings, MotionFit::new(train, highest), turnouts);
     let scribe = demo.begin_machine(CalibrationBeginning::KIND, &beginning)?;
-    let layout = &on.layout;
+    let layout = &written.layout;
     let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
     let began = demo.now();
     demo.set_active(train, "learns", "");

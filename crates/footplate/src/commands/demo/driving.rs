@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::{Driver, Finished, Notice, Order, OrderId, PlannedStop, Refusal, StopOrder};
+use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
-use footplate_core::track::{Landmark, Layout};
-use footplate_core::tracking::{DueContact, PassedContact, TrackContext};
-use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::track::{Landmark, Layout, Leg};
+use footplate_core::tracking::{DueContact, Locator, PassedContact, TrackContext};
+use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use serde::{Deserialize, Serialize};
 
-use super::beginning::TourBeginning;
 use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::running_demo::Demo;
@@ -16,7 +17,7 @@ use super::targets::{Dice, steps_for_stops, target_ahead};
 use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
-use crate::witness::{Input, Witnessed};
+use crate::witness::{Input, Listener, Witnessed};
 
 /// Refused targets after which a stop is skipped.
 const MAX_REFUSALS: usize = 40;
@@ -40,12 +41,12 @@ pub(super) struct Tour<'l> {
 impl<'l> Tour<'l> {
     pub(super) fn new(
         demo: &mut Demo<'_, '_, '_>,
-        on: &'l WrittenLayout,
+        written: &'l WrittenLayout,
         train: TrainId,
         known: &Calibrated,
     ) -> anyhow::Result<Self> {
-        let layout = &on.layout;
-        let beginning = TourBeginning::new(on, known);
+        let layout = &written.layout;
+        let beginning = TourBeginning::new(written, known);
         let scribe = demo.begin_machine(TourBeginning::KIND, &beginning)?;
         let driver = Witnessed::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
@@ -250,5 +251,46 @@ impl<'l> Tour<'l> {
             promised: [promise.low, promise.high],
             estimated_error: finished.achieved.and_then(|achieved| achieved.error),
         })
+    }
+}
+
+/// Everything that the driver of a calibrated train is built from.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct TourBeginning {
+    /// The text of the layout file.
+    pub(crate) layout: String,
+    turnouts: Vec<(TurnoutId, Leg)>,
+    model: MotionModel,
+    /// The located train.
+    locator: Locator,
+}
+
+impl TourBeginning {
+    /// The kind of this machine in a store.
+    pub(crate) const KIND: &'static str = "tour";
+
+    pub(super) fn new(written: &WrittenLayout, known: &Calibrated) -> Self {
+        Self {
+            layout: written.text.clone(),
+            turnouts: written.legs(&known.turnouts),
+            model: known.fit.model().clone(),
+            locator: known.locator.clone(),
+        }
+    }
+
+    /// Builds the driver; `layout` is the one in the text.
+    pub(crate) fn driver(self, layout: &Layout) -> Driver {
+        let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
+        driver.add_located(self.model, self.locator);
+        driver
+    }
+}
+
+impl Listener for Driver {
+    fn handle_word(&mut self, now: Timestamp, word: &Input) {
+        if let Input::Order(order) = word {
+            // An order that was refused live is refused in a replay, too.
+            let _ = self.order(now, *order);
+        }
     }
 }

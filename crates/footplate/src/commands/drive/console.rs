@@ -12,7 +12,7 @@ use footplate_core::{Command, Timestamp};
 use footplate_wire::{CommandError, LinkNotice};
 
 use super::script_runner::ScriptRunner;
-use super::spoken::{Ended, Spoken};
+use super::session_message::{Ended, SessionMessage};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
 use crate::runtime::{Attendant, Wish};
@@ -63,7 +63,7 @@ pub(super) struct Console {
     /// News of the link since the script runner was last called.
     news: Vec<LinkNews>,
     /// Messages that are scored against the simulated truth before time moves on.
-    pub(super) for_scoring: Vec<Spoken>,
+    pub(super) for_scoring: Vec<SessionMessage>,
     pub(super) is_over: bool,
 }
 
@@ -158,21 +158,21 @@ impl Console {
 }
 
 impl Attendant<Witnessed<ScriptRunner>> for Console {
-    fn hear(&mut self, now: Timestamp, notice: Spoken) {
+    fn hear(&mut self, now: Timestamp, notice: SessionMessage) {
         match notice {
-            Spoken::Line { text, status } => {
+            SessionMessage::Line { text, status } => {
                 if let Some(live_view) = &self.live_view {
                     live_view.board.say((now - Timestamp::ZERO).as_s(), &text);
                 }
                 self.screen.say(&text, &status);
             }
-            Spoken::Passed(passed) => {
+            SessionMessage::Passed(passed) => {
                 if let Some(live_view) = &mut self.live_view {
                     live_view.painter.passed(passed);
                 }
             }
-            Spoken::Alarm(alarm) => self.alarm(now, &alarm),
-            Spoken::Over => self.is_over = true,
+            SessionMessage::Alarm(alarm) => self.alarm(now, &alarm),
+            SessionMessage::Over => self.is_over = true,
             begun_or_ended => self.for_scoring.push(begun_or_ended),
         }
     }
@@ -216,9 +216,9 @@ impl Attendant<Witnessed<ScriptRunner>> for Console {
 }
 
 /// The ended order in a message, if it is one.
-pub(super) fn ended(spoken: &Spoken) -> Option<&Ended> {
-    match spoken {
-        Spoken::Ended(ended) => Some(ended),
+pub(super) fn ended(message: &SessionMessage) -> Option<&Ended> {
+    match message {
+        SessionMessage::Ended(ended) => Some(ended),
         _ => None,
     }
 }

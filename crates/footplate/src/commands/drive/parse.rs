@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_of_the_help_is_understood() {
+    fn every_line_of_the_help_parses() {
         let (train, step) = (TrainId(24), |step| SpeedStep::new(step).expect("a step"));
         assert_eq!(order("speed 24 8"), Order::Speed { train, step: step(8) });
         assert_eq!(order("stop 24"), Order::Speed { train, step: step(0) });
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_is_named_with_its_column_and_what_would_be_right() {
+    fn errors_name_the_column_and_the_correction() {
         let wrong: Vec<String> = [
             ("stopp 24 at C13", "column 1: `stopp` is not a command: did you mean `stop`?"),
             ("stop 25 at C13", "column 6: `25` is not a train of this session: 24, 58"),
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn no_line_whatever_makes_it_panic() {
+    fn no_line_panics() {
         for line in [
             "\u{0}",
             "speed 99999999999 1",

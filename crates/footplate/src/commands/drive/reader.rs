@@ -105,10 +105,10 @@ impl<'t> Words<'_, 't, '_> {
         let first = self.next("a place, such as `C13` or `C13+120mm`")?;
         let mut text = first.text.to_owned();
         while let Some(word) = self.rest.first() {
-            let goes_on = word.text.starts_with(['+', '-'])
+            let continues = word.text.starts_with(['+', '-'])
                 || text.ends_with(['+', '-'])
                 || (word.text == "mm" && text.ends_with(|c: char| c.is_ascii_digit()));
-            if !goes_on {
+            if !continues {
                 break;
             }
             text.push_str(word.text);

@@ -22,7 +22,7 @@ use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::{Step, step};
-use super::spoken::Spoken;
+use super::session_message::SessionMessage;
 use crate::dashboard::{Painter, TrainTask};
 use crate::witness::{Input, Listener};
 
@@ -72,7 +72,7 @@ pub(crate) struct ScriptRunner {
     journeys: BTreeMap<OrderId, Timestamp>,
     /// The last stop of each train.
     rests: BTreeMap<TrainId, Finished>,
-    outputs: VecDeque<Output<Spoken>>,
+    outputs: VecDeque<Output<SessionMessage>>,
     began: Option<Timestamp>,
     /// The time of the last event or timeout.
     last_event: Timestamp,
@@ -169,7 +169,7 @@ impl ScriptRunner {
 
     fn say(&mut self, line: String) {
         let status = self.formatter().status(self.last_event);
-        self.outputs.push_back(Output::Notice(Spoken::Line { text: line, status }));
+        self.outputs.push_back(Output::Notice(SessionMessage::Line { text: line, status }));
     }
 
     fn since_begin(&self, time: Timestamp) -> TimeSpan {
@@ -207,7 +207,7 @@ impl ScriptRunner {
 
     fn end(&mut self) {
         self.is_over = true;
-        self.outputs.push_back(Output::Notice(Spoken::Over));
+        self.outputs.push_back(Output::Notice(SessionMessage::Over));
     }
 
     fn carry_out(&mut self, now: Timestamp, step: Step) {
@@ -217,7 +217,7 @@ impl ScriptRunner {
                     if let (Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }, Some(train)) =
                         (order, order.train())
                     {
-                        self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                        self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                     }
                     self.pending.insert(id, step);
                 }
@@ -285,7 +285,7 @@ impl ScriptRunner {
                     self.pending.remove(&before);
                 }
                 self.journeys.insert(id, now);
-                self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                 self.pending.insert(id, step);
             }
             Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_retry => {
@@ -364,7 +364,7 @@ impl ScriptRunner {
 }
 
 impl Machine for ScriptRunner {
-    type Notice = Spoken;
+    type Notice = SessionMessage;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.dispatcher.handle_event(now, event);
@@ -377,7 +377,7 @@ impl Machine for ScriptRunner {
         self.advance(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<Spoken>> {
+    fn poll_output(&mut self) -> Option<Output<SessionMessage>> {
         self.outputs.pop_front()
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use footplate_core::track::Layout;
 use footplate_core::{Length, TrainId};
 
-use super::spoken::{Ended, Target};
+use super::session_message::{Ended, Target};
 use crate::link::{Link, ObservedLink, SimulatedLink};
 
 /// The true state of the railway; `None` on a real one.

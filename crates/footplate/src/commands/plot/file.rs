@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ending_says_what_is_drawn() {
+    fn the_extension_selects_the_format() {
         assert_eq!("a/b.SVG".parse::<PictureFile>().unwrap().form, Form::Svg);
         assert_eq!("b.png".parse::<PictureFile>().unwrap().form, Form::Png);
         assert!("b.gif".parse::<PictureFile>().unwrap_err().contains("end with .svg or .png"));

@@ -12,7 +12,7 @@ use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_la
 use super::session::read;
 use crate::commands::calibrate::{CalibrationBeginning, calibration_line};
 use crate::commands::demo::TourBeginning;
-use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, Board, CalibrationFollower, LayoutPicture, Painter, TrainPassed};
 use crate::witness::{Input, Listener};
@@ -30,11 +30,11 @@ enum Shown {
     Calibration(CalibrationNotice),
 }
 
-fn of_session(notice: Spoken) -> Option<Shown> {
+fn of_session(notice: SessionMessage) -> Option<Shown> {
     match notice {
-        Spoken::Line { text, .. } => Some(Shown::Line(text)),
-        Spoken::Passed(passed) => Some(Shown::Passed(passed)),
-        Spoken::Alarm(alarm) => Some(Shown::Alarm(alarm)),
+        SessionMessage::Line { text, .. } => Some(Shown::Line(text)),
+        SessionMessage::Passed(passed) => Some(Shown::Passed(passed)),
+        SessionMessage::Alarm(alarm) => Some(Shown::Alarm(alarm)),
         _ => None,
     }
 }

@@ -36,7 +36,7 @@ use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
 
 /// The most events in one mark: more than a hop has, fewer than a session.
-const MOST_MARKED: usize = 1_000;
+const MAX_MARKED: usize = 1_000;
 
 #[derive(Clone)]
 struct Archive {
@@ -217,8 +217,8 @@ async fn mark(State(archive): State<Archive>, body: Result<Json<NewMark>, JsonRe
 
 impl NewMark {
     fn make(self, store: &mut Store) -> anyhow::Result<String> {
-        if self.events.is_empty() || self.events.len() > MOST_MARKED {
-            bail!("{} events cannot be marked at once: 1 to {MOST_MARKED} can", self.events.len());
+        if self.events.is_empty() || self.events.len() > MAX_MARKED {
+            bail!("{} events cannot be marked at once: 1 to {MAX_MARKED} can", self.events.len());
         }
         let events: Vec<EventKey> = self.events.into_iter().map(EventKey).collect();
         let kind = match self.mark {

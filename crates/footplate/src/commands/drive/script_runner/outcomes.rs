@@ -11,7 +11,7 @@ use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::formatter::{promises_broken, trains, verb};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
-use crate::commands::drive::spoken::{Ended, Spoken, Target};
+use crate::commands::drive::session_message::{Ended, SessionMessage, Target};
 use crate::dashboard::{Alarm, TrainPassed};
 
 /// Warn about a train once its stop intervals are this much wider, one standard deviation (chosen: ±30 mm is visible at
@@ -26,7 +26,7 @@ impl ScriptRunner {
         self.fell_short = true;
         self.say(format!("refused `{}`: {why}", step.text));
         let ended = Ended { refused: Some(why.to_string()), ..self.ended(now, step) };
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
     }
 
     fn ended(&self, time: Timestamp, step: &Step) -> Ended {
@@ -68,7 +68,7 @@ impl ScriptRunner {
                 }
             }
             if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
-                self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm.said(&line))));
+                self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm.said(&line))));
             }
             self.say(line);
         }
@@ -78,7 +78,7 @@ impl ScriptRunner {
             }
             Notice::Passed { train, passed, next } => {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
-                self.outputs.push_back(Output::Notice(Spoken::Passed(passed_by)));
+                self.outputs.push_back(Output::Notice(SessionMessage::Passed(passed_by)));
                 self.learning.passed(*train, self.dispatcher.driver(), passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
@@ -94,7 +94,7 @@ impl ScriptRunner {
             Notice::TurnoutThrown { order: Some(order), .. } => {
                 if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
                     let ended = self.ended(now, &step);
-                    self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+                    self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
                 }
             }
             Notice::GivenUp { order, train, why } => {
@@ -140,7 +140,7 @@ impl ScriptRunner {
         let ended = Ended { error, target_on_arrival, ..self.ended(now, &step) };
         let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
         let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
-        self.outputs.push_back(Output::Notice(Spoken::Ended(Ended { achieved, ..ended })));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(Ended { achieved, ..ended })));
     }
 
     /// What a line asked for was cancelled: a script tries it again once the train can be driven, or the line is refused.
@@ -163,7 +163,7 @@ impl ScriptRunner {
             ..self.ended(finished.time, &step)
         };
         let ended = self.at_rest(finished, ended);
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
     }
 
     /// The place of a train that was stopped before the end of its run.
@@ -212,7 +212,7 @@ impl ScriptRunner {
         if unexplained >= UNRELIABLE_FROM && self.unreliable.insert(train) {
             let line = promises_broken(train, unexplained);
             let alarm = Alarm::promises_broken(train, unexplained).said(&line);
-            self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm)));
+            self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm)));
             self.say(line);
         }
     }

@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_written_mended_and_had_again() {
+    fn a_line_is_edited_and_recalled() {
         let mut prompt = Prompt::default();
         write(&mut prompt, "speed ä4 8");
         for _ in 0..4 {

@@ -13,11 +13,11 @@ use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};
 use super::Extent;
 use super::timed::Timed;
 use super::world::WorldName;
-use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
 use crate::witness::Input;
 use footplate_eval::driving::{Plan, TRAIN};
-use footplate_eval::rehearsal::{VirtualLine, calibrate};
+use footplate_eval::testbed::{VirtualLine, calibrate};
 
 /// Stops are asked for from steps whose true speed is at least this, in mm/s (chosen: slower ones may not move at all).
 const SLOWEST_MM_PER_S: f64 = 35.0;
@@ -157,7 +157,12 @@ impl Driven<'_, '_> {
     fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<ScriptRunner> {
         let sections = SectionIndex::of(&self.written.layout);
         learnt.1.iter_mut().for_each(|fit| fit.begin_session(&sections));
-        learnt.0 = learnt.1.iter().map(|fit| fit.model().clone()).collect();
+        // A train that a recovery measured again has a model and no fit.
+        let fitted = |model: MotionModel| {
+            let fit = learnt.1.iter().find(|fit| fit.model().train() == model.train());
+            fit.map_or_else(|| model.for_later_session(), |fit| fit.model().clone())
+        };
+        learnt.0 = learnt.0.into_iter().map(fitted).collect();
         let beginning = DriveBeginning::line_by_line(self.written, &self.turnouts, learnt);
         let text = serde_json::to_string(&beginning).context("what was learnt is kept as text")?;
         let kept: DriveBeginning = serde_json::from_str(&text).context("what was kept is read back")?;
@@ -184,20 +189,22 @@ impl Driven<'_, '_> {
         let ended = self.drive(
             machine,
             until,
-            |spoken| matches!(spoken, Spoken::Ended(ended) if ended.command == "stop"),
+            |message| matches!(message, SessionMessage::Ended(ended) if ended.command == "stop"),
         );
         self.until_at_rest(machine);
         match ended {
-            Some(Spoken::Ended(ended)) => match (ended.refused, ended.promise, self.beyond(node, offset)) {
-                (None, Some(promise), Some(error)) => {
-                    let promised = [promise.low.as_mm(), promise.high.as_mm()];
-                    self.scored.stops.push(ScoredStop { session, step, error, promised });
+            Some(SessionMessage::Ended(ended)) => {
+                match (ended.refused, ended.promise, self.beyond(node, offset)) {
+                    (None, Some(promise), Some(error)) => {
+                        let promised = [promise.low.as_mm(), promise.high.as_mm()];
+                        self.scored.stops.push(ScoredStop { session, step, error, promised });
+                    }
+                    (refused, ..) => {
+                        self.failed(&order, refused.as_deref().unwrap_or("no promise"));
+                        self.seek(machine);
+                    }
                 }
-                (refused, ..) => {
-                    self.failed(&order, refused.as_deref().unwrap_or("no promise"));
-                    self.seek(machine);
-                }
-            },
+            }
             _ => {
                 self.failed(&order, "not ended in time");
                 self.is_stuck = true;
@@ -245,19 +252,19 @@ impl Driven<'_, '_> {
         &mut self,
         machine: &mut Timed,
         until: Timestamp,
-        is_waited_for: impl Fn(&Spoken) -> bool,
-    ) -> Option<Spoken> {
+        is_waited_for: impl Fn(&SessionMessage) -> bool,
+    ) -> Option<SessionMessage> {
         loop {
-            let spoken = self.line.drive_hearing(machine, until, |machine, now, notice| {
+            let message = self.line.drive_hearing(machine, until, |machine, now, notice| {
                 if let Some(news) = notice.news() {
                     machine.handle_word(now, &Input::Link(news));
                 }
             })?;
-            if matches!(&spoken, Spoken::Alarm(alarm) if alarm.is_of_promises()) {
+            if matches!(&message, SessionMessage::Alarm(alarm) if alarm.is_of_promises()) {
                 self.scored.sessions_warned += 1;
             }
-            if is_waited_for(&spoken) {
-                return Some(spoken);
+            if is_waited_for(&message) {
+                return Some(message);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! A machine on a simulated layout: the loop around the bytes of a virtual station, on its clock.
+//! Connects a machine with a simulated station through its bytes, on the clock of the simulation.
 
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Timestamp};
@@ -6,10 +6,10 @@ use footplate_sim::{FromStation, VirtualStation};
 use footplate_wire::marklin_serial::{EncodeError, Interface, Settings};
 use footplate_wire::{LinkNotice, Session, Transmit};
 
-/// S88 modules that the session asks for: the five of the course layouts.
+/// S88 modules that the session polls: the five of the course layouts.
 const MODULES: u8 = 5;
 
-/// A station and the program's side of the line to it; a clone is the same world with another future.
+/// A simulated station and the session at the other end of the link. A clone is a copy of the world.
 #[derive(Clone)]
 pub struct VirtualLine<'l> {
     /// The station, with the world behind it.
@@ -18,7 +18,7 @@ pub struct VirtualLine<'l> {
 }
 
 impl<'l> VirtualLine<'l> {
-    /// A line that has just been opened.
+    /// Opens the link.
     pub fn open(station: VirtualStation<'l>) -> Result<Self, EncodeError> {
         let now = station.now();
         let mut interface = Interface::new(now, Settings::with_cts(MODULES))?;
@@ -31,12 +31,12 @@ impl<'l> VirtualLine<'l> {
         self.station.now()
     }
 
-    /// Lets a machine drive until it has something to say or a time has come.
+    /// Drives until the machine has a notice or a time is reached.
     pub fn drive<M: Machine>(&mut self, machine: &mut M, until: Timestamp) -> Option<M::Notice> {
         self.drive_hearing(machine, until, |_, _, _| {})
     }
 
-    /// The same with one that is told what the session has to say of the line.
+    /// The same; `hear` receives the notices of the link.
     pub fn drive_hearing<M: Machine>(
         &mut self,
         machine: &mut M,
@@ -66,7 +66,7 @@ impl<'l> VirtualLine<'l> {
         }
     }
 
-    /// Carries everything between machine and session that can be carried now.
+    /// Exchanges all pending outputs between machine and session.
     fn settle<M: Machine>(
         &mut self,
         machine: &mut M,
@@ -83,7 +83,7 @@ impl<'l> VirtualLine<'l> {
                 }
             }
             match machine.poll_output()? {
-                Output::Command(command) => self.tell(command),
+                Output::Command(command) => self.command(command),
                 Output::HoldLine(until) => self.interface.hold_line(until),
                 Output::Watch(sensor) => self.interface.watch(sensor),
                 Output::Notice(notice) => return Some(notice),
@@ -91,8 +91,8 @@ impl<'l> VirtualLine<'l> {
         }
     }
 
-    fn tell(&mut self, command: Command) {
-        // Only what no decoder has is refused, and machines know their decoders.
+    fn command(&mut self, command: Command) {
+        // Machines send only commands that the decoder supports: none is refused.
         let _ = self.interface.handle_command(self.now(), command);
     }
 }

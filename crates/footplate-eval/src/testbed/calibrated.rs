@@ -1,4 +1,4 @@
-//! A train calibrated from nothing, as a person would let it.
+//! Calibrates an unknown train without an operator.
 
 use footplate_core::control::{Calibrator, CalibratorSettings, Machine};
 use footplate_core::model::MotionFit;
@@ -9,29 +9,29 @@ use footplate_core::{SpeedStep, TimeSpan, TrainId};
 
 use super::VirtualLine;
 
-/// Steps of the decoders that all figures are about.
+/// The highest step of the simulated decoders.
 const HIGHEST: u8 = 14;
-/// A calibration that has not ended so long after its budget is taken as it is.
-const PATIENCE: TimeSpan = TimeSpan::from_s(420.0);
+/// A calibration that exceeds its budget by this time is ended.
+const TIMEOUT: TimeSpan = TimeSpan::from_s(420.0);
 
-/// What a calibration leaves to whoever drives next.
+/// The results of a calibration, for the next driver.
 #[derive(Clone)]
 pub struct Calibrated {
-    /// What was found.
+    /// The calibrated model.
     pub model: MotionModel,
-    /// What it follows from, to learn on.
+    /// The fit, to be continued.
     pub fit: MotionFit,
-    /// Where the train is.
+    /// The located train.
     pub locator: Locator,
-    /// How turnouts lie.
+    /// The turnout positions.
     pub turnouts: TurnoutStates,
-    /// Track time that it took, in s.
+    /// Simulated time that it took, in s.
     pub seconds: f64,
-    /// Why it ended.
+    /// How it ended.
     pub ending: String,
 }
 
-/// Calibrates a train from nothing, within a budget of track time. It has to be alone on the layout.
+/// Calibrates an unknown train within a budget of simulated time. No other train may be on the layout.
 pub fn calibrate(
     layout: &Layout,
     line: &mut VirtualLine<'_>,
@@ -42,8 +42,8 @@ pub fn calibrate(
     let settings = CalibratorSettings { budget, ..CalibratorSettings::default() };
     let mut calibrator = Calibrator::new(layout, settings, MotionFit::new(train, highest));
     let began = line.now();
-    let patience = began + PATIENCE + budget;
-    // It begins with the first word it hears.
+    let patience = began + TIMEOUT + budget;
+    // The first timeout starts the calibrator.
     calibrator.handle_timeout(began);
     while line.now() < patience && calibrator.ending().is_none() {
         let _ = line.drive(&mut calibrator, patience);

@@ -1,4 +1,4 @@
-//! Several trains on one layout, each calibrated alone, and put where a scorer wants them.
+//! Several trains on one layout, each calibrated alone, and then put where a score needs them.
 
 use std::collections::BTreeMap;
 
@@ -12,31 +12,32 @@ use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 
 use super::{VirtualLine, calibrate};
 
-/// How well a person sees where the end of a shoe is, beside a contact whose own place is known to 5 mm.
-const HAND: Length = Length::from_mm(12.0);
-/// What a lifted train was told it may still be told once more; then the line is quiet.
-const QUIET: TimeSpan = TimeSpan::from_s(12.0);
+/// The standard deviation of a position that an operator reads off: the end of the shoe beside a sensor, whose own
+/// place is known to 5 mm.
+const READ_OFF_BY_HAND: Length = Length::from_mm(12.0);
+/// The time in which repeated commands to lifted trains end.
+const REPEATS_END: TimeSpan = TimeSpan::from_s(12.0);
 
-/// A world with trains that are known, as well as a calibration within a budget gets to know them.
+/// A world with calibrated trains.
 #[derive(Clone)]
-pub struct Rehearsal<'l> {
+pub struct PreparedTrains<'l> {
     layout: &'l Layout,
-    /// The line to the station.
+    /// The link to the station.
     pub line: VirtualLine<'l>,
-    /// What calibration found.
+    /// The calibrated models.
     pub models: BTreeMap<TrainId, MotionModel>,
-    /// How the turnouts lie: all straight in the beginning, and known to.
+    /// The turnout positions: all straight at first.
     pub turnouts: TurnoutStates,
     /// Where trains were put.
     places: BTreeMap<TrainId, WayPoint>,
 }
 
-impl<'l> Rehearsal<'l> {
-    /// Draws trains and rails from the seed, calibrates each train while the others are lifted, and lifts them all. A train
-    /// that comes to grief is put elsewhere and calibrated again. A hand lays all turnouts straight then.
+impl<'l> PreparedTrains<'l> {
+    /// Draws trains and track from the seed, calibrates each train while the others are off the layout, lifts them all,
+    /// and sets all turnouts straight. A calibration with a fault is repeated from another place.
     ///
     /// # Errors
-    /// When no train can run round on the layout.
+    /// The layout has no room for a train.
     pub fn prepare(
         layout: &'l Layout,
         seed: u64,
@@ -44,23 +45,23 @@ impl<'l> Rehearsal<'l> {
         switches: &LivingSwitches,
         budget: TimeSpan,
     ) -> anyhow::Result<Self> {
-        Self::prepare_believing(layout, layout, seed, trains, switches, budget)
+        Self::prepare_on(layout, layout, seed, trains, switches, budget)
     }
 
-    /// The same with trains calibrated on what people believe the layout to be: its lengths may be others.
+    /// The same, with trains calibrated on the layout `assumed`, whose lengths may differ from the true ones.
     ///
     /// # Errors
-    /// When no train can run round on the layout.
-    pub fn prepare_believing(
+    /// The layout has no room for a train.
+    pub fn prepare_on(
         layout: &'l Layout,
-        believed: &Layout,
+        assumed: &Layout,
         seed: u64,
         trains: &[TrainId],
         switches: &LivingSwitches,
         budget: TimeSpan,
     ) -> anyhow::Result<Self> {
         let mut station = VirtualStation::draw(layout, seed, trains, switches)?;
-        let stood: Vec<Option<(Position, End)>> = trains
+        let starts_at: Vec<Option<(Position, End)>> = trains
             .iter()
             .map(|train| {
                 let truth = station.world().truth().train(*train)?;
@@ -71,15 +72,16 @@ impl<'l> Rehearsal<'l> {
         let mut line = VirtualLine::open(station)?;
         let mut models = BTreeMap::new();
         for (nth, train) in trains.iter().enumerate() {
-            // Nobody knows at first where it runs to. Whoever saw it run off the rails puts it where another began.
-            let begins = stood.iter().cycle().skip(nth).take(trains.len()).flatten();
+            // The route ahead of a train is unknown at first. If it runs off the track, it starts again from another
+            // train's place.
+            let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
             let mut model = None;
-            for (position, leads) in begins {
-                let mishaps = line.station.world().mishaps().len();
+            for (position, leads) in starts {
+                let faults = line.station.world().mishaps().len();
                 line.station.world_mut().place(*train, *position, *leads)?;
-                model = Some(calibrate(believed, &mut line, *train, budget).model);
+                model = Some(calibrate(assumed, &mut line, *train, budget).model);
                 line.station.world_mut().lift(*train);
-                if line.station.world().mishaps().len() == mishaps {
+                if line.station.world().mishaps().len() == faults {
                     break;
                 }
             }
@@ -90,27 +92,27 @@ impl<'l> Rehearsal<'l> {
             line.station.world_mut().lay(turnout, Leg::Straight);
             turnouts.set(turnout, Leg::Straight);
         }
-        let mut rehearsal = Self { layout, line, models, turnouts, places: BTreeMap::new() };
-        rehearsal.quieten();
-        Ok(rehearsal)
+        let mut prepared = Self { layout, line, models, turnouts, places: BTreeMap::new() };
+        prepared.drain_commands();
+        Ok(prepared)
     }
 
-    /// Lets commands that are still on their way reach decoders that are in somebody's hand.
-    fn quieten(&mut self) {
-        let until = self.line.now() + QUIET;
-        while self.line.drive(&mut Silent, until).is_some() {}
+    /// Waits until commands in transit have reached the decoders of lifted trains.
+    fn drain_commands(&mut self) {
+        let until = self.line.now() + REPEATS_END;
+        while self.line.drive(&mut Idle, until).is_some() {}
     }
 
-    /// The world, for scorers.
+    /// The world, with the truth.
     pub fn world(&self) -> &LivingLayout<'l> {
         self.line.station.world()
     }
 
-    /// Puts a train down with the leading end of its shoe past the contact at a node, its nose in front, running in the
-    /// node's direction.
+    /// Puts a train down with the leading end of its shoe past the sensor at a node, nose first, in the node's
+    /// direction.
     ///
     /// # Errors
-    /// When there is no room there.
+    /// There is no room.
     pub fn put(&mut self, train: TrainId, node: NodeId, offset: Length) -> anyhow::Result<()> {
         let at = footplate_core::track::Landmark { node, offset };
         let position = self.layout.locate(at, &self.turnouts)?;
@@ -119,28 +121,28 @@ impl<'l> Rehearsal<'l> {
         Ok(())
     }
 
-    /// A driver that knows the trains that were put down, and where.
+    /// A driver that knows the trains and their places.
     pub fn driver(&self) -> Driver {
         self.driver_on(self.layout)
     }
 
-    /// The same with another idea of the layout.
+    /// The same, on a layout whose lengths may differ.
     pub fn driver_on(&self, layout: &Layout) -> Driver {
         let mut driver = Driver::new(layout.clone(), self.turnouts.clone());
         for (train, at) in &self.places {
             if let Some(model) = self.models.get(train) {
                 driver.add_train(model.clone());
-                driver.place(self.line.now(), *train, *at, HAND);
+                driver.place(self.line.now(), *train, *at, READ_OFF_BY_HAND);
             }
         }
         driver
     }
 }
 
-/// A machine that wants nothing.
-struct Silent;
+/// A machine that sends no commands.
+struct Idle;
 
-impl Machine for Silent {
+impl Machine for Idle {
     type Notice = SpeedStep;
 
     fn handle_event(&mut self, _: Timestamp, _: &footplate_core::Event) {}
@@ -159,22 +161,23 @@ mod tests {
     use footplate_store::layout_named;
 
     #[test]
-    fn trains_are_known_and_stand_where_they_were_put() {
+    fn trains_are_located_at_rest_where_they_were_put() {
         let layout = layout_named("track-a").expect("built in").layout;
         let trains = [TrainId(24), TrainId(58)];
         let budget = TimeSpan::from_s(60.0);
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = Rehearsal::prepare(&layout, 3, &trains, &switches, budget).expect("two trains");
-        for (train, contact) in trains.into_iter().zip(["C13", "D5"]) {
-            let node = layout.node_named(contact).expect("a contact of track A");
-            rehearsal.put(train, node, Length::from_mm(60.0)).expect("room");
-            let driver = rehearsal.driver();
-            let located = driver.locate(train, rehearsal.line.now()).expect("placed");
+        let mut prepared =
+            PreparedTrains::prepare(&layout, 3, &trains, &switches, budget).expect("two trains");
+        for (train, sensor) in trains.into_iter().zip(["C13", "D5"]) {
+            let node = layout.node_named(sensor).expect("a sensor of track A");
+            prepared.put(train, node, Length::from_mm(60.0)).expect("room");
+            let driver = prepared.driver();
+            let located = driver.locate(train, prepared.line.now()).expect("placed");
             assert_eq!(located.at.node, node);
-            let sensor = layout.sensor_at(node).expect("a contact");
-            let past = rehearsal.world().truth().felt_past(train, sensor).expect("near");
+            let sensor = layout.sensor_at(node).expect("a sensor");
+            let past = prepared.world().truth().felt_past(train, sensor).expect("near");
             assert!((past - located.at.way).abs() < Length::from_mm(30.0), "{past:?}");
-            assert!(driver.is_at_rest(train, rehearsal.line.now()));
+            assert!(driver.is_at_rest(train, prepared.line.now()));
         }
     }
 }
