@@ -211,12 +211,19 @@ impl LineWorld {
         self.notes.join(", ")
     }
 
-    /// Whether what every level claims is true in a run of it: not where rows are read late, where one burst of
-    /// interference meets both sensors, or where wheels slip on a train that rolls back against its traction.
+    /// Whether the claims of every level are true in a run of it. They are not where rows are read late, where one burst of
+    /// interference meets both sensors, where wheels slip on a train that rolls back against its traction, and where a train
+    /// rolls back whose sensors report no direction.
     #[must_use]
     pub fn claims_hold(&self, run: &LineRun) -> bool {
+        let signed = run
+            .samples
+            .iter()
+            .flat_map(|sample| sample.wheels)
+            .any(|wheel| wheel.turned.is_some() || wheel.pulses.is_none() && wheel.counter.is_some());
         let rolls_back = |truth: &LineTruth| {
-            truth.speed.as_m_per_s() < 0.0 && truth.wheels.iter().any(|does| *does != WheelTruth::Rolling)
+            truth.speed.as_m_per_s() < 0.0
+                && (!signed || truth.wheels.iter().any(|does| *does != WheelTruth::Rolling))
         };
         !matches!(self.setup.fault, Fault::Clock | Fault::Bursts) && !run.truth.iter().any(rolls_back)
     }
