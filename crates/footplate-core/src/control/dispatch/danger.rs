@@ -1,4 +1,4 @@
-//! While a train is in danger nobody sets out, and it is let crawl once all others stand.
+//! While a train is in danger no other sets out, and it gets clearance to creep once all others are at rest.
 
 use alloc::vec::Vec;
 
@@ -12,7 +12,7 @@ use super::dispatcher::Dispatcher;
 use super::reservation::{Reservation, Span};
 use crate::control::Notice;
 
-/// Track of two trains that touches is track of both: so much is left between them.
+/// The gap between two reservations: those that touch overlap.
 const APART: Length = Length::from_mm(1.0);
 
 impl Dispatcher {
@@ -35,7 +35,7 @@ impl Dispatcher {
             Notice::Recovered { train, .. } => {
                 self.crawlers.remove(train);
                 if let Some(known) = self.trains.get_mut(train) {
-                    // What it was granted is long behind it.
+                    // It has left the track of its authority.
                     known.held = Reservation::empty();
                     known.kept = Reservation::empty();
                     known.seen_since_start = true;
@@ -65,7 +65,7 @@ impl Dispatcher {
         self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
-    /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.
+    /// Clears a train in danger to creep once all others are at rest: from then on no other moves. Returns whether one was.
     pub(super) fn let_crawl(&mut self, now: Timestamp) -> bool {
         let mut is_let = false;
         let crawlers: Vec<TrainId> = self.crawlers.iter().copied().collect();
@@ -87,7 +87,7 @@ impl Dispatcher {
         is_let
     }
 
-    /// All that nobody else holds: a train that is let crawl may come onto any of it, and nobody else sets out.
+    /// All track that no other train has reserved: a creeping train may enter any of it, and no other sets out.
     fn all_that_is_free(&self, id: TrainId) -> Reservation {
         let layout = self.watchdog.driver().layout();
         let others = || self.trains.values().filter(|other| other.id != id);

@@ -97,7 +97,7 @@ impl Dispatcher {
             let Some(unobstructed) = unobstructed else {
                 if self.watchdog.driver().missed_sensor(id, now).is_none() {
                     self.cannot_go(now, id, self.unreachable(id));
-                } else if !self.begins_to_look_back(id) {
+                } else if !self.begins_to_look_back(id) && !self.looks_ahead(now, id, &start) {
                     self.lose(now, id);
                 }
                 continue;

@@ -1,4 +1,4 @@
-//! Who holds the track that a train was stopped before.
+//! Which trains have reserved the track that a train was stopped before.
 
 use alloc::vec::Vec;
 
@@ -9,13 +9,12 @@ use crate::units::Length;
 use super::dispatcher::Dispatcher;
 use super::path::Path;
 
-/// So far beyond the end of what a train may enter its holder is looked for: two of the steps in which free track is looked
-/// for.
+/// How far beyond the end of authority reservations are looked for: two of the steps in which free track is looked for.
 const BEYOND: Length = Length::from_mm(100.0);
 
 impl Dispatcher {
-    /// The trains that hold the track just beyond what a train may enter, as the turnouts lie; nobody where it may go on as
-    /// far as anybody looks.
+    /// The trains that have reserved the track just beyond a train's end of authority, as the turnouts lie; none where it has
+    /// no end within the horizon.
     #[must_use]
     pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
         let found = || {

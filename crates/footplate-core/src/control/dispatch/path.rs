@@ -1,4 +1,4 @@
-//! A way over the rails in one direction: edges one after the other, and points on it by their distance from its start.
+//! A path over the rails in one direction: consecutive edges, and points by their distance from its start.
 
 use alloc::vec::Vec;
 
@@ -9,26 +9,26 @@ use crate::units::Length;
 use super::occupied_path::OccupiedPath;
 use super::reservation::Reservation;
 
-/// No way leads over more edges: some rounds of any layout in use.
+/// The most edges of a path: several laps of any layout in use.
 const MOST_EDGES: usize = 1_000;
 
 /// Edges in the order of travel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Path {
-    /// Each with where it begins.
+    /// Each with the distance at which it begins.
     edges: Vec<(EdgeId, Length)>,
     length: Length,
 }
 
 impl Path {
-    /// Goes on over an edge.
+    /// Appends an edge.
     pub(super) fn push(&mut self, layout: &Layout, id: EdgeId) {
         let Some(edge) = layout.edge(id) else { return };
         self.edges.push((id, self.length));
         self.length += edge.length;
     }
 
-    /// Forgets what comes after the last time an edge does.
+    /// Drops everything after the last occurrence of an edge.
     pub(super) fn cut_after(&mut self, edge: EdgeId) {
         while self.edges.len() > 1 && self.edges.last().is_some_and(|(last, _)| *last != edge) {
             if let Some((_, begins)) = self.edges.pop() {
@@ -45,8 +45,8 @@ impl Path {
         self.edges.iter().map(|(id, _)| *id)
     }
 
-    /// The track behind and before a place, as the turnouts lie where the train did not come from there; shorter where the
-    /// track ends. Gives where the place is.
+    /// The track behind and ahead of a place: behind it as the train came, and otherwise as the turnouts lie; shorter where
+    /// the track ends. Returns the path and the distance of the place on it.
     pub(super) fn around(
         layout: &Layout,
         turnouts: &TurnoutStates,
@@ -74,8 +74,8 @@ impl Path {
         (path, at)
     }
 
-    /// Goes on as the turnouts lie until it is so long, or the track ends. Where nobody knows how a turnout lies it is
-    /// taken to lie straight.
+    /// Extends the path as the turnouts lie, to a length or the end of the track. Turnouts of unknown position count as
+    /// straight.
     pub(super) fn reach(&mut self, layout: &Layout, turnouts: &TurnoutStates, length: Length) {
         while self.length <= length && self.edges.len() < MOST_EDGES {
             let Some(next) = self.edges.last().and_then(|(last, _)| next_edge(layout, turnouts, *last))
@@ -86,14 +86,14 @@ impl Path {
         }
     }
 
-    /// Where a place is on the way, the first time from a point on; a centimetre before still counts.
+    /// The distance of a place, the first one from a point on; a centimetre before still counts.
     pub(super) fn find(&self, place: Position, from: Length) -> Option<Length> {
         let slack = Length::from_mm(10.0);
         let at = |(id, begins): &(EdgeId, Length)| (*id == place.edge).then_some(*begins + place.offset);
         self.edges.iter().filter_map(at).find(|at| *at >= from - slack)
     }
 
-    /// Where a node is on the way, the first time from a point on.
+    /// The distance of a node, the first one from a point on.
     pub(super) fn find_node(&self, layout: &Layout, node: NodeId, from: Length) -> Option<Length> {
         let at = |(id, begins): &(EdgeId, Length)| {
             let edge = layout.edge(*id)?;
@@ -105,7 +105,7 @@ impl Path {
         self.edges.iter().filter_map(at).find(|at| *at >= from)
     }
 
-    /// The place of a point.
+    /// The place at a distance.
     pub(super) fn place(&self, at: Length) -> Option<Position> {
         let found = self.edges.iter().rev().find(|(_, begins)| *begins <= at).or(self.edges.first())?;
         Some(Position { edge: found.0, offset: (at - found.1).max(Length::ZERO) })
@@ -125,7 +125,7 @@ impl Path {
         })
     }
 
-    /// What an interval of the way takes.
+    /// The reservation for an interval of the path.
     pub(super) fn reservation(&self, layout: &Layout, from: Length, to: Length) -> Reservation {
         let mut taken = Reservation::empty();
         for (id, [from, to]) in self.within(layout, from, to) {
@@ -134,7 +134,7 @@ impl Path {
         taken
     }
 
-    /// How turnouts lie best whose toes are passed from a leg on an interval of the way.
+    /// The turnouts trailed on an interval of the path, with the legs that they are trailed from.
     pub(super) fn trailed(
         &self,
         layout: &Layout,
@@ -147,7 +147,7 @@ impl Path {
         })
     }
 
-    /// How turnouts have to lie of which an interval of the way passes the toe, each once, in order.
+    /// The turnouts whose toes an interval of the path passes, with the legs that they need, each once, in order.
     pub(super) fn needs(&self, layout: &Layout, from: Length, to: Length) -> Vec<TurnoutNeed> {
         let mut needs: Vec<TurnoutNeed> = Vec::new();
         for (id, [from, to]) in self.within(layout, from, to) {
@@ -163,12 +163,12 @@ impl Path {
     }
 }
 
-/// The edge after an edge as the turnouts lie.
+/// The edge that follows an edge as the turnouts lie.
 fn next_edge(layout: &Layout, turnouts: &TurnoutStates, edge: EdgeId) -> Option<EdgeId> {
     edge_from(layout, turnouts, layout.edge(edge)?.to)
 }
 
-/// The edge ahead of a node as the turnouts lie, straight on where nobody knows.
+/// The edge ahead of a node as the turnouts lie; straight on over those of unknown position.
 pub(super) fn edge_from(layout: &Layout, turnouts: &TurnoutStates, node: NodeId) -> Option<EdgeId> {
     let node = layout.node(node)?;
     match (node.ways, node.kind) {

@@ -1,4 +1,4 @@
-//! Setting turnouts for a run, so surely that one that fails now and then does not matter.
+//! Route setting: each turnout of a run is commanded twice, so that one that fails now and then does not matter.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -14,11 +14,11 @@ use super::dispatcher::Dispatcher;
 use super::path::edge_from;
 use super::turnout_command::{SURE, TurnoutCommand};
 
-/// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
+/// From the command until the points have moved: solenoids take 0.1 to 0.3 s.
 const MOVES: TimeSpan = TimeSpan::from_ms(350);
-/// A line that works tells a turnout within this: two polls, and the solenoids of a dozen others before it.
+/// A command to a turnout leaves within this: two polls, and the solenoids of a dozen others before it.
 const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
-/// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
+/// The authority is withdrawn when a turnout cannot be thrown for this long: a train is nearer to it than was estimated.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
 /// A turnout whose unknown position leaves open where the train before it, or on it, is.
@@ -30,7 +30,7 @@ pub(super) struct UnknownTurnout {
 }
 
 impl Dispatcher {
-    /// Throws what the present run of a train needs; whether all of it lies right by now.
+    /// Throws the turnouts of the present run of a train. Returns whether all of them lie right by now.
     pub(super) fn set(&mut self, now: Timestamp, id: TrainId) -> bool {
         let Some(train) = self.trains.get(&id) else { return false };
         let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
@@ -63,7 +63,7 @@ impl Dispatcher {
             return false;
         }
         for need in missing {
-            // Points that are still moving might be left half way by a second word that fails.
+            // A second command that fails could leave moving points halfway.
             let moves =
                 |commanded: &TurnoutCommand| commanded.leg == need.leg && now - commanded.last < MOVES;
             if self.is_being_thrown(now, need.turnout) || self.commanded.get(&need.turnout).is_some_and(moves)
@@ -80,7 +80,7 @@ impl Dispatcher {
                 Ok(_) => {
                     self.throwing.insert(need.turnout, (id, now));
                 }
-                // It stands on the points, and they give way to it.
+                // The train is on the points and trails them.
                 Err(_) if !need.facing && held_down.contains(&need.turnout) => {
                     if let Some(train) = self.trains.get_mut(&id) {
                         train.skipped.insert(need.turnout);
@@ -96,8 +96,8 @@ impl Dispatcher {
         false
     }
 
-    /// Takes back what was granted to a train that stands too near to a turnout of its run: no waiting helps, but another
-    /// way may. Not while a turnout is on its way to being thrown, which nobody would hold.
+    /// Withdraws the authority of a train that is too near to a turnout of its run: waiting does not help, another path may.
+    /// Not while a command to a turnout is under way, which no train would have reserved then.
     fn is_in_its_own_way(
         &mut self,
         now: Timestamp,
@@ -116,13 +116,12 @@ impl Dispatcher {
         true
     }
 
-    /// Whether a turnout was asked for and may still be told. What got lost on the line is asked for again.
+    /// Whether a command to a turnout may still be under way. One that was lost on the line is given again.
     pub(super) fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
         self.throwing.get(&turnout).is_some_and(|(_, since)| now - *since < TOLD_WITHIN)
     }
 
-    /// Whether a train comes from a leg to points that have to give way to it: it stands on them, or on those in the same
-    /// place.
+    /// Whether a train trails points that cannot be thrown, as it is on them, or on those in the same place.
     fn gives_way(
         &self,
         now: Timestamp,
@@ -141,7 +140,7 @@ impl Dispatcher {
         train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_held_down(partner.turnout))
     }
 
-    /// How the turnout in the same place has to lie.
+    /// The need of the turnout in the same place.
     fn partner(&self, need: &TurnoutNeed) -> Option<TurnoutNeed> {
         let turnout = self
             .watchdog
@@ -215,7 +214,7 @@ impl Dispatcher {
         None
     }
 
-    /// A turnout has been told how to lie.
+    /// A command to a turnout has left.
     pub(super) fn turnout_told(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
         let asked_for = self.throwing.remove(&turnout);
         if let Some((id, _)) =

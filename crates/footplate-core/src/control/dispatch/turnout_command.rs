@@ -3,8 +3,8 @@
 use crate::time::Timestamp;
 use crate::track::Leg;
 
-/// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
-/// hang together; those that do show when a train takes the other leg.
+/// How many times a turnout is commanded. One that fails once in 300 fails twice in a row once in 90 000, if its failures are
+/// independent; others show when a train takes the other leg.
 pub(super) const SURE: u8 = 2;
 
 /// How a turnout was set.

@@ -13,19 +13,15 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
-use super::trials::{SpeedTrial, Steps};
+use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
-/// A ratio no further from 1 than this is none: what a run differs from the next, three times.
-const SAME: f64 = 0.02;
-/// See [`SAME`]: in standard deviations.
-const SAME_DEVIATIONS: f64 = 3.0;
 /// Ratios that are further apart than this are not of one train that has changed, but of two.
 const ANOTHER: f64 = 1.10;
 /// A stop this many standard deviations from its forecast is not of the same train either.
 const ANOTHER_STOP: f64 = 2.5;
-/// How far before a contact the checked stop ends, and is crawled up to.
+/// How far before a sensor the checked stop ends.
 const SHORT_OF: Length = Length::from_mm(120.0);
 /// Hops ahead among which one is looked for that is long enough for that.
 const HOPS_TO_STOP: usize = 8;
@@ -36,8 +32,6 @@ impl Watchdog {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
-        let is_same =
-            |one: &MeasuredRatio| libm::log(one.ratio).abs() <= SAME.max(SAME_DEVIATIONS * one.deviation);
         let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
         // Only who is said to drift has to show all of its speeds before that is taken back.
         let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));
@@ -90,7 +84,7 @@ impl Watchdog {
         self.measure(now, train);
     }
 
-    /// A stop that ends shortly before a contact.
+    /// Stops the train shortly before a sensor.
     pub(super) fn stop_short(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get(&train) else { return };
         let step = recovery.steps.middle;
@@ -109,7 +103,7 @@ impl Watchdog {
         }
     }
 
-    /// A place shortly before a contact, behind the second one from here on.
+    /// A place shortly before a sensor, beyond the second one ahead.
     fn target_short_of_contact(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
         let context = self.driver.context();
         let from = self.driver.locate(train, now)?.at.node;

@@ -9,7 +9,7 @@ use crate::model::{MeasuredRatio, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
-/// A train that nobody is sure of runs no faster than this to be found, ...
+/// A train that is being located runs no faster than this, ...
 const CRAWL_UP_TO: Speed = Speed::from_mm_per_s(150.0);
 /// ... and no slower, or it may not start at all.
 const CRAWL_FROM: Speed = Speed::from_mm_per_s(80.0);
@@ -21,12 +21,21 @@ const HIGH: Speed = Speed::from_mm_per_s(430.0);
 const HOPS: u8 = 3;
 /// ... or as few as two, if they are this long.
 const LONG_ENOUGH: Length = Length::from_mm(1_200.0);
-/// One run differs from the next by so much, as a part.
+/// A ratio this close to 1 is no change: three standard deviations from run to run.
+const SAME: f64 = 0.02;
+/// See [`SAME`]: in standard deviations of the measurement.
+const SAME_DEVIATIONS: f64 = 3.0;
+/// The standard deviation of speeds from run to run, as a part.
 const RUN_DEVIATION: f64 = 0.006;
 /// Changes of speed take a little longer than the model of another train says.
 const SETTLES_PART: f64 = 1.3;
 /// See [`SETTLES_PART`].
 const SETTLES_MORE: TimeSpan = TimeSpan::from_ms(400);
+
+/// Whether a measured speed is that of the model.
+pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
+    libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
+}
 
 /// The steps that a recovery uses.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +64,7 @@ impl Steps {
     }
 }
 
-/// A speed being measured: from contact to contact, once it has settled.
+/// A measurement of a speed: from sensor to sensor, once it has settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpeedTrial {
     pub(super) step: SpeedStep,
@@ -79,7 +88,7 @@ impl SpeedTrial {
         self.settled = Some(at + settles + SETTLES_MORE);
     }
 
-    /// Where the train passed a contact, and how far that is from the one before.
+    /// A passage of a sensor, with the distance from the one before.
     pub(super) fn pass(&mut self, node: NodeId, window: ContactWindow, hop: Option<Length>) {
         if self.settled.is_none_or(|settled| window.after < settled) {
             return;
@@ -99,7 +108,7 @@ impl SpeedTrial {
         self.last = Some((node, window));
     }
 
-    /// The contact from which the next hop counts.
+    /// The sensor from which the next hop counts.
     pub(super) fn last(&self) -> Option<NodeId> {
         self.last.map(|(node, _)| node)
     }
