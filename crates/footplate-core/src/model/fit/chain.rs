@@ -39,6 +39,9 @@ pub(super) struct Chain {
     last_sensor: Option<SensorId>,
     /// Whether the next trip begins where the last one ended.
     unbroken: bool,
+    /// Whether the train has moved as commanded since it was last at rest.
+    #[cfg_attr(feature = "serde", serde(default))]
+    moves_as_commanded: bool,
 }
 
 impl Chain {
@@ -59,6 +62,12 @@ impl Chain {
 
     /// Breaks the chain: the train's position no longer follows from its earlier positions.
     pub(super) fn interrupt(&mut self) {
+        self.lose_place();
+        self.moves_as_commanded = false;
+    }
+
+    /// The position no longer follows from earlier positions; the train moves as commanded all the same.
+    pub(super) fn lose_place(&mut self) {
         self.unbroken = false;
         self.at = None;
         self.last_sensor = None;
@@ -80,6 +89,7 @@ impl Chain {
             }
             let continues = self.unbroken && self.trips.last().is_some();
             self.trips.push(Trip::new(sent, None, continues));
+            self.moves_as_commanded = true;
             self.unbroken = true;
         } else if !self.unbroken {
             self.trips.push(Trip::new(sent, Some((from, self.above)), false));
@@ -115,8 +125,13 @@ impl Chain {
             .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
         let begins_anew = !self.unbroken || (self.at.is_some() && way.is_none());
         if begins_anew {
-            // The train is running and its earlier path is unknown: distances count from here.
-            self.trips.push(Trip::new(time, Some((self.step, self.above)), false));
+            // The earlier path is unknown: distances count from here. A train that has moved as commanded since it was at rest
+            // may still be accelerating; any other counts as running steadily.
+            let trip = match self.trips.last().filter(|_| self.moves_as_commanded) {
+                Some(moving) => moving.from_another_place(),
+                None => Trip::new(time, Some((self.step, self.above)), false),
+            };
+            self.trips.push(trip);
             self.unbroken = true;
         }
         if let (Some([hop]), [.., stopped, trip]) = (way.as_ref().map(Reach::hops), self.trips.as_mut_slice())

@@ -161,6 +161,12 @@ impl MotionFit {
         self.chain.interrupt();
     }
 
+    /// The position of the train no longer follows from earlier ones, but it moves as commanded: a train whose place was unknown
+    /// was located.
+    pub fn lose_place(&mut self) {
+        self.chain.lose_place();
+    }
+
     /// Records whether a step moved the train.
     pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
         self.model.note_use(step, found);

@@ -117,6 +117,15 @@ impl Trip {
         }
     }
 
+    /// The same motion from an unknown place, with no sensor passed yet.
+    pub(super) fn from_another_place(&self) -> Self {
+        Self {
+            commanded: self.commanded.clone(),
+            pieces: self.pieces.clone(),
+            ..Self::new(self.begins, self.running, false)
+        }
+    }
+
     pub(super) fn command(&mut self, commanded: SpeedCommand) {
         self.commanded.push(commanded);
         if self.commanded.len() > 1 {

@@ -56,8 +56,10 @@ impl Learning {
 
     /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
     pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedContact) {
-        if passed.late.is_none() {
-            self.interrupt(train);
+        if passed.late.is_none()
+            && let Some(fit) = self.fits.get_mut(&train)
+        {
+            fit.lose_place();
         }
         if self.changes.get(&train).is_some_and(|changes| *changes > MAX_STEP_CHANGES) {
             return;
