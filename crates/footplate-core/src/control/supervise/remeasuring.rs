@@ -30,17 +30,14 @@ const SHORT_OF: Length = Length::from_mm(120.0);
 /// Hops ahead among which one is looked for that is long enough for that.
 const HOPS_TO_STOP: usize = 8;
 
-/// Whether a speed is the one of before.
-pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
-    libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
-}
-
 impl Watchdog {
     /// Begins with the next speed, or decides what the train is.
     pub(super) fn measure(&mut self, now: Timestamp, train: TrainId) {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
+        let is_same =
+            |one: &MeasuredRatio| libm::log(one.ratio).abs() <= SAME.max(SAME_DEVIATIONS * one.deviation);
         let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
         // Only who is said to drift has to show all of its speeds before that is taken back.
         let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));
