@@ -6,6 +6,7 @@
 //! driving  pacing  zones      trains driven to places, at speeds, to times
 //! traffic  disasters          several trains; faults
 //! survey                      lengths estimated from runs
+//! line                        odometers of full-size trains
 //! testbed                     calibrated trains in a simulated world: the start of every score
 //! seeds                       seeds and random tasks
 //! figures  written_scores     statistics and their output
@@ -14,8 +15,8 @@
 pub mod disasters;
 pub mod driving;
 pub mod figures;
+pub mod line;
 pub mod pacing;
-
 pub mod seeds;
 pub mod survey;
 pub mod testbed;

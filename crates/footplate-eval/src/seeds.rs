@@ -9,6 +9,17 @@ use anyhow::{anyhow, bail};
 const MAX_SEEDS: u64 = 100_000;
 /// The prefix of a number of seeds that a commit draws.
 pub const FRESH: &str = "fresh:";
+
+const OF_FRESH_SEEDS: &str =
+    "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
+const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
+
+/// Says on a page who chose its seeds.
+#[must_use]
+pub const fn seeds_sentence(are_fresh: bool) -> &'static str {
+    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
+}
+
 /// Digits of a commit's hash that determine its seeds.
 const HASH_DIGITS: usize = 12;
 /// The suffix of a hash if files differ from the commit.

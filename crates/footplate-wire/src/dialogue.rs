@@ -1,12 +1,14 @@
-//! What all sessions share that speak with a station which confirms what it is commanded.
+//! The state that every session with a confirming station shares.
 //!
-//! Commands wait in a queue in which stops go first. At most one request for a train is without an answer; it is repeated until the
-//! station confirms it. A session adds its codec, what it asks for while the line opens, and what the station's messages mean.
+//! Commands wait in a queue that sends stops first. Each train has at most one request without an answer, which is repeated until
+//! the station confirms it. A session adds its codec, its questions while the line opens, and the meaning of the station's messages.
 
-use alloc::collections::VecDeque;
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
-use footplate_core::{Command, Event, EventKind, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use crate::farewell::Farewell;
 use crate::locomotives::{Locomotive, Locomotives};
@@ -26,26 +28,28 @@ pub(crate) struct Dialogue<A: Awaited> {
     pub(crate) waiting: Queue,
     pub(crate) outstanding: AllOutstanding<A>,
     pub(crate) locomotives: Locomotives,
-    /// How turnouts lie, by the station's own messages.
-    turnouts: Vec<(TurnoutId, bool)>,
-    /// Whether the track is meant to have power, and whether the station has said that it has.
+    /// Whether each turnout is set to its curved leg, as the station reported.
+    turnouts: BTreeMap<TurnoutId, bool>,
+    /// Whether the track should have power, and whether the station reported that it has.
     pub(crate) power: bool,
     pub(crate) is_powered: bool,
-    /// When the last message came.
+    /// How much longer than usual for this station the line may delay a report.
+    pub(crate) excess: TimeSpan,
+    /// When the last message arrived.
     pub(crate) heard: Timestamp,
-    /// The time of the last entry of the recording: entries stay in order.
+    /// Time of the last entry in the recording; entries stay in order.
     pub(crate) last_entry: Timestamp,
     pub(crate) farewell: Farewell,
-    /// Whether all locomotives are to be stopped next, those that cannot be commanded yet among them.
+    /// Whether to stop all locomotives next, including those that cannot be commanded yet.
     stops_all: bool,
     pub(crate) output: VecDeque<Transmit>,
 }
 
-/// What becomes of a request that was not answered in time.
+/// What to do with a request whose answer is overdue.
 pub(crate) enum Repeat<A: Awaited> {
-    /// It is written again.
+    /// Write it again.
     Again(Outgoing<A>),
-    /// It was written often enough.
+    /// Give it up: it was written often enough.
     GivenUp(Outstanding<A>),
 }
 
@@ -59,9 +63,10 @@ impl<A: Awaited> Dialogue<A> {
             waiting: Queue::default(),
             outstanding: AllOutstanding::new(),
             locomotives: Locomotives::default(),
-            turnouts: Vec::new(),
+            turnouts: BTreeMap::new(),
             power: true,
             is_powered: false,
+            excess: TimeSpan::ZERO,
             heard: now,
             last_entry: now,
             farewell: Farewell::default(),
@@ -70,14 +75,14 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
-    /// The clock has gone on; returns whether the station has just been found silent.
+    /// Advances the clock; returns whether the station has just become silent.
     pub(crate) fn watch(&mut self, now: Timestamp) -> bool {
         self.now = now;
         let notice = self.silence.watch(now);
         notice.into_iter().map(|notice| self.notify(notice)).count() > 0
     }
 
-    /// The line was opened again.
+    /// Resets what was on the line after it was opened again.
     pub(crate) fn reopened(&mut self) {
         self.silence = Silence::new(self.checks);
         self.outstanding.clear();
@@ -96,17 +101,23 @@ impl<A: Awaited> Dialogue<A> {
         self.output.push_back(Transmit::Event(Event { time, kind }));
     }
 
+    /// A sensor became occupied within a span that ends at `latest`.
+    pub(crate) fn report(&mut self, sensor: SensorId, latest: Timestamp, width: TimeSpan) {
+        let poll_interval = Some(width + self.excess);
+        self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval }));
+    }
+
     pub(crate) fn write(&mut self, bytes: Vec<u8>) {
         self.output.push_back(Transmit::Message(bytes));
     }
 
-    /// A message has come; returns whether the station was silent before.
+    /// Notes that a message arrived; returns whether the station was silent before.
     pub(crate) fn hear(&mut self, now: Timestamp) -> bool {
         self.heard = now;
         self.silence.heard()
     }
 
-    /// Bytes have come that are no message.
+    /// Counts bytes that form no message.
     pub(crate) fn hear_noise(&mut self, bytes: usize) {
         if bytes > 0
             && let Some(notice) = self.silence.heard_noise(bytes)
@@ -122,12 +133,12 @@ impl<A: Awaited> Dialogue<A> {
         !self.farewell.is_over() && now >= self.pacing.urgent_at()
     }
 
-    /// Whether all locomotives are to be stopped next; true once.
+    /// Whether to stop all locomotives now; true once.
     pub(crate) fn take_stop_of_all(&mut self) -> bool {
         core::mem::take(&mut self.stops_all)
     }
 
-    /// The next command that stops something. With `directed`, a train has to have a known direction: a stop would turn it otherwise.
+    /// Returns the next command that stops something. With `directed`, a stop needs a known direction, because it would set one.
     pub(crate) fn next_stop(&mut self, now: Timestamp, directed: bool) -> Option<Command> {
         let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
         self.waiting.next_urgent(|command| {
@@ -138,7 +149,7 @@ impl<A: Awaited> Dialogue<A> {
         })
     }
 
-    /// A request that was not answered in time, unless a newer command for the same waits.
+    /// Returns a request whose answer is overdue, unless a newer command replaces it.
     pub(crate) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Repeat<A>> {
         loop {
             let due = self.outstanding.take_due(now, only_urgent)?;
@@ -160,7 +171,7 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
-    /// At the end, a train to be stopped whose direction is unknown and was not asked for.
+    /// Returns, at the end, a train to stop whose direction is unknown and not asked for yet.
     pub(crate) fn undirected_at_end(&self) -> Option<TrainId> {
         let is_unasked = |train: &TrainId| {
             !self.locomotives.has_direction(*train) && self.outstanding.blocks(*train, false).is_none()
@@ -169,18 +180,18 @@ impl<A: Awaited> Dialogue<A> {
         self.locomotives.driven(false).into_iter().filter(|_| waits).find(is_unasked)
     }
 
-    /// Whether the power has to be switched off now; true once.
+    /// Whether to switch the power off now; true once.
     pub(crate) fn switch_off_is_due(&mut self, now: Timestamp) -> bool {
         self.farewell.switch_off_is_due(now, &self.locomotives)
     }
 
-    /// A train with a waiting command whose direction has to be asked for first.
+    /// Returns a train with a waiting command whose direction must be asked for first.
     pub(crate) fn undirected(&self, is_asked: impl Fn(TrainId) -> bool) -> Option<TrainId> {
         let asks = |train: &TrainId| !self.locomotives.has_direction(*train) && !is_asked(*train);
         self.waiting.iter().filter_map(train_of).find(asks)
     }
 
-    /// The next command of those that can wait; `may_throw`: whether a turnout may be thrown now.
+    /// Returns the next command that is not urgent; `may_throw`: whether a turnout may be thrown now.
     pub(crate) fn next_command(&mut self, may_throw: bool) -> Option<Command> {
         let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
         self.waiting.next_usual(|command| match command {
@@ -193,7 +204,7 @@ impl<A: Awaited> Dialogue<A> {
         })
     }
 
-    /// A train is commanded to run at a step, reversed or not; returns whether it runs forward then.
+    /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
     pub(crate) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
         self.locomotives.know(train);
         let Some(locomotive) = self.locomotives.get_mut(train) else { return true };
@@ -204,7 +215,7 @@ impl<A: Awaited> Dialogue<A> {
         locomotive.forward.unwrap_or(true)
     }
 
-    /// A request has been written; enters its command in the recording and returns the entry.
+    /// Notes that a request was written; adds its command to the recording and returns the entry.
     pub(crate) fn sent(&mut self, now: Timestamp, outgoing: Outgoing<A>) -> Option<EventKind> {
         let Outgoing { request, awaited, command, tries } = outgoing;
         self.pacing.sent(now);
@@ -225,7 +236,7 @@ impl<A: Awaited> Dialogue<A> {
         self.waiting.push(command).map_err(CommandError::TooManyWaiting)
     }
 
-    /// When to go on: `usual`, the next question of the session itself, `release`, a coil to be switched off, and `asks`, whether more
+    /// Returns when to continue. `usual`: the session's next question; `release`: when to switch a coil off; `asks`: whether more
     /// questions wait.
     pub(crate) fn next_timeout(
         &self,
@@ -257,7 +268,7 @@ impl<A: Awaited> Dialogue<A> {
 
     // What the station says.
 
-    /// The locomotive of a train that was ever commanded or is about to be.
+    /// Returns the locomotive of a train that was commanded or is about to be.
     pub(crate) fn locomotive(&mut self, train: TrainId) -> Option<&mut Locomotive> {
         if self.waiting.iter().any(|command| train_of(command) == Some(train)) {
             self.locomotives.know(train);
@@ -265,32 +276,28 @@ impl<A: Awaited> Dialogue<A> {
         self.locomotives.get_mut(train)
     }
 
-    /// The trains whose direction the station has said.
+    /// Returns the trains whose direction is known.
     pub(crate) fn directed(&self) -> Vec<TrainId> {
         let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
         known.map(|locomotive| locomotive.train).collect()
     }
 
-    /// The station says how a turnout lies; returns how it was said to lie before.
+    /// Notes a turnout's position from the station; returns the position before.
     pub(crate) fn hear_of_turnout(&mut self, turnout: TurnoutId, curved: bool) -> Option<bool> {
-        if let Some((_, lies)) = self.turnouts.iter_mut().find(|(known, _)| *known == turnout) {
-            return Some(core::mem::replace(lies, curved));
-        }
-        self.turnouts.push((turnout, curved));
-        None
+        self.turnouts.insert(turnout, curved)
     }
 
-    /// Whether a turnout is known to lie so.
+    /// Whether a turnout is known to be in this position.
     pub(crate) fn lies(&self, turnout: TurnoutId, curved: bool) -> bool {
-        self.turnouts.contains(&(turnout, curved))
+        self.turnouts.get(&turnout) == Some(&curved)
     }
 
-    /// Whether power that is off was meant to be on; `request`: what this program awaits when it has just switched it itself.
+    /// Whether the track lost its power unexpectedly; `request`: what this program awaits after switching it itself.
     pub(crate) fn is_power_lost(&self, on: bool, request: &A) -> bool {
         self.is_powered && !on && self.power && !self.outstanding.has(request)
     }
 
-    /// The station says whether the track has power.
+    /// Notes whether the track has power, as the station reports.
     pub(crate) fn hear_power(&mut self, on: bool, is_lost: bool) {
         if is_lost {
             self.notify(LinkNotice::PowerLost);
@@ -301,7 +308,7 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
-    /// The station has forgotten everything: trains have stopped, and their directions are written again.
+    /// Handles a station that was reset: trains have stopped, and their directions are written again.
     pub(crate) fn restarted(&mut self) {
         self.notify(LinkNotice::Restarted);
         self.outstanding.clear();
@@ -324,17 +331,17 @@ impl<A: Awaited> Dialogue<A> {
         let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// Stops a train again that was found running while the session ends.
+    /// Stops a train again if the session is ending.
     pub(crate) fn stop_at_end(&mut self, train: TrainId) {
         if self.farewell.has_begun() {
             self.stop(train);
         }
     }
 
-    /// Begins the end, once: every train that ever had a speed is stopped, then the power goes off.
+    /// Begins the end, once: stops every train that was driven, then switches the power off.
     ///
-    /// Stops that wait are kept. With `directed`, a train that was never driven here, such as one that an earlier session left running,
-    /// cannot be commanded before the station has said how it faces: it is stopped together with all others first.
+    /// Waiting stops are kept. With `directed`, a train of unknown direction, such as one that an earlier session left running, cannot be
+    /// commanded yet; it is stopped together with all others first.
     pub(crate) fn close(&mut self, now: Timestamp, directed: bool) -> bool {
         let begins = !self.farewell.has_begun();
         if begins {
@@ -350,13 +357,13 @@ impl<A: Awaited> Dialogue<A> {
         begins
     }
 
-    /// Stops every train that ever had a speed.
+    /// Stops every train that was driven.
     fn stop_driven(&mut self) {
         self.locomotives.stop_driven(&mut self.waiting);
         self.farewell.begin_again(self.now);
     }
 
-    /// How far the end has come.
+    /// Returns how far the end has come.
     pub(crate) fn closing(&self) -> Closing {
         self.farewell.statement(&self.locomotives)
     }

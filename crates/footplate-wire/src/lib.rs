@@ -1,7 +1,7 @@
-//! Bytes to reports, commands to bytes: one folder a command station, no sockets.
+//! Command station protocols: bytes to reports, commands to bytes; one folder for each station, no sockets.
 //!
-//! - A codec knows bytes and what they mean. A [`Session`] knows who asked what and when, and when to ask again. Over
-//!   which cable, is decided above.
+//! - A codec knows bytes and their meaning. A [`Session`] knows which requests are outstanding and when to repeat them. The caller
+//!   chooses the cable.
 #![no_std]
 
 extern crate alloc;

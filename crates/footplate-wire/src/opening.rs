@@ -1,8 +1,8 @@
-//! How far a station has been asked for all that has to be known before trains are driven.
+//! The opening: what is asked of a station before trains may run.
 
 use alloc::collections::VecDeque;
 
-/// Where the opening is.
+/// The state of the opening.
 #[derive(Debug, Clone)]
 pub(crate) enum Opening<Q> {
     /// These are still to be asked, each when the one before is answered.

@@ -5,7 +5,7 @@ use core::fmt::Debug;
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
-/// When a kind of station is asked again.
+/// When requests to a kind of station are repeated.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Repeats {
     /// A request without an answer is repeated after this time.
@@ -16,7 +16,7 @@ pub(crate) struct Repeats {
     pub(crate) stop_waits: TimeSpan,
     /// How often a request is written in all before it is given up.
     pub(crate) most_tries: u8,
-    /// How many repetitions of a command are usual on this link, so that nobody is told.
+    /// How many repetitions of a command are usual on this link and not reported.
     pub(crate) usual: u8,
 }
 
@@ -30,10 +30,10 @@ pub(crate) trait Awaited: Copy + Debug {
 
     fn is_answered_by(&self, reply: &Self::Reply) -> bool;
 
-    /// Whether another one awaits the answer to the same question: only the newer one counts.
+    /// Whether both await the answer to the same question, so that only the newer one counts.
     fn is_same(&self, other: &Self) -> bool;
 
-    /// The train whose next command has to wait for this answer.
+    /// The train whose next command must wait for this answer.
     fn train(&self) -> Option<TrainId>;
 
     /// The turnout that is not thrown again before this answer.
@@ -54,7 +54,7 @@ pub(crate) struct Outgoing<A: Awaited> {
     pub(crate) request: A::Request,
     pub(crate) awaited: Option<A>,
     pub(crate) command: Option<Command>,
-    /// The how manieth time it is written.
+    /// How often it was written, this time included.
     pub(crate) tries: u8,
 }
 
@@ -69,7 +69,7 @@ impl<A: Awaited> Outgoing<A> {
         Self { request, awaited: None, command: None, tries: 1 }
     }
 
-    /// What carries out a command.
+    /// A request that carries out a command.
     pub(crate) const fn commands(command: Command, request: A::Request, awaited: Option<A>) -> Self {
         Self { request, awaited, command: Some(command), tries: 1 }
     }
@@ -110,7 +110,7 @@ impl<A: Awaited> AllOutstanding<A> {
         Self(Vec::new())
     }
 
-    /// A request was written; it takes the place of an earlier one for the same.
+    /// Adds a request that was written; it replaces an earlier one for the same question.
     pub(crate) fn push(&mut self, outstanding: Outstanding<A>) {
         self.0.retain(|other| !other.awaited.is_same(&outstanding.awaited));
         self.0.push(outstanding);
@@ -135,19 +135,19 @@ impl<A: Awaited> AllOutstanding<A> {
         Some(self.0.remove(at))
     }
 
-    /// One of the parts of an answer has come: the rest is awaited anew.
+    /// Notes that a part of an answer arrived, and awaits the rest anew.
     pub(crate) fn goes_on(&mut self, awaited: A, now: Timestamp) {
         if let Some(found) = self.0.iter_mut().find(|outstanding| outstanding.awaited.is_same(&awaited)) {
             (found.awaited, found.sent) = (awaited, now);
         }
     }
 
-    /// Removes and returns a request that has to be repeated by now.
+    /// Removes and returns a request whose answer is overdue.
     pub(crate) fn take_due(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outstanding<A>> {
         self.take_first(|outstanding| now >= outstanding.due() && (!only_urgent || outstanding.is_urgent()))
     }
 
-    /// When the next has to be repeated, of those that stop something or of the rest.
+    /// Returns when the next request is overdue, of those that stop something or of the rest.
     pub(crate) fn due(&self, urgent: bool) -> Option<Timestamp> {
         self.0.iter().filter(|outstanding| outstanding.is_urgent() == urgent).map(Outstanding::due).min()
     }

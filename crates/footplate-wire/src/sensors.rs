@@ -1,4 +1,4 @@
-//! Which sensors are occupied, where the line loses and repeats no messages, and what a message about one of them means.
+//! Sensor states on a line that loses and repeats no messages.
 
 use alloc::vec::Vec;
 
@@ -9,17 +9,16 @@ pub(crate) struct Sensors(Vec<(u16, bool)>);
 /// What a message means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Change {
-    /// It has become occupied.
+    /// It became occupied.
     Occupied,
-    /// It is occupied, and was before it was first asked for.
+    /// It was occupied before it was first read.
     HeldFromStart,
-    /// Nothing new, or free.
+    /// No change, or free.
     None,
 }
 
 impl Sensors {
-    /// A sensor is occupied or free. `listing`: the states are being asked for, so that the first word about a sensor is no
-    /// change.
+    /// Notes a sensor's state. `listing`: all states are being read, so the first message about a sensor is no change.
     pub(crate) fn heard(&mut self, id: u16, active: bool, listing: bool) -> Change {
         let before = match self.0.binary_search_by_key(&id, |(id, _)| *id) {
             Ok(at) => self.0.get_mut(at).map(|(_, state)| core::mem::replace(state, active)),

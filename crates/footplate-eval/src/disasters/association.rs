@@ -77,7 +77,7 @@ pub(super) fn associations(
             associated.iter().find(|(sensor, from, to, _)| *sensor == pass.sensor && within(*from, *to));
         match (pass.cause, pass.train, found) {
             (Cause::Train, Some(train), Some((.., associated_train))) if *associated_train == train => {
-                counted.right += 1
+                counted.right += 1;
             }
             (Cause::Train, Some(_), Some(_)) => counted.wrong += 1,
             (Cause::Train, Some(_), None) => counted.rejected += 1,

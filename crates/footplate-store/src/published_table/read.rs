@@ -113,7 +113,7 @@ fn figure(
         None => PublishedQuantity::Speed,
         Some(column) => PublishedQuantity::Stop(row.read(
             column,
-            "command, gate, or nothing where the team does not say",
+            "command, gate, or empty if the team does not state it",
             counted,
         )?),
     };
@@ -126,7 +126,7 @@ fn figure(
         step: row.read(step, "a throttle step from 1", |text| {
             text.parse().ok().and_then(SpeedStep::new).filter(|step| *step > SpeedStep::STAND)
         })?,
-        approach: row.read(approach, "below, above, or nothing where the team does not say", |text| {
+        approach: row.read(approach, "below, above, or empty if the team does not state it", |text| {
             match text {
                 "below" => Some(Approach::Below),
                 "above" => Some(Approach::Above),

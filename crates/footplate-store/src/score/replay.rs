@@ -21,7 +21,7 @@ pub struct ReplayContext<'a> {
 pub enum ReplayError {
     /// Several trains run, and reports do not name the train.
     #[error(
-        "run {run}: trains {} run at once, and no report says which of them made it; record one train a run",
+        "run {run}: trains {} run at once, and reports do not name the train; record one train per run",
         listed(trains)
     )]
     ManyTrains {

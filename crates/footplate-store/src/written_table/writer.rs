@@ -20,7 +20,7 @@ pub enum TableForm {
 
 /// The extension of the file does not name a format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}: the name should end in .csv or .parquet, which says what is written")]
+#[error("{file}: the name should end in .csv or .parquet")]
 pub struct UnknownForm {
     file: String,
 }

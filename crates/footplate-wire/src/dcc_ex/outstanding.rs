@@ -1,4 +1,4 @@
-//! What answers the requests to the board, and when to repeat them.
+//! The answers to requests to the board, and when to repeat them.
 
 use footplate_core::{TimeSpan, TrainId, TurnoutId};
 
@@ -7,18 +7,18 @@ use super::request::{Request, Throttle};
 use super::time_model::ANSWER_LONGEST;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
-/// A request is repeated when it was not answered for so long: many times the longest answer (9.1 ms), as the project's own
+/// A request without an answer is repeated after this time: many times the longest answer (9.1 ms), as the project's own
 /// client library asks of clients.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Awaited {
     Identity,
     Slots,
-    /// How a train is driven, whatever that is.
+    /// The state of a train, whatever it is.
     Locomotive(TrainId),
-    /// That a train is driven so.
+    /// That a train has this state.
     Driven(TrainId, Throttle, bool),
     Power(bool),
     Turnout(TurnoutId, bool),

@@ -19,7 +19,7 @@ use crate::sensors::Sensors;
 use crate::session::{Closing, CommandError, Session, Transmit};
 use crate::silence::Checks;
 
-/// A sign of life is asked for when nothing has come for so long.
+/// The board is polled when no message has arrived for this time.
 const KEEP_ALIVE: TimeSpan = TimeSpan::from_ms(500);
 
 /// About 20 requests a second are safe (the project's own client library asks for the same). Three of the longest,
@@ -27,14 +27,14 @@ const KEEP_ALIVE: TimeSpan = TimeSpan::from_ms(500);
 /// 9.1 ms.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(50), 3, TimeSpan::from_ms(10));
 
-/// What a person should check.
+/// What the user should check.
 const CHECKS: Checks = Checks {
     nothing_heard: "check its power, the cable and the port",
     nothing_whole: "check the line's speed (115200 baud) and that the port belongs to a DCC-EX board",
     noise: "check the line's speed (115200 baud), the cable, and that no other program writes to the port",
 };
 
-/// The program's side of the line to a DCC-EX board.
+/// The client's session with a DCC-EX board.
 #[derive(Debug, Clone)]
 pub struct Client {
     settings: Settings,
@@ -42,9 +42,9 @@ pub struct Client {
     framing: Framing,
     opening: Opening,
     sensors: Sensors,
-    /// Locomotives whose state has to be asked for again.
+    /// Locomotives whose state must be read again.
     unverified: Vec<TrainId>,
-    /// Since when nothing was heard before the states were asked for again.
+    /// Since when the station was silent, until its states have been read again.
     blind_since: Option<Timestamp>,
 }
 
@@ -65,7 +65,7 @@ impl Client {
         client
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
         if self.dialogue.watch(now) {
             self.blind_since.get_or_insert(self.dialogue.heard);
@@ -79,7 +79,7 @@ impl Client {
         }
     }
 
-    /// What is to be written next, if anything may be written now.
+    /// Returns the next request, if one may be written now.
     fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         let is_closing = self.dialogue.farewell.has_begun();
         if !self.dialogue.may_write(now) || self.opening.awaits_banner() && !is_closing {
@@ -144,7 +144,7 @@ impl Client {
         (!lives).then_some(Outgoing::asks(Request::Slots, Awaited::Slots))
     }
 
-    /// The request of a command, and what was commanded by it.
+    /// Returns the request for a command, and notes what it commands.
     fn outgoing(&mut self, command: Command) -> Outgoing<Awaited> {
         let (request, awaited) = match command {
             Command::Speed { train, step } => self.drive(train, step, false),
@@ -219,6 +219,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

@@ -22,4 +22,4 @@ pub use request::{LAST_WILL, LOCOMOTIVES, SPEED_PER_STEP, TURNOUTS, speed_of};
 pub use session::Client;
 pub use settings::Settings;
 pub use slot::{SlotData, SlotUse};
-pub use time_model::{BUS_BYTE, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL};
+pub use time_model::{BUS_BYTE, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL, USUAL_LINE};

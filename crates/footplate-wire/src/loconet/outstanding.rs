@@ -1,4 +1,4 @@
-//! What answers the requests to the station, and when to repeat them.
+//! The answers to requests to the station, and when to repeat them.
 
 use footplate_core::{TimeSpan, TrainId, TurnoutId};
 
@@ -7,9 +7,9 @@ use super::request::Request;
 use super::slot::SlotData;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
-/// A request is repeated when it was not answered for so long: three messages with their reports take some 30 ms on an idle bus; a busy
+/// A request without an answer is repeated after this time: three messages with their reports take some 30 ms on an idle bus; a busy
 /// bus and a wireless network are given ten times that.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
 
 /// What the station or the server says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub(super) enum Awaited {
 }
 
 impl Awaited {
-    /// Whether the answer has to be known before trains are driven.
+    /// Whether trains may not run before the answer.
     pub(super) const fn is_question(&self) -> bool {
         matches!(self, Self::Status | Self::Power(_) | Self::Interrogation(_))
     }

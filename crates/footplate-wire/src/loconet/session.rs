@@ -25,7 +25,7 @@ use crate::silence::Checks;
 /// A request is up to three messages of some 5 ms on the bus, which has other users: 30 requests a second leave them half of it.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(33), 3, TimeSpan::from_ms(5));
 
-/// A state is asked for when nothing has come for so long.
+/// A slot is read when no message has arrived for this time.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(500);
 
 /// Between two questions for the states of detectors: each may be answered by many of them, at 2.4 ms a report.
@@ -37,14 +37,14 @@ const REFRESHED_EVERY: TimeSpan = TimeSpan::from_ms(60_000);
 /// How long an output of a turnout is powered (150 ms are usual).
 const PULSE: TimeSpan = TimeSpan::from_ms(150);
 
-/// What a person should check.
+/// What the user should check.
 const CHECKS: Checks = Checks {
     nothing_heard: "check that the LocoNet server (LbServer) is running, its address and port, and the power of the command station",
     nothing_whole: "check that the port belongs to a LocoNet-over-TCP server (usually port 1234)",
     noise: "check that the port belongs to a LocoNet-over-TCP server (usually port 1234)",
 };
 
-/// The program's side of the line to a LocoNet server.
+/// The client's session with a LocoNet server.
 #[derive(Debug, Clone)]
 pub struct Client {
     settings: Settings,
@@ -63,7 +63,7 @@ pub struct Client {
     /// Trains whose slots have to be read again.
     unverified: Vec<TrainId>,
     identity: Option<String>,
-    /// Since when nothing was heard before the states were asked for again.
+    /// Since when the station was silent, until its states have been read again.
     blind_since: Option<Timestamp>,
     /// Trains for which the station was said to have no slot.
     without_slot: Vec<TrainId>,
@@ -103,7 +103,7 @@ impl Client {
         &self.settings
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
         if self.dialogue.watch(now) {
             self.blind_since.get_or_insert(self.dialogue.heard);
@@ -129,7 +129,7 @@ impl Client {
         if self.dialogue.farewell.has_begun() { SENT_WITHIN_AT_END } else { SENT_WITHIN }
     }
 
-    /// What is to be written next, if anything may be written now.
+    /// Returns the next request, if one may be written now.
     fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         if !self.dialogue.may_write(now) || !self.outbox.is_empty() {
             return None;
@@ -239,7 +239,7 @@ impl Client {
         }
     }
 
-    /// The request of a command, and what was commanded by it.
+    /// Returns the request for a command, and notes what it commands.
     fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
         let (request, awaited) = match command {
             Command::Speed { train, step } => {
@@ -298,7 +298,7 @@ impl Client {
         self.dialogue.notify(LinkNotice::Answers);
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
         self.opening = Opening::asking(questions(self.dialogue.power));
         self.unverified = self.dialogue.directed();
@@ -353,6 +353,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

@@ -1,4 +1,4 @@
-//! What answers the requests to the station, and when to repeat them.
+//! The answers to requests to the station, and when to repeat them.
 
 use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
 
@@ -8,7 +8,7 @@ use super::uid::Uid;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
 /// Stations answer within some milliseconds; 250 to 500 ms are advised.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// A train at 500 mm/s runs 50 mm in this time, and a stop that comes twice does no harm.
 const STOP_REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
@@ -41,7 +41,7 @@ pub(super) enum Awaited {
 }
 
 impl Awaited {
-    /// Whether the answer has to be known before trains are driven.
+    /// Whether trains may not run before the answer.
     pub(super) const fn is_question(&self) -> bool {
         matches!(self, Self::Participant | Self::Modules | Self::Power(_) | Self::Roster { .. })
     }
@@ -113,7 +113,7 @@ impl AwaitedAnswer for Awaited {
 
     fn most_tries(&self) -> u8 {
         match self {
-            // A list that was damaged on its way comes whole another time.
+            // A damaged list arrives whole another time.
             Self::Roster { has_begun: true } => LIST_TRIES,
             _ => Self::REPEATS.most_tries,
         }

@@ -25,17 +25,17 @@ use crate::pacing::Pacing;
 use crate::session::{Closing, CommandError, Session, Transmit};
 use crate::silence::Checks;
 
-/// A frame needs half a millisecond on the bus, and quick datagrams are lost now and then: 100 a second, four at once, and what stops
-/// something 2 ms after the frame before.
+/// A frame takes half a millisecond on the bus, and datagrams in quick succession get lost: 100 a second, four at once, and a stop
+/// 2 ms after the frame before it.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(10), 4, TimeSpan::from_ms(2));
 
-/// How often all contacts are asked for: what changed in a report that was lost is known after that. It is a sign of life, too.
+/// The interval between polls of all contacts, which find changes whose reports were lost and show that the station is alive.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(1_000);
 
-/// The rest of a frame comes within this time: it is on its way already.
+/// The rest of a frame arrives within this time.
 const FRAME_WITHIN: TimeSpan = TimeSpan::from_ms(200);
 
-/// What an adapter is written before anything else: end what a line may hold, close, 250 kbit/s, open.
+/// Opens an adapter: end a half-written line, close, 250 kbit/s, open.
 const OPEN_ADAPTER: &[u8] = b"\r\rC\rS5\rO\r";
 
 /// What a person should check on a network.
@@ -53,7 +53,7 @@ const ADAPTER_CHECKS: Checks = Checks {
     noise: "check that the port belongs to a CAN adapter that understands slcan (Lawicel), and that no other program uses it",
 };
 
-/// The program's side of the line to a station.
+/// The client's session with a station.
 #[derive(Debug, Clone)]
 pub struct Client {
     settings: Settings,
@@ -63,22 +63,22 @@ pub struct Client {
     opening: Opening<Question>,
     roster: Roster,
     contacts: Contacts,
-    /// Participants that have named themselves.
+    /// Participants that have identified themselves.
     participants: Vec<Uid>,
     solenoid: Option<Solenoid>,
-    /// Locomotives whose state has to be asked for, and those of which something else was said than was commanded.
+    /// Locomotives whose state must be read, and those whose reported state does not fit the commands.
     unverified: Vec<(TrainId, Query)>,
     suspected: Vec<TrainId>,
-    /// Whether the station answers when it is asked for its modules, and when it was asked last.
+    /// Whether the station answers polls of its modules, and when it was polled last.
     has_modules: bool,
     polled: Timestamp,
-    /// When the last byte came.
+    /// When the last byte arrived.
     arrived: Timestamp,
-    /// Whether nothing was heard before the states were asked for again.
+    /// Whether the station was silent and its states have not been read since.
     is_blind: bool,
 }
 
-/// What is asked of a locomotive.
+/// A question about a locomotive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Query {
     Speed,
@@ -127,7 +127,7 @@ impl Client {
         self.roster.list()
     }
 
-    /// An adapter is closed until it is opened, and a track box behind it may wait in its loader.
+    /// Opens an adapter, and starts a track box behind it that may wait in its loader.
     fn open_adapter(&mut self) {
         if self.settings.transport == Transport::Adapter {
             self.dialogue.write(OPEN_ADAPTER.to_vec());
@@ -135,7 +135,7 @@ impl Client {
         }
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
         self.is_blind |= self.dialogue.watch(now);
         while let Some(next) = self.next(now) {
@@ -143,12 +143,12 @@ impl Client {
         }
     }
 
-    /// What is to be written next, if anything may be written now.
+    /// Returns the next request, if one may be written now.
     fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         if !self.dialogue.may_write(now) {
             return None;
         }
-        // A speed says nothing of the direction: a train can be stopped before its direction is known.
+        // A speed contains no direction, so a train can be stopped before its direction is known.
         if let Some(command) = self.dialogue.next_stop(now, false) {
             return Some(self.outgoing(now, command));
         }
@@ -244,6 +244,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

@@ -1,4 +1,4 @@
-//! What answers the requests to the station, and when to repeat them.
+//! The answers to requests to the station, and when to repeat them.
 
 use footplate_core::{TimeSpan, TrainId, TurnoutId};
 
@@ -9,9 +9,9 @@ use super::speed::{Steps, Throttle};
 use super::states::TurnoutPosition;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
-/// A request is repeated when it was not answered for so long: a datagram may be lost, and stations answer within some
+/// A request without an answer is repeated after this time: a datagram may be lost, and stations answer within some
 /// milliseconds. Over a busy wireless network answers take longer now and then; a repetition then does no harm.
-const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
+pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,16 +25,16 @@ pub(super) enum Awaited {
     /// The inputs of a group.
     Feedback(u8),
     Power(bool),
-    /// How a train is driven, whatever that is.
+    /// The state of a train, whatever it is.
     Locomotive(TrainId),
-    /// That a train is driven so.
+    /// That a train has this state.
     Driven(TrainId, Steps, Throttle, bool),
     /// That a turnout at an address lies by its second output, or its first.
     Turnout(TurnoutId, u16, bool),
 }
 
 impl Awaited {
-    /// Whether the answer has to be known before trains are driven.
+    /// Whether trains may not run before the answer.
     pub(super) const fn is_question(&self) -> bool {
         !matches!(self, Self::Locomotive(_) | Self::Driven(..) | Self::Turnout(..))
     }

@@ -28,7 +28,7 @@ const PACING: Pacing = Pacing::new(TimeSpan::from_ms(20), 3, TimeSpan::from_ms(5
 /// The detectors of the CAN bus answer one after the other within this time after they were asked (chosen).
 const DETECTORS_WITHIN: TimeSpan = TimeSpan::from_ms(50);
 
-/// What a person should check.
+/// What the user should check.
 const CHECKS: Checks = Checks {
     nothing_heard: "check its power, the network cable, that its address is right (a Z21 has 192.168.0.111 unless changed) and \
                     that this computer is in its network",
@@ -36,7 +36,7 @@ const CHECKS: Checks = Checks {
     noise: "check that the address belongs to a Z21 (UDP port 21105)",
 };
 
-/// The program's side of the line to a Z21.
+/// The client's session with a Z21.
 #[derive(Debug, Clone)]
 pub struct Client {
     settings: Settings,
@@ -44,25 +44,25 @@ pub struct Client {
     opening: Opening<Request>,
     sensors: Sensors,
     outputs: Outputs,
-    /// What this client asks to be told, and whether the station has confirmed that it will.
+    /// What this client subscribes to, and whether the station has confirmed it.
     wanted: Broadcasts,
     is_subscribed: bool,
-    /// The station has said once that the track has no power, which an old datagram may say, too.
+    /// The station reported once that the track has no power; it may be an old datagram.
     power_is_suspect: bool,
     asks_status: bool,
-    /// Something does not fit what was commanded: perhaps the station was restarted, and has forgotten this client, too.
+    /// A state does not fit the commands: the station may have been restarted and have lost the subscription.
     asks_broadcasts: bool,
-    /// Locomotives whose state has to be asked for again.
+    /// Locomotives whose state must be read again.
     unverified: Vec<TrainId>,
-    /// What was said once of a locomotive and is not what was commanded: an old datagram, or another throttle.
+    /// States of locomotives that were reported once and do not fit the commands: an old datagram, or another throttle.
     suspected: Vec<(TrainId, Throttle, bool)>,
     identity: Option<String>,
     serial_number: u32,
     polls: u32,
     polled: Timestamp,
-    /// When the detectors of the CAN bus were asked last.
+    /// When the detectors on the CAN bus were polled last.
     asked_detectors: Option<Timestamp>,
-    /// Whether nothing was heard before the states were asked for again.
+    /// Whether the station was silent and its states have not been read since.
     is_blind: bool,
 }
 
@@ -95,13 +95,13 @@ impl Client {
         client
     }
 
-    /// What the station, its sensors and its turnouts are taken to be like.
+    /// The settings of the station, its sensors and its turnouts.
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
         self.is_blind |= self.dialogue.watch(now);
         while let Some(next) = self.next(now) {
@@ -109,7 +109,7 @@ impl Client {
         }
     }
 
-    /// What is to be written next, if anything may be written now.
+    /// Returns the next request, if one may be written now.
     fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         if !self.dialogue.may_write(now) {
             return None;
@@ -135,7 +135,7 @@ impl Client {
         if now < self.dialogue.pacing.usual_at() {
             return None;
         }
-        // At the end, too: a train whose direction is asked for can be stopped only when that is answered.
+        // At the end, too: a train can be stopped only when its direction is known.
         let repeat = self.next_repeat(now, false);
         if self.dialogue.farewell.has_begun() { repeat } else { repeat.or_else(|| self.next_usual(now)) }
     }
@@ -172,7 +172,7 @@ impl Client {
     fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
         loop {
             match self.dialogue.next_repeat(now, only_urgent)? {
-                // Inputs are asked for again anyway.
+                // Inputs are polled anyway.
                 Repeat::Again(outgoing)
                     if !(self.opening.is_open() && matches!(outgoing.request, Request::Feedback { .. })) =>
                 {
@@ -183,7 +183,7 @@ impl Client {
         }
     }
 
-    /// The request of a command, and what was commanded by it.
+    /// Returns the request for a command, and notes what it commands.
     fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
         let (request, awaited) = match command {
             Command::Speed { train, step } => self.drive(train, step, false),
@@ -223,7 +223,7 @@ impl Client {
         let mut bytes = Vec::new();
         request.write(&mut bytes);
         if let Some(question) = question_with(request) {
-            // Some clones read only the first dataset of a datagram: what is repeated goes in two.
+            // Some clones read only the first dataset of a datagram: a repeat uses two datagrams.
             if tries > 1 {
                 self.dialogue.write(core::mem::take(&mut bytes));
             }
@@ -239,7 +239,7 @@ impl Client {
     }
 }
 
-/// The question that goes with a request, so that its answer confirms it, whatever the station tells by itself.
+/// The question in the same datagram, whose answer confirms a request even without a broadcast.
 const fn question_with(request: Request) -> Option<Request> {
     match request {
         Request::Drive { address, .. } => Some(Request::Locomotive { address }),
@@ -286,6 +286,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

@@ -1,17 +1,17 @@
 //! The one output of a turnout that is powered.
 //!
-//! Without the queue of later firmware a client has to let go of an output itself, and outputs of two turnouts must not be powered
-//! at once. So it is done here for every station: one turnout after the other.
+//! Older firmware has no queue: a client releases outputs itself and must not power two at once. Footplate does this with every
+//! station, one turnout after the other.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 use super::request::Request;
 
-/// How long an output is powered: 100 ms at least, and 150 ms are usual.
+/// How long an output is powered: at least 100 ms, usually 150 ms.
 const PULSE: TimeSpan = TimeSpan::from_ms(150);
-/// How often its release is written: a datagram may be lost, and nothing confirms a release.
+/// How often its release is written: a datagram may be lost, and no answer confirms it.
 const RELEASES: u8 = 2;
-/// From one to the next.
+/// Time between two releases.
 const BETWEEN_RELEASES: TimeSpan = TimeSpan::from_ms(30);
 
 /// An output under power.
@@ -19,7 +19,7 @@ const BETWEEN_RELEASES: TimeSpan = TimeSpan::from_ms(30);
 struct Pulse {
     address: u16,
     second: bool,
-    /// When it is let go next, and how often still.
+    /// When to release it next, and how often.
     release_at: Timestamp,
     releases: u8,
 }
@@ -31,7 +31,7 @@ pub(super) struct Outputs {
 }
 
 impl Outputs {
-    /// An output is powered.
+    /// Notes that an output is powered.
     pub(super) fn powered(&mut self, address: u16, second: bool, now: Timestamp) {
         self.pulse = Some(Pulse { address, second, release_at: now + PULSE, releases: RELEASES });
     }
@@ -41,12 +41,12 @@ impl Outputs {
         self.pulse.is_none()
     }
 
-    /// When an output has to be let go.
+    /// Returns when to release an output.
     pub(super) fn release_due(&self) -> Option<Timestamp> {
         self.pulse.map(|pulse| pulse.release_at)
     }
 
-    /// What lets go of an output, when it is time or at once.
+    /// Returns the request that releases an output, if it is due.
     pub(super) fn take_release(&mut self, now: Timestamp) -> Option<Request> {
         let Pulse { address, second, releases, .. } = self.pulse.filter(|pulse| now >= pulse.release_at)?;
         self.pulse = (releases > 1).then_some(Pulse {

@@ -26,7 +26,7 @@ const sentence = ({ what, blanks, text }) => {
 };
 
 /** An alarm as a sentence that begins with its train. */
-export const told = (alarm) => (alarm.train == null ? sentence(alarm) : `${say("train", alarm.train)}: ${sentence(alarm)}`);
+export const described = (alarm) => (alarm.train == null ? sentence(alarm) : `${say("train", alarm.train)}: ${sentence(alarm)}`);
 
 const isOfLine = ({ what }) => what.startsWith("line-");
 
@@ -110,14 +110,14 @@ export class Alarmed extends EventTarget {
   }
 
   #row(alarm) {
-    const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", told(alarm)) }, say("end-alarm"));
+    const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", described(alarm)) }, say("end-alarm"));
     end.addEventListener("click", () => {
       this.#ended.add(this.#key(alarm));
       this.#show();
     });
     const acts = action(alarm);
     const row = make("p", { class: `alarm ${alarm.grade}` }, make("span"), ...(acts.hash === location.hash ? [] : [acts]), end);
-    put(row.firstElementChild, told(alarm));
+    put(row.firstElementChild, described(alarm));
     return row;
   }
 }

@@ -116,8 +116,8 @@ export class Draft {
       const part = bend * nth / 12;
       return [piece.radius * Math.sin(part), (piece.side ?? 1) * piece.radius * (1 - Math.cos(part))];
     });
-    const ways = { straight: [line], curve: [arc], turnout: [line, arc] }[piece.kind];
-    return ways.map((way) => way.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
+    const curves = { straight: [line], curve: [arc], turnout: [line, arc] }[piece.kind];
+    return curves.map((curve) => curve.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
   }
 
   /** The mistakes of the draft: keys of sentences with their values. `isError` prevents saving. */
@@ -191,34 +191,34 @@ class Written {
   }
 
   /** Every path out of a node, by the name of the node in this direction, and its name in the other direction. */
-  #ways() {
-    const ways = [];
+  #paths() {
+    const paths = [];
     for (const joint of this.#sensors) {
       const [one, other] = joint.ends;
-      ways.push({ from: joint.sensor[0], back: joint.sensor[1], ...this.#through(other.piece, other.port, 0) });
-      ways.push({ from: joint.sensor[1], back: joint.sensor[0], ...this.#through(one.piece, one.port, 0) });
+      paths.push({ from: joint.sensor[0], back: joint.sensor[1], ...this.#through(other.piece, other.port, 0) });
+      paths.push({ from: joint.sensor[1], back: joint.sensor[0], ...this.#through(one.piece, one.port, 0) });
     }
     for (const { piece, number } of this.#turnouts) {
       const laid = this.#draft.pieces[piece];
-      ways.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
-      ways.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
-      ways.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
+      paths.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
+      paths.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
+      paths.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
     }
     for (const joint of this.#ends) {
       const [{ piece, port }] = joint.ends;
-      ways.push({ from: `EN${joint.end}`, back: `EX${joint.end}`, ...this.#through(piece, port, 0) });
+      paths.push({ from: `EN${joint.end}`, back: `EX${joint.end}`, ...this.#through(piece, port, 0) });
     }
-    return ways;
+    return paths;
   }
 
   text() {
     const written = new Set();
     const edges = [];
-    for (const { from, back, name, mm } of this.#ways()) {
+    for (const { from, back, name, mm } of this.#paths()) {
       // Each edge is found from both of its ends.
       if (written.has(`${from} ${name}`)) continue;
       written.add(`${from} ${name}`);
-      const other = this.#ways().find((way) => way.back === name && way.name === back);
+      const other = this.#paths().find((path) => path.back === name && path.name === back);
       if (other) written.add(`${other.from} ${other.name}`);
       edges.push(`  { from = "${from}", to = "${name}", mm = ${mm.toFixed(1)} },`);
     }

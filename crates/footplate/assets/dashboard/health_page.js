@@ -1,6 +1,6 @@
 // The health page: prediction errors, drift, alarms, and the timing of link and control loop.
 
-import { told } from "./alarms.js";
+import { described } from "./alarms.js";
 import { colour, dots } from "./chart.js";
 import { LiveChart, upright } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -103,7 +103,7 @@ export function healthPage(root, live) {
 
   function alarms() {
     const rows = live.alarms.slice(-LISTED).reverse().map((alarm) => make("li", { class: alarm.grade },
-      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), told(alarm)));
+      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), described(alarm)));
     $("#alarms").replaceChildren(...rows);
     $("#no-alarm").hidden = rows.length > 0;
   }

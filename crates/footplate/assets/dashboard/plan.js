@@ -95,16 +95,16 @@ function headingsAt(layout, points, straight) {
 
 /** Ends without a point: a short distance beyond their neighbour, beside the straight leg. */
 function setEnds(layout, points, headings) {
-  const ways = layout.edges.flatMap(({ from, to }) => {
+  const lengths = layout.edges.flatMap(({ from, to }) => {
     const [one, other] = [points.get(placeOf(from)), points.get(placeOf(to))];
     return one && other ? [Math.hypot(one[0] - other[0], one[1] - other[1])] : [];
   }).sort((one, other) => one - other);
-  const way = ways[ways.length >> 1] ?? 1;
+  const length = lengths[lengths.length >> 1] ?? 1;
   for (const { from, to, leg } of layout.edges) {
     if (points.has(placeOf(to)) || !points.has(placeOf(from))) continue;
     const [x, y] = points.get(placeOf(from));
     const heading = (along(headings, from) ?? 0) + (leg === "curved" ? 0.35 : 0);
-    points.set(placeOf(to), [x + way * Math.cos(heading), y + way * Math.sin(heading)]);
+    points.set(placeOf(to), [x + length * Math.cos(heading), y + length * Math.sin(heading)]);
     headings.set(placeOf(to), (along(headings, from) ?? 0) + (senseOf(to) < 0 ? Math.PI : 0));
   }
 }

@@ -33,7 +33,7 @@ export function cut(points, from, to) {
   const whole = lengthOf(points);
   const [low, high] = [from * whole, to * whole];
   const found = [];
-  let way = 0;
+  let distance = 0;
   for (const [nth, point] of points.entries()) {
     if (nth === 0) {
       if (low <= 0) found.push(point);
@@ -41,11 +41,11 @@ export function cut(points, from, to) {
     }
     const before = points[nth - 1];
     const step = apart(before, point);
-    const at = (where) => [0, 1].map((axis) => before[axis] + (point[axis] - before[axis]) * (step > 0 ? (where - way) / step : 0));
-    if (way < low && low <= way + step) found.push(at(low));
-    if (low < way + step && way + step < high) found.push(point);
-    if (way < high && high <= way + step) found.push(at(high));
-    way += step;
+    const at = (where) => [0, 1].map((axis) => before[axis] + (point[axis] - before[axis]) * (step > 0 ? (where - distance) / step : 0));
+    if (distance < low && low <= distance + step) found.push(at(low));
+    if (low < distance + step && distance + step < high) found.push(point);
+    if (distance < high && high <= distance + step) found.push(at(high));
+    distance += step;
   }
   return found.length > 0 ? found : [points.at(-1)];
 }
@@ -54,15 +54,15 @@ export function cut(points, from, to) {
 export function nearest(points, [x, y]) {
   const whole = lengthOf(points) || 1;
   let best = { away: Infinity, part: 0 };
-  let way = 0;
+  let distance = 0;
   for (const [nth, [x2, y2]] of points.entries()) {
     if (nth === 0) continue;
     const [x1, y1] = points[nth - 1];
     const square = (x2 - x1) ** 2 + (y2 - y1) ** 2;
     const part = square > 0 ? Math.min(Math.max(((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / square, 0), 1) : 0;
     const away = Math.hypot(x - x1 - part * (x2 - x1), y - y1 - part * (y2 - y1));
-    if (away < best.away) best = { away, part: (way + part * Math.sqrt(square)) / whole };
-    way += Math.sqrt(square);
+    if (away < best.away) best = { away, part: (distance + part * Math.sqrt(square)) / whole };
+    distance += Math.sqrt(square);
   }
   return best;
 }

@@ -42,9 +42,9 @@ class Drawing {
     // Track that is not connected is drawn below.
     for (let start = this.#unplaced(); start !== undefined; start = this.#unplaced()) {
       const main = this.#mainLine(start);
-      if (main.way.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
+      if (main.path.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
       this.#lanes = new Map();
-      this.#base = new Base(main.way.map((edge) => this.#long(edge)), main.isRound);
+      this.#base = new Base(main.path.map((edge) => this.#long(edge)), main.isRound);
       this.#base.top = top;
       this.#placeMain(main);
       for (let track = this.#nextTrack(); track; track = this.#nextTrack()) this.#placeTrack(track);
@@ -62,21 +62,21 @@ class Drawing {
 
   /** The longest path that passes no place twice: a circuit, if one is at least half as long as the longest line. */
   #mainLine(start) {
-    const [round, line] = [{ long: 0, way: [], isRound: true }, { long: 0, way: [], isRound: false }];
+    const [round, line] = [{ long: 0, path: [], isRound: true }, { long: 0, path: [], isRound: false }];
     let tried = 0;
     const most = () => tried > MOST_TRIED;
-    const walk = (first, node, seen, way, long) => {
+    const walk = (first, node, seen, path, long) => {
       tried += 1;
-      if (long > line.long + 1e-6) Object.assign(line, { long, way: [...way] });
+      if (long > line.long + 1e-6) Object.assign(line, { long, path: [...path] });
       for (const edge of this.#leaving.get(node) ?? []) {
         if (most()) return;
         const further = long + this.#long(edge) * (this.#isCurved(edge) ? CURVED_COUNTS : 1);
-        if (edge.to === first && further > round.long + 1e-6) Object.assign(round, { long: further, way: [...way, edge] });
+        if (edge.to === first && further > round.long + 1e-6) Object.assign(round, { long: further, path: [...path, edge] });
         if (seen.has(placeOf(edge.to))) continue;
         seen.add(placeOf(edge.to));
-        way.push(edge);
-        walk(first, edge.to, seen, way, further);
-        way.pop();
+        path.push(edge);
+        walk(first, edge.to, seen, path, further);
+        path.pop();
         seen.delete(placeOf(edge.to));
       }
     };
@@ -103,9 +103,9 @@ class Drawing {
     return found;
   }
 
-  #placeMain({ way, isRound }) {
+  #placeMain({ path, isRound }) {
     let at = 0;
-    for (const edge of way) {
+    for (const edge of path) {
       this.#spot(edge.from, at, 0, 1);
       this.#draw(edge, this.#base.curve(at, at + this.#long(edge), () => 0));
       at += this.#long(edge);
@@ -113,11 +113,11 @@ class Drawing {
     }
   }
 
-  /** Puts a place on a lane, where a train that passes this node runs along the main line (`way` +1) or against it. */
-  #spot(node, at, lane, way) {
+  /** Puts a place on a lane, where a train that passes this node runs along the main line (`sense` +1) or against it. */
+  #spot(node, at, lane, sense) {
     const [x, y] = this.#base.point(at, lane);
     this.#points.set(placeOf(node), [x, y]);
-    this.#spots.set(placeOf(node), { at, lane, way: way * senseOf(node) });
+    this.#spots.set(placeOf(node), { at, lane, sense: sense * senseOf(node) });
   }
 
   #draw(edge, points) {
@@ -148,10 +148,10 @@ class Drawing {
     }
     const [from, last] = [this.#spots.get(placeOf(first.from)), edges.at(-1).to];
     const to = this.#spots.get(placeOf(last));
-    const leaves = from.way * senseOf(first.from);
+    const leaves = from.sense * senseOf(first.from);
     const long = edges.reduce((sum, edge) => sum + this.#long(edge), 0);
     const span = to ? this.#base.ahead(from.at, to.at, leaves) : Math.max(long, LEAST_GAPS * this.#base.gap);
-    const isBeside = !to || (leaves === to.way * senseOf(last) && span > 0 && span < 0.8 * this.#base.long);
+    const isBeside = !to || (leaves === to.sense * senseOf(last) && span > 0 && span < 0.8 * this.#base.long);
     return { edges, from, to, leaves, long, span, isBeside, order: (isBeside ? 0 : 1e9) + span + (to ? 0 : this.#base.long) };
   }
 
@@ -167,31 +167,31 @@ class Drawing {
       const out = from.lane + (lane - from.lane) * soft(part / ramp);
       return to && !isCrossover ? out + (to.lane - lane) * soft((part - 1 + ramp) / ramp) : out;
     };
-    let way = 0;
+    let distance = 0;
     for (const edge of edges) {
-      const [start, end] = [way, way + this.#long(edge)].map((mm) => from.at + leaves * span * mm / long);
+      const [start, end] = [distance, distance + this.#long(edge)].map((mm) => from.at + leaves * span * mm / long);
       this.#draw(edge, this.#base.curve(start, end, laneAt));
       if (!this.#spots.has(placeOf(edge.to))) this.#spot(edge.to, end, laneAt(end), leaves);
-      way += this.#long(edge);
+      distance += this.#long(edge);
     }
   }
 
   /** A track that leads back or across: one curve with its places along it. */
   #placeAcross({ edges, from, to, leaves, long }) {
     const [start, end] = [this.#base.point(from.at, from.lane), this.#base.point(to.at, to.lane)];
-    const facing = (spot, way) => this.#base.heading(spot.at) + (way < 0 ? Math.PI : 0);
-    const curve = bezier(start, facing(from, leaves), end, facing(to, to.way * senseOf(edges.at(-1).to)));
-    let way = 0;
+    const facing = (spot, sense) => this.#base.heading(spot.at) + (sense < 0 ? Math.PI : 0);
+    const curve = bezier(start, facing(from, leaves), end, facing(to, to.sense * senseOf(edges.at(-1).to)));
+    let distance = 0;
     for (const edge of edges) {
-      const parts = [way / long, (way + this.#long(edge)) / long];
+      const parts = [distance / long, (distance + this.#long(edge)) / long];
       const points = Array.from({ length: POINTS }, (_, nth) => pointOf(curve, parts[0] + (parts[1] - parts[0]) * nth / (POINTS - 1)));
       this.#draw(edge, points);
       if (!this.#spots.has(placeOf(edge.to))) {
         this.#points.set(placeOf(edge.to), points.at(-1));
         // Tracks that begin here lie beside the main line as if this place did.
-        this.#spots.set(placeOf(edge.to), { at: from.at + leaves * (way + this.#long(edge)), lane: from.lane, way: leaves * senseOf(edge.to) });
+        this.#spots.set(placeOf(edge.to), { at: from.at + leaves * (distance + this.#long(edge)), lane: from.lane, sense: leaves * senseOf(edge.to) });
       }
-      way += this.#long(edge);
+      distance += this.#long(edge);
     }
   }
 
@@ -250,8 +250,8 @@ class Base {
   hasRoom = (lane) => !this.#isRound || lane * this.gap < 0.75 * this.#radius;
 
   /** The distance from one place to another in a direction. */
-  ahead(from, to, way) {
-    const span = way * (to - from);
+  ahead(from, to, sense) {
+    const span = sense * (to - from);
     return this.#isRound ? ((span % this.long) + this.long) % this.long : span;
   }
 
@@ -260,9 +260,9 @@ class Base {
     return turns.some((turn) => from + turn * this.long < high && to + turn * this.long > low);
   }
 
-  #at(way) {
-    if (!this.#isRound) return { point: [way, 0], heading: 0 };
-    const at = (((way + this.#shift) % this.long) + this.long) % this.long;
+  #at(distance) {
+    if (!this.#isRound) return { point: [distance, 0], heading: 0 };
+    const at = (((distance + this.#shift) % this.long) + this.long) % this.long;
     const [straight, radius, half] = [this.#straight, this.#radius, this.long / 2];
     const isBack = at >= half;
     const on = isBack ? at - half : at;
@@ -274,10 +274,10 @@ class Base {
     return isBack ? { point: [straight - x, 2 * radius - y], heading: heading + Math.PI } : { point: [x, y], heading };
   }
 
-  heading = (way) => this.#at(way).heading;
+  heading = (distance) => this.#at(distance).heading;
 
-  point(way, lane) {
-    const { point: [x, y], heading } = this.#at(way);
+  point(distance, lane) {
+    const { point: [x, y], heading } = this.#at(distance);
     const aside = lane * this.gap;
     return [x - aside * Math.sin(heading), this.top + y + aside * Math.cos(heading)];
   }

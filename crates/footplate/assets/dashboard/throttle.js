@@ -6,16 +6,16 @@ import { say } from "./words.js";
 
 export class Throttle {
   /** Whether the slider is being moved. */
-  held = false;
-  #slider; #told; #train; #lock; #give; #step = 0;
+  isDragged = false;
+  #slider; #shown; #train; #lock; #give; #step = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
     const $ = (selector) => root.querySelector(selector);
-    [this.#slider, this.#told, this.#train, this.#lock, this.#give] = [$("#step"), $("#step-told"), train, $("#lock"), give];
+    [this.#slider, this.#shown, this.#train, this.#lock, this.#give] = [$("#step"), $("#step-told"), train, $("#lock"), give];
     const slider = this.#slider;
-    slider.addEventListener("input", () => { this.held = true; put(this.#told, slider.value); });
-    slider.addEventListener("change", () => { this.held = false; this.#runAt(Number(slider.value)); });
+    slider.addEventListener("input", () => { this.isDragged = true; put(this.#shown, slider.value); });
+    slider.addEventListener("change", () => { this.isDragged = false; this.#runAt(Number(slider.value)); });
     $("#slower").addEventListener("click", () => this.#runAt(Number(slider.value) - 1));
     $("#faster").addEventListener("click", () => this.#runAt(Number(slider.value) + 1));
     $("#stop").addEventListener("click", () => give(`stop ${train}`));
@@ -50,9 +50,9 @@ export class Throttle {
   show({ step }, highest) {
     this.#step = step;
     if (highest) this.#slider.max = String(highest);
-    if (this.held) return;
+    if (this.isDragged) return;
     if (document.activeElement !== this.#slider) this.#slider.value = String(step);
-    put(this.#told, String(step));
+    put(this.#shown, String(step));
   }
 
   close() {

@@ -180,9 +180,9 @@ export class TrainCharts {
       name: say("chart-way"), x, y: say("axis-way"), sync, height: STRIP, range, zooms: false, below: marks,
       series: [line(say("estimated"), "first", "m", 2), dots(say("contact"), "second", "m", 2)],
     }), () => {
-      const { t_s: t, way_mm: way } = this.#history;
+      const { t_s: t, way_mm: distance } = this.#history;
       const m = (mm) => (mm == null ? null : mm / 1000);
-      return uPlot.join([[t, way.map(m)], [this.#passed.map(({ t_s }) => t_s), this.#passed.map(({ way_mm }) => m(way_mm))]]);
+      return uPlot.join([[t, distance.map(m)], [this.#passed.map(({ t_s }) => t_s), this.#passed.map(({ way_mm }) => m(way_mm))]]);
     });
     const late = [];
     add("late", () => ({

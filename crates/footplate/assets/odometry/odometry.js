@@ -67,7 +67,7 @@ function key(figure, places) {
   if (there.size === 0) return;
   const list = document.createElement("ul");
   list.className = "key";
-  list.setAttribute("aria-label", pick("Key to the marks", "Schlüssel zu den Marken"));
+  list.setAttribute("aria-label", pick("Legend of the marks", "Legende der Marken"));
   for (const what of Object.keys(WORDS).filter((word) => there.has(word))) {
     const swatch = document.createElement("span");
     swatch.className = "swatch";
@@ -109,7 +109,7 @@ function speed(figure, lines) {
   });
   const widest = greatest(confidence_speed_high_m_s.map((high, place) => high - confidence_speed_low_m_s[place]));
   const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
-  say(figure, pick(`The estimate goes from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung geht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
+  say(figure, pick(`The estimate ranges from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung reicht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
@@ -158,12 +158,12 @@ function shares(figure, { share_1, share_1_and_2 }) {
   });
   const mode = (u, _, __, index) => WORDS[markedAt("mode", u.data[0][index ?? 0])] ?? "normal";
   chart(figure, {
-    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des gedachten Sensors, und die Betriebsart"), x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
+    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des virtuellen Sensors, und die Betriebsart"), x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
     range: { y: { range: [0, 100 / (1 - STRIP_OF)] } },
     below: [shade(run.marks.mode, 0, STRIP_OF - 0.02, 1)],
     data: [run.time_s, run.time_s.map(() => 100), both, first, run.time_s.map(() => null)],
     series: [
-      part(pick("virtual sensor", "gedachter Sensor"), "first", (index) => 100 - both[index]),
+      part(pick("virtual sensor", "virtueller Sensor"), "first", (index) => 100 - both[index]),
       part(PLACES.wheel_2, "third", (index) => both[index] - first[index]),
       { ...part(PLACES.wheel_1, "second", (index) => first[index]), fill: `color-mix(in srgb, ${colour("second")} 25%, transparent)` },
       { ...line(PLACES.mode, "quiet", "", 0), value: mode },
@@ -180,7 +180,7 @@ function distance(figure, lines) {
   const { error_m, confidence_error_low_m, confidence_error_high_m, width_m, over_m, under_m } = lines;
   if (error_m) {
     chart(figure, {
-      name: pick("Distance less the true distance, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Weg weniger dem wahren Weg, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
+      name: pick("Distance error, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Fehler des Weges, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("distance error (m)", "Fehler des Weges (m)"), sync: SYNC, zero: true,
       data: [run.time_s, confidence_error_high_m, confidence_error_low_m, error_m, lines.guaranteed_error_high_m, lines.guaranteed_error_low_m],
       series: [
         bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2),
@@ -189,11 +189,11 @@ function distance(figure, lines) {
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
     const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(confidence_error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(confidence_error_high_m), 2)} m`];
-    say(figure, pick(`The error goes from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler geht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
+    say(figure, pick(`The error ranges from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler reicht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
     return;
   }
   chart(figure, {
-    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und wie viel er garantiert höchstens zu lang und zu kurz gelesen wird"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
+    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und garantierte Beträge von Über- und Unterlesen"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
     series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });
@@ -223,8 +223,8 @@ function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
   const recorded = [measured && pick("an accelerometer", "ein Beschleunigungsmesser"), effort && pick("the command", "der Befehl")].filter(Boolean).join(pick(" and ", " und "));
   const goes = span(accel_m_s2, "m/s²", 2);
   say(figure, pick(
-    `The estimate goes from ${goes}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`,
-    `Die Schätzung geht von ${goes}. ${recorded ? `Daneben aufgezeichnet: ${recorded}.` : "Weder ein Beschleunigungsmesser noch der Befehl ist aufgezeichnet."}`,
+    `The estimate ranges from ${goes}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`,
+    `Die Schätzung reicht von ${goes}. ${recorded ? `Daneben aufgezeichnet: ${recorded}.` : "Weder ein Beschleunigungsmesser noch der Befehl ist aufgezeichnet."}`,
   ));
 }
 

@@ -25,6 +25,7 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
+use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
 use self::console::{Console, ended, lines_of_stdin};
@@ -47,7 +48,7 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::witness::Witnessed;
@@ -116,6 +117,11 @@ pub(crate) struct Railway {
 impl Railway {
     pub(super) const fn link(&self) -> &Address {
         &self.link
+    }
+
+    /// What the doctor measured of the line.
+    fn line(&self) -> anyhow::Result<Option<MeasuredLine>> {
+        MeasuredLine::of(&self.link, self.store.as_deref())
     }
 }
 
@@ -222,7 +228,7 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
-            link: self.railway.link.time_model(),
+            link: self.railway.link.time_model(self.railway.line()?.as_ref()),
         })
     }
 
@@ -275,7 +281,8 @@ impl Arguments {
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
-        let session = open_session(&self.railway.link, &link, layout)?;
+        let mut session = open_session(&self.railway.link, &link, layout)?;
+        session.expect_delays(self.railway.link.excess(self.railway.line()?.as_ref()));
         let sits_at_terminal = self.is_drawn();
         let drawn = || Board::new(now().as_ns());
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));

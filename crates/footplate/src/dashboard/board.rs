@@ -173,7 +173,7 @@ impl Board {
         match request {
             Request::EmergencyStop => waiting.push_front(PendingRequest { request, answer }),
             Request::Line(_) if waiting.len() < MAX_WAITING => {
-                waiting.push_back(PendingRequest { request, answer })
+                waiting.push_back(PendingRequest { request, answer });
             }
             Request::Line(_) => return Err(TooMany),
         }

@@ -35,7 +35,7 @@ const FASTEST: f64 = 1e6;
 /// Which station is meant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Address {
-    /// A simulated one in this process.
+    /// A simulated station in this process.
     Simulated(SimulatedAddress),
     /// A 6050 or 6051 behind a line of bytes.
     Serial(SerialAddress),
@@ -50,7 +50,7 @@ pub(crate) enum Address {
 }
 
 impl Address {
-    /// The world that is simulated, if one is.
+    /// Returns the simulated world, if the station is simulated.
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
@@ -60,7 +60,7 @@ impl Address {
 }
 
 impl Address {
-    /// The line to a station outside this program.
+    /// Returns the line to a station outside this program.
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
             Self::Simulated(_) => None,
@@ -90,10 +90,10 @@ pub(crate) enum StationKind {
 }
 
 impl StationKind {
-    /// The station of a name.
+    /// Returns the station with this name.
     ///
     /// # Errors
-    /// There is none; those that there are.
+    /// The names that exist, if there is no such name.
     pub(crate) fn named(value: &str) -> Result<Self, String> {
         match value {
             "marklin" => Ok(Self::Marklin),
@@ -117,30 +117,30 @@ pub(crate) struct SimulatedAddress {
     pub(crate) seed: u64,
     /// The trains that stand on it.
     pub(crate) trains: Vec<TrainId>,
-    /// How they change speed; left out, each has the next law.
+    /// Their law of speed change; if left out, each train has the next one.
     pub(crate) law: Option<LawFamily>,
-    /// Whether contacts and turnouts fail now and then.
+    /// Whether sensors and turnouts fail at times.
     pub(crate) faults: bool,
-    /// What is drawn from wider ranges than usual.
+    /// The physics that is drawn from wider ranges than usual.
     pub(crate) physics: PhysicsRange,
-    /// How fast its clock runs, if it was said.
+    /// The speed of its clock, if given.
     pub(crate) speed: Option<Speed>,
-    /// The station that it is behind.
+    /// The station in front of it.
     pub(crate) station: StationKind,
-    /// How it behaves.
+    /// The station's quirks.
     pub(crate) quirks: Quirks,
 }
 
 /// How a simulated station behaves, by its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Quirks {
-    /// If it is a DCC-EX board.
+    /// Quirks of a DCC-EX board.
     pub(crate) board: BoardSwitches,
-    /// If it is a Z21.
+    /// Quirks of a Z21.
     pub(crate) z21: Z21Switches,
-    /// If it is a Central Station.
+    /// Quirks of a Central Station.
     pub(crate) can: CanSwitches,
-    /// If it is a LocoNet server.
+    /// Quirks of a LocoNet server.
     pub(crate) loconet: LocoNetSwitches,
 }
 
@@ -149,7 +149,7 @@ pub(crate) struct Quirks {
 pub(crate) enum Speed {
     /// As fast as it goes.
     Unpaced,
-    /// So many times as fast as real time.
+    /// This many times as fast as real time.
     Times(f64),
 }
 
@@ -158,22 +158,22 @@ pub(crate) enum Speed {
 pub(crate) struct SerialAddress {
     /// Where it is.
     pub(crate) port: Port,
-    /// How fast it is spoken to without its hand-shake line; left out, by that line where there is one.
+    /// The pace without its hand-shake line; if left out, the hand-shake line sets it where there is one.
     pub(crate) pace: Option<PaceChoice>,
-    /// Whether its hand-shake line is used; left out, if it can be read.
+    /// Whether to use its hand-shake line; if left out, where it can be read.
     pub(crate) cts: Option<bool>,
-    /// S88 modules on its bus; left out, those that the layout's contacts are on.
+    /// S88 modules on its bus; if left out, as many as the layout's sensors need.
     pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 /// The gaps that are left without a hand-shake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PaceChoice {
-    /// Long ones, which every interface keeps up with.
+    /// Long gaps, which suit every interface.
     Careful,
-    /// Short ones, for an interface or an adapter that keeps up.
+    /// Short gaps, for a fast interface or adapter.
     Fast,
 }
 
@@ -233,7 +233,7 @@ pub(super) fn times(value: &str) -> Result<f64, String> {
 }
 
 impl SimulatedAddress {
-    /// A layout as it is if nothing more is said.
+    /// Returns the default world of a layout.
     ///
     /// # Errors
     /// When no layout is named.
@@ -340,7 +340,7 @@ pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
 /// The law of a name.
 ///
 /// # Errors
-/// There is none; those that there are.
+/// The names that exist, if there is no such name.
 pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
     let names = || LawFamily::ALL.map(LawFamily::name).join(", ");
     let named = LawFamily::ALL.into_iter().find(|law| law.name() == value);
@@ -350,7 +350,7 @@ pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
 /// The range of physics of a name.
 ///
 /// # Errors
-/// There is none; those that there are.
+/// The names that exist, if there is no such name.
 pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
     let names = || PhysicsRange::EVERY.map(PhysicsRange::name).join(", ");
     PhysicsRange::named(value).ok_or_else(|| format!("there is no world `{value}`; there are {}", names()))

@@ -19,14 +19,14 @@ const LONGEST_DELAY_MS: u16 = 2_000;
 pub(crate) struct LocoNetAddress {
     /// Where it is.
     pub(crate) port: Port,
-    /// What is on the bus.
+    /// Settings of the bus.
     pub(crate) settings: Settings,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 impl LocoNetAddress {
-    /// A server at a place of the network.
+    /// Returns a server at a place in the network.
     ///
     /// # Errors
     /// When no place is named.

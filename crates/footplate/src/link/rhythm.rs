@@ -10,17 +10,17 @@ use serde::Serialize;
 #[derive(Debug, Default)]
 pub(crate) struct Rhythm {
     said: Vec<u8>,
-    /// The last request, and how many other messages went since.
+    /// The last poll, and how many other messages were written since.
     request: Option<(Timestamp, usize)>,
     is_awaited: bool,
     power: Option<PowerCommand>,
-    /// Sensors were asked for after that.
+    /// Whether sensors were polled after that.
     asked_since: bool,
-    /// What a DCC-EX board says, once something was written to one.
+    /// Messages from a DCC-EX board, once something was written to one.
     replies: Option<Framing>,
-    /// What a station on Märklin's CAN bus says, once something was written to one.
+    /// Frames from Märklin's CAN bus, once something was written to it.
     frames: Option<marklin_can::Framing>,
-    /// What a LocoNet server says, once something was written to one.
+    /// Lines from a LocoNet server, once something was written to one.
     lines: Option<loconet::Lines>,
 }
 
@@ -29,19 +29,19 @@ pub(crate) struct Rhythm {
 pub(crate) struct PowerCommand {
     /// On, or off.
     is_on: bool,
-    /// The station has answered a request since, so that it hears; whether it did what it was told no 6051 says.
+    /// Whether the station has answered a poll since; a 6051 never confirms the command itself.
     has_answered: bool,
 }
 
 /// Sensors were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Request {
-    /// How long after the request before, and how many other messages went between them.
+    /// Time since the poll before, and how many other messages were written between them.
     pub(crate) after: Option<(TimeSpan, usize)>,
 }
 
 impl Rhythm {
-    /// A byte was put on the line; the request that it completes.
+    /// Takes a byte that was written; returns the poll that it completes.
     pub(crate) fn written(&mut self, at: Timestamp, byte: u8) -> Option<Request> {
         self.said.push(byte);
         let (message, _) = Message::decode(&self.said)?;
@@ -145,12 +145,12 @@ impl Rhythm {
         }
     }
 
-    /// What the station was told of the power.
+    /// The last power command, and whether the station has confirmed it.
     pub(crate) const fn power(&self) -> Option<PowerCommand> {
         self.power
     }
 
-    /// A byte was heard; if it is the first of an answer, how long after the last bit of its request.
+    /// Takes a byte from the station; if it is the first of a reply, returns the time since the last bit of its poll.
     pub(crate) fn heard(&mut self, at: Timestamp) -> Option<TimeSpan> {
         let (asked, _) = self.request.filter(|_| std::mem::take(&mut self.is_awaited))?;
         if let Some(power) = &mut self.power
@@ -234,7 +234,7 @@ mod tests {
         assert_eq!(rhythm.written(at(0), 133), Some(Request { after: None }));
         assert_eq!(rhythm.written(at(5), 97), None);
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
-        // The answer to what was asked before says nothing of it.
+        // The reply to an earlier poll confirms nothing.
         assert!(rhythm.heard(at(12)).is_some());
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
         let request = rhythm.written(at(70), 133).expect("a request");

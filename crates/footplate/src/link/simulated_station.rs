@@ -76,7 +76,7 @@ impl<'l> SimulatedStation<'l> {
         }
     }
 
-    /// Goes on until a time, or until something reaches the host before it.
+    /// Advances until a time, or until something reaches the host before it.
     pub(crate) fn advance(&mut self, until: Timestamp) -> Option<FromSimulated> {
         match self {
             Self::Marklin(station) => station.advance(until).map(|heard| match heard {
@@ -95,12 +95,12 @@ impl<'l> SimulatedStation<'l> {
         }
     }
 
-    /// The host puts bytes on the line.
+    /// Puts the host's bytes on the line.
     pub(crate) fn write(&mut self, bytes: &[u8]) {
         self.write_of(0, bytes);
     }
 
-    /// One of several clients puts bytes on the line, of which each has its own where the station knows more than one.
+    /// Puts a client's bytes on its line; a station that knows one client only has one line.
     pub(crate) fn write_of(&mut self, client: usize, bytes: &[u8]) {
         match self {
             Self::Marklin(station) => bytes.iter().for_each(|byte| station.write(*byte)),
@@ -111,7 +111,7 @@ impl<'l> SimulatedStation<'l> {
         }
     }
 
-    /// Whether the station is ready for a byte; `None` if it has no line that says so.
+    /// Whether the station is ready for a byte; `None` without a hand-shake line.
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
@@ -141,7 +141,7 @@ impl<'l> SimulatedStation<'l> {
         }
     }
 
-    /// Solenoids that were left powered for too long; others leave that to the decoders of turnouts.
+    /// Solenoids that were powered for too long; with other stations the decoders of turnouts prevent that.
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),

@@ -90,6 +90,9 @@ impl Session for StationSession {
     fn watch(&mut self, sensor: Option<SensorId>) {
         self.any_mut().watch(sensor);
     }
+    fn expect_delays(&mut self, excess: footplate_core::TimeSpan) {
+        self.any_mut().expect_delays(excess);
+    }
     fn handle_timeout(&mut self, now: Timestamp) {
         self.any_mut().handle_timeout(now);
     }

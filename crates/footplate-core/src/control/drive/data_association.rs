@@ -85,7 +85,7 @@ impl DataAssociation {
     }
 
     /// Applies a command to a train in its branches, too.
-    pub(super) fn command_left(
+    pub(super) fn command_sent(
         &mut self,
         trains: &BTreeMap<TrainId, DrivenTrain>,
         context: TrackContext<'_>,
@@ -226,8 +226,8 @@ impl DataAssociation {
 
     fn unexplained(&mut self, detection: Detection) -> Association {
         let was_stuck = self.faults.is_stuck(detection.sensor);
-        let is_news = self.faults.note_unexplained(detection.sensor, detection.window.until);
-        match (was_stuck, is_news) {
+        let is_newly_stuck = self.faults.note_unexplained(detection.sensor, detection.window.until);
+        match (was_stuck, is_newly_stuck) {
             (true, _) => Association::Ignored,
             (false, true) => Association::Stuck,
             (false, false) => Association::Unexplained,

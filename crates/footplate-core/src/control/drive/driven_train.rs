@@ -206,7 +206,7 @@ impl DrivenTrain {
     }
 
     /// A command to this train has been sent.
-    pub(super) fn command_left(
+    pub(super) fn command_sent(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -225,7 +225,7 @@ impl DrivenTrain {
                 }
                 self.expect_after_command(context, now);
                 self.pacing_step_sent(event.time);
-                self.step_left(context, now, step, out);
+                self.step_sent(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
                 let rest = self.located_at_rest(context, event.time);
@@ -263,7 +263,7 @@ impl DrivenTrain {
         self.located(context, time).filter(|located| located.at_rest)
     }
 
-    fn step_left(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
+    fn step_sent(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
         let Some(task) = self.task else { return };
         match (task.phase, task.goal) {
             (TaskPhase::Commanding { .. }, Goal::Run) if step > SpeedStep::STAND => {
@@ -314,7 +314,7 @@ impl DrivenTrain {
         let Goal::RestAt(destination) = task.goal else { return };
         match (task.phase, destination.at) {
             (TaskPhase::Locating { .. }, _) => {
-                self.resume_to_target(context, now, task.order, destination, out)
+                self.resume_to_target(context, now, task.order, destination, out);
             }
             (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
                 Some(at) => {

@@ -185,7 +185,7 @@ impl Driver {
             (Order::Reverse { then, .. }, Some(train)) => train.reverse(context, now, id, then, out),
             (Order::Stop(stop), Some(train)) => train.stop_at(context, now, id, &stop, out)?,
             (Order::Move { distance, .. }, Some(train)) => {
-                train.start_move(context, now, id, distance, out)?
+                train.start_move(context, now, id, distance, out)?;
             }
             (Order::Hold { speed, .. }, Some(train)) => train.hold(context, now, id, speed, out)?,
             (Order::Arrive { target, within, .. }, Some(train)) => {
@@ -248,9 +248,9 @@ impl Driver {
         if context.layout.branch(turnout).is_none() {
             return Err(Refusal::UnknownTurnout { turnout });
         }
-        let lies = context.turnouts.get(turnout) == Some(Leg::from_curved(curved));
+        let is_set = context.turnouts.get(turnout) == Some(Leg::from_curved(curved));
         let on_it = train_on(&self.trains, context, now, turnout);
-        if let Some(train) = on_it.filter(|_| !lies) {
+        if let Some(train) = on_it.filter(|_| !is_set) {
             return Err(Refusal::TurnoutOccupied { turnout, train });
         }
         let partner = context
@@ -413,9 +413,9 @@ impl Machine for Driver {
         match event.kind {
             EventKind::Sensor(report) => self.report(now, event.time, report),
             EventKind::Speed { train, .. } | EventKind::Reverse { train } => {
-                self.association.command_left(&self.trains, context, event);
+                self.association.command_sent(&self.trains, context, event);
                 if let Some(train) = self.trains.get_mut(&train) {
-                    train.command_left(context, now, event, &mut self.outputs);
+                    train.command_sent(context, now, event, &mut self.outputs);
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_sent(now, turnout, curved),

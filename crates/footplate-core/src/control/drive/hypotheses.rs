@@ -77,7 +77,7 @@ pub(super) fn hypotheses(
     let mut found = Vec::new();
     for train in trains.values().filter(|train| may_have_moved(train, context, now, detection.window)) {
         let id = train.id();
-        let anywhere = log_anywhere(train, context);
+        let anywhere = log_density_if_lost(train, context);
         let mut add = |explanation, log_density: f64| {
             if log_density.is_finite() {
                 found.push(Hypothesis { explanation, log_density });
@@ -130,7 +130,7 @@ fn may_have_moved(
 
 /// ln of the density (1/s) with which a train of unknown position reaches one sensor: its speed over the length of
 /// all track, both directions.
-fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
+fn log_density_if_lost(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
     let speed = train.model.speed(train.commanded, Approach::Below).value.as_m_per_s();
     let track: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
     let track = if track > 0.0 { track } else { UNKNOWN_TRACK_M };

@@ -194,7 +194,7 @@ impl DrivenTrain {
         let wanted = self.speed_supervision.wanted.filter(|wanted| *wanted > commanded);
         let lookahead = Lookahead::of(self, now);
         let restrictions = lookahead.restrictions(context, wanted.unwrap_or(commanded));
-        let by = lookahead.slow_down_by(&restrictions, commanded);
+        let by = lookahead.latest_slowdown(&restrictions, commanded);
         let due = by.filter(|(by, _)| *by <= lookahead.start() + MIN_CHECK_INTERVAL);
         let slower =
             due.map(|(_, zone)| (lookahead.fastest_below(&restrictions, commanded, MIN_FASTER_TIME), zone));
@@ -388,7 +388,7 @@ impl<'t> Lookahead<'t> {
     }
 
     /// The latest time for a slower step, and the zone that requires it; now for a zone that the train may be in.
-    fn slow_down_by<'g>(
+    fn latest_slowdown<'g>(
         &self,
         restrictions: &[Restriction<'g>],
         commanded: SpeedStep,

@@ -13,14 +13,10 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
-use super::trials::{SpeedTrial, Steps};
+use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
-/// A ratio no further from 1 than this is none: what a run differs from the next, three times.
-const SAME: f64 = 0.02;
-/// See [`SAME`]: in standard deviations.
-const SAME_DEVIATIONS: f64 = 3.0;
 /// Ratios that are further apart than this are not of one train that has changed, but of two.
 const ANOTHER: f64 = 1.10;
 /// A stop this many standard deviations from its forecast is not of the same train either.
@@ -36,8 +32,6 @@ impl Watchdog {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
-        let is_same =
-            |one: &MeasuredRatio| libm::log(one.ratio).abs() <= SAME.max(SAME_DEVIATIONS * one.deviation);
         let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
         // Only who is said to drift has to show all of its speeds before that is taken back.
         let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));

@@ -176,3 +176,73 @@ fn turn_alike(scene: &Scene, [one, other]: &[Compared; 2], [first_dead, second_d
     let noise = libm::sqrt(one.variance + other.variance);
     (one.speed - other.speed).abs() < part * one.speed.abs() + least + 2.0 * noise
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wheel(speed: f64) -> WheelScene {
+        WheelScene {
+            counted: 0.05 * speed,
+            late: 0.0,
+            read: true,
+            stuck: false,
+            speed,
+            speed_deviation: 0.05,
+            acceleration: 0.0,
+            acceleration_deviation: 0.5,
+            pitch: 0.03,
+            tolerance: 0.002,
+            braked: true,
+            driven: false,
+        }
+    }
+
+    /// The width above the wheels after so many seconds of a command (m/s²) with wheels at 20 m/s that slip with this
+    /// probability.
+    fn above(reach: &mut Reach, commanded: f64, slip: f64, seconds: f64) -> f64 {
+        let scene = Scene {
+            wheels: [wheel(20.0); 2],
+            acceleration: Range { low: -1.5, high: 0.4 },
+            rolling: Range { low: -1.5, high: 0.4 },
+            commanded: Some(commanded),
+            brake: 0.0,
+            traction: 0.0,
+            slide: true,
+            slip: true,
+            felt: None,
+            independent: false,
+            top_speed: 40.0,
+        };
+        let compared = [Compared { speed: 20.0, variance: 0.0025 }; 2];
+        let p = [1.0 - slip, 0.0, 0.0, slip, 0.0, 0.0, 0.0, 0.0];
+        let likely = Range { low: 19.8, high: 20.2 };
+        let mut high = 0.0;
+        for _ in 0..(seconds / 0.05) as usize {
+            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0), 0.05).high;
+        }
+        high - likely.high
+    }
+
+    #[test]
+    fn brakes_widen_it_by_unseen_creepage_and_coasting_ends_that() {
+        let mut reach = Reach::new();
+        assert!(above(&mut reach, 0.0, 0.0, 10.0) < 1e-9, "coasting");
+        let soon = above(&mut reach, -0.5, 0.0, 1.5);
+        assert!(soon > 0.1 && soon < 0.8 * 1.6, "{soon}: no more than the reach and the rate allow");
+        let long = above(&mut reach, -0.5, 0.0, 60.0);
+        assert!((long - 0.2 * 20.2).abs() < 1e-9, "{long}: a fifth of the speed");
+        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "coasting again");
+    }
+
+    #[test]
+    fn after_a_slip_of_both_it_lasts_as_long_as_the_brake() {
+        let mut reach = Reach::new();
+        above(&mut reach, 0.0, 0.0, 10.0);
+        let slides = above(&mut reach, -0.5, 0.9, 10.0);
+        assert!((slides - 0.35 * 10.0).abs() < 0.2, "{slides}: what gradients add");
+        let alike = above(&mut reach, -0.5, 0.0, 10.0);
+        assert!(alike > 5.0 && alike <= 0.25 * 20.2 + 1.0 + 1e-9, "{alike}");
+        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "they roll");
+    }
+}

@@ -1,8 +1,8 @@
-//! What becomes of the messages that come.
+//! Handles messages from the board.
 
 use alloc::borrow::ToOwned;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::opening::Opening;
 use super::super::outstanding::Awaited;
@@ -86,13 +86,13 @@ impl Client {
         }
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
         self.opening = Opening::ask_states(&self.settings, self.dialogue.power);
         self.unverified = self.dialogue.directed();
     }
 
-    /// The board has forgotten everything.
+    /// Handles a board that was reset.
     fn restarted(&mut self) {
         self.dialogue.restarted();
         self.unverified.clear();
@@ -104,7 +104,7 @@ impl Client {
         self.dialogue.notify(LinkNotice::Answers);
     }
 
-    /// How a train is driven, and whether that is what was asked for.
+    /// Compares a train's state with the commanded one.
     fn hear_of_locomotive(&mut self, train: TrainId, driven: Driven, is_confirmed: bool) {
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
@@ -126,7 +126,7 @@ impl Client {
             return;
         }
         if driven.register < 0 {
-            // The board does not drive it at all: it was restarted while nothing was heard of it.
+            // The board does not drive it: it was restarted while the line was silent.
             self.restarted();
             return;
         }
@@ -141,7 +141,7 @@ impl Client {
         let before = self.dialogue.hear_of_turnout(turnout, thrown);
         let is_used = self.settings.turnouts == TurnoutRequests::Defined;
         if is_used && !was_asked && before == Some(!thrown) {
-            // Somebody else has thrown it: that is how it lies from now on.
+            // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved: thrown });
         }
     }
@@ -152,9 +152,9 @@ impl Client {
         match self.sensors.heard(id, active, self.opening.is_listing()) {
             Change::Occupied => {
                 let (latest, width) = occupied(now, self.dialogue.last_entry);
-                // It may have become occupied at any time since nothing was heard.
+                // It may have become occupied at any time since the line was silent.
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}
@@ -162,7 +162,7 @@ impl Client {
     }
 }
 
-/// How the board drives a locomotive.
+/// A locomotive's state on the board.
 #[derive(Clone, Copy)]
 struct Driven {
     register: i16,

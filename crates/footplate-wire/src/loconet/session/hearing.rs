@@ -1,8 +1,8 @@
-//! What becomes of the lines that come.
+//! Handles lines from the server.
 
 use alloc::string::String;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
 
 use super::super::line::{Line, SentReport};
 use super::super::message::{Malformed, Message};
@@ -159,7 +159,7 @@ impl Client {
         let curved = closed != self.settings.closed_is_straight;
         let before = self.dialogue.hear_of_turnout(turnout, curved);
         if !is_own && before != Some(curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
+            // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
@@ -170,9 +170,9 @@ impl Client {
         match self.sensors.heard(number, is_occupied, !self.opening.is_open()) {
             Change::Occupied => {
                 let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                // It may have become occupied at any time since nothing was heard.
+                // It may have become occupied at any time since the line was silent.
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}

@@ -1,4 +1,4 @@
-//! Requests and commands as frames, and what is done when they are not answered.
+//! Sends requests and commands as frames, and handles missing answers.
 
 use footplate_core::{Command, EventKind, SpeedStep, Timestamp, TrainId};
 
@@ -56,7 +56,7 @@ impl Client {
         self.roster.uid(train).unwrap_or_else(|| self.settings.locomotives.uid(train.0))
     }
 
-    /// The coil that has been powered for long enough is released.
+    /// Releases the coil that was powered for long enough.
     pub(super) fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         let Solenoid { turnout, curved, .. } = self.solenoid.take_if(|powered| now >= powered.release_at)?;
         let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
@@ -64,7 +64,7 @@ impl Client {
         Some(Outgoing::asks(message, Awaited::Accessory(turnout, uid, position, 0)))
     }
 
-    /// A request that was not answered in time, unless something newer waits or it was repeated often enough.
+    /// Returns a request whose answer is overdue, unless it was repeated often enough.
     pub(super) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
         loop {
             match self.dialogue.next_repeat(now, only_urgent)? {
@@ -78,12 +78,12 @@ impl Client {
         }
     }
 
-    /// The station does not answer this; what is done instead.
+    /// Handles a request that the station does not answer; returns a request to send instead.
     fn instead_of(&mut self, awaited: Awaited) -> Option<Outgoing<Awaited>> {
         match awaited {
             Awaited::Modules => self.has_modules = false,
             Awaited::AnyDirection(train, uid) => {
-                // It cannot be asked which end leads: it is commanded, so that it is known.
+                // The direction cannot be read: it is commanded, so that it is known.
                 self.dialogue.locomotives.know(train);
                 let locomotive = self.dialogue.locomotives.get_mut(train)?;
                 if locomotive.forward.is_none() {
@@ -97,7 +97,7 @@ impl Client {
         None
     }
 
-    /// The request of a command, and what was commanded by it.
+    /// Returns the request for a command, and notes what it commands.
     pub(super) fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
         let (message, awaited) = match command {
             Command::Speed { train, step } => {

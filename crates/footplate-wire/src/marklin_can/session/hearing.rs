@@ -1,8 +1,8 @@
-//! What becomes of the frames that come.
+//! Handles frames from the bus.
 
 use alloc::format;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::contacts::News;
 use super::super::frame::Frame;
@@ -61,7 +61,7 @@ impl Client {
             }
             (Message::Overload { .. }, _) => self.hear_power(false),
             (message, true) => self.respond(now, message),
-            // What others ask of the station is none of this program's business until it is confirmed.
+            // Requests of other programs count only when the station confirms them.
             _ => {}
         }
     }
@@ -137,7 +137,7 @@ impl Client {
         self.dialogue.notify(LinkNotice::Identified { identity });
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     pub(super) fn verify(&mut self) {
         let is_listed = !self.roster.list().is_empty();
         let questions: &[Question] = if is_listed { &Question::AGAIN } else { &Question::ALL };
@@ -163,7 +163,7 @@ impl Client {
         self.dialogue.hear_power(on, is_lost);
     }
 
-    /// Something else was said of a train than was commanded: an old frame, or another throttle. It is asked for.
+    /// Reads the state of a train that does not fit the commands: it may be an old frame, or another throttle.
     fn suspect(&mut self, train: TrainId, query: Query) {
         if !self.suspected.contains(&train) {
             self.suspected.push(train);
@@ -189,7 +189,7 @@ impl Client {
         if answered.is_none() {
             return self.suspect(train, Query::Speed);
         }
-        // It was asked for and is not what was commanded.
+        // The station confirms a state that was not commanded.
         let was_blind = self.is_blind;
         (locomotive.step, locomotive.is_stopped) = (step, false);
         self.dialogue.stop_at_end(train);
@@ -228,7 +228,7 @@ impl Client {
         let before = self.dialogue.hear_of_turnout(turnout, curved);
         let is_own = was_asked || self.dialogue.outstanding.has(&Awaited::Accessory(turnout, Uid::ALL, 0, 0));
         if !is_own && before != Some(curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
+            // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
@@ -256,7 +256,7 @@ impl Client {
             News::Occupied(span) => {
                 let order = Order { not_before: self.dialogue.last_entry, now };
                 let (latest, width) = span.entry(contact, self.settings.scan, order);
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             News::None => {}

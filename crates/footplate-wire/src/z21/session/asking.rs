@@ -1,4 +1,4 @@
-//! What is asked all the time, so that nothing that was lost on its way stays unknown.
+//! Polls, which find changes whose datagrams were lost.
 
 use footplate_core::{TimeSpan, Timestamp};
 
@@ -8,16 +8,16 @@ use super::super::request::Request;
 use super::{Client, query};
 use crate::outstanding::Outgoing;
 
-/// How often something is asked for: what changed in a datagram that was lost is known after that. It also keeps the station from
-/// forgetting this client, which it does after a minute.
+/// The interval between polls. They find changes whose datagrams were lost, and keep the station from forgetting this client, which
+/// it does after a minute.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(200);
-/// One question in so many is for a locomotive, so that all stay subscribed.
+/// One poll in this many is for a locomotive, so that all stay subscribed.
 const POLLS_A_LOCOMOTIVE: u32 = 8;
-/// One in so many is for what this client is told: a station that was restarted has forgotten it.
+/// One poll in this many is for the subscription, which a restarted station has lost.
 const POLLS_A_SUBSCRIPTION: u32 = 25;
 
 impl Client {
-    /// The next question of those that are asked all the time.
+    /// Returns the next poll.
     pub(super) fn poll(&mut self, now: Timestamp) -> Outgoing<Awaited> {
         (self.polled, self.polls) = (now, self.polls.wrapping_add(1));
         let groups = self.settings.groups();
@@ -50,7 +50,7 @@ impl Client {
         self.polled + TimeSpan::from_ns(POLL_EVERY.as_ns() / groups)
     }
 
-    /// A request whose answer is awaited where one comes.
+    /// Returns a request, with the answer that it has.
     pub(super) const fn question(&self, request: Request) -> Outgoing<Awaited> {
         let awaited = match request {
             Request::SerialNumber => Awaited::SerialNumber,

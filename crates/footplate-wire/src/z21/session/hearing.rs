@@ -1,9 +1,9 @@
-//! What becomes of the datagrams that come.
+//! Handles datagrams from the station.
 
 use alloc::format;
 use alloc::vec::Vec;
 
-use footplate_core::{EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
 
 use super::super::broadcasts::Broadcasts;
 use super::super::dataset::Datasets;
@@ -58,7 +58,7 @@ impl Client {
                 self.hear_of_turnout(now, address, second, answered.is_some());
             }
             Reply::Feedback { .. } | Reply::Can(_) | Reply::LocoNet(_) => {
-                // What is found when it is asked for may have been so since it was said to be free.
+                // A change found by a poll may have happened any time since the sensor was last reported free.
                 let is_answer = matches!(reply, Reply::Can(_))
                     && self.asked_detectors.is_some_and(|asked| now - asked < DETECTORS_WITHIN);
                 let was_missed = answered.is_some() || is_answer || self.is_blind;
@@ -92,20 +92,20 @@ impl Client {
         }
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     pub(super) fn verify(&mut self) {
         self.opening =
             Opening::asking(self.settings.questions(self.wanted, self.is_subscribed, self.dialogue.power));
         self.unverified = self.dialogue.directed();
     }
 
-    /// The station has forgotten everything.
+    /// Handles a station that was reset.
     fn restarted(&mut self) {
         self.dialogue.restarted();
         self.suspected.clear();
     }
 
-    /// The station need not keep a place for this client any longer.
+    /// Frees this client's place at the station.
     fn log_off(&mut self) {
         let mut bytes = Vec::new();
         Request::LogOff.write(&mut bytes);
@@ -118,7 +118,7 @@ impl Client {
         self.dialogue.notify(LinkNotice::Answers);
     }
 
-    /// What this client is told.
+    /// The subscription of this client.
     fn hear_of_broadcasts(&mut self, told: Broadcasts) {
         if told.has(self.wanted) {
             self.is_subscribed = true;
@@ -130,7 +130,7 @@ impl Client {
             self.restarted();
             return self.verify();
         }
-        // It is written again until the station has it, or does not want it.
+        // It is repeated until the station accepts or refuses it.
         let Some(asked) = self.dialogue.outstanding.take(&Awaited::Broadcasts(self.wanted)) else { return };
         if asked.tries < Awaited::REPEATS.most_tries {
             return self.dialogue.outstanding.push(asked);
@@ -151,7 +151,7 @@ impl Client {
         self.dialogue.hear_power(on, is_unexpected);
     }
 
-    /// How a train is driven, and whether that is what was asked for.
+    /// Compares a train's state with the commanded one.
     fn hear_of_locomotive(&mut self, state: &LocomotiveState, is_confirmed: bool) {
         let train = TrainId(state.address);
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
@@ -173,7 +173,7 @@ impl Client {
             locomotive.forward = Some(state.forward);
             return;
         }
-        // An old datagram may say so: it counts when it is said again in answer to a question.
+        // It may be an old datagram: it counts when the station repeats it in answer to a question.
         let said = (train, state.throttle, state.forward);
         if !self.suspected.contains(&said) {
             self.suspected.retain(|(other, ..)| *other != train);
@@ -197,7 +197,7 @@ impl Client {
         let before = self.dialogue.hear_of_turnout(turnout, curved);
         let is_outstanding = self.dialogue.outstanding.has(&Awaited::Turnout(turnout, address, second));
         if !was_asked && !is_outstanding && before == Some(!curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
+            // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
@@ -214,7 +214,7 @@ impl Client {
                 let free_at = free_at.filter(|_| was_missed);
                 let (latest, width) =
                     occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, free_at);
-                self.dialogue.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}

@@ -20,6 +20,7 @@ use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
+use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -33,7 +34,7 @@ use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
 use crate::witness::Witnessed;
@@ -156,7 +157,9 @@ impl Session<'_> {
             Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
             None => None,
         };
-        let session = open_session(self.link, &link, layout)?;
+        let line = MeasuredLine::of(self.link, self.store)?;
+        let mut session = open_session(self.link, &link, layout)?;
+        session.expect_delays(self.link.excess(line.as_ref()));
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);

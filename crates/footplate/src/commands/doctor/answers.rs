@@ -2,7 +2,8 @@
 
 use std::io::Write;
 
-use footplate_core::Timestamp;
+use footplate_core::link::RoundTrips;
+use footplate_core::{TimeSpan, Timestamp};
 
 use super::figures::{histogram, line, quantiles};
 use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape, shares};
@@ -32,7 +33,7 @@ impl<K: PartialEq> Waiting<K> {
     /// A request was written.
     pub(super) fn asked(&mut self, kind: K, at: Timestamp) {
         self.answers.asked += 1;
-        // The same is asked again before it was answered only when no answer came.
+        // A request is repeated before its answer only if the answer is missing.
         let before = self.waiting.len();
         self.waiting.retain(|(other, _)| *other != kind);
         self.answers.lost += before - self.waiting.len();
@@ -47,7 +48,7 @@ impl<K: PartialEq> Waiting<K> {
         }
     }
 
-    /// What has come of them.
+    /// Returns the times to answers.
     pub(super) fn finish(mut self) -> Answers {
         self.answers.times.sort_by(f64::total_cmp);
         self.answers
@@ -58,6 +59,12 @@ impl Answers {
     /// The share of requests that were not answered.
     pub(super) fn lost_share(&self) -> f64 {
         self.lost as f64 / self.asked.max(1) as f64
+    }
+
+    /// Returns the measured line; `None` with too few answers.
+    pub(super) fn round_trips(&self) -> Option<RoundTrips> {
+        let times: Vec<TimeSpan> = self.times.iter().map(|ms| TimeSpan::from_s(ms / 1e3)).collect();
+        RoundTrips::of(&times, u32::try_from(self.lost).unwrap_or(u32::MAX))
     }
 
     /// Adds its figures to those of a station.
@@ -100,23 +107,23 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    /// A sensor is occupied or free; where it was free before, that is a report.
+    /// Notes a sensor's state; a change from free to occupied counts as a report.
     pub(super) fn heard(&mut self, number: u16, is_occupied: bool) {
         let before = self.is(number, is_occupied);
         self.reported(before == Some(false) && is_occupied);
     }
 
-    /// A sensor is occupied or free; returns what it was before.
+    /// Notes a sensor's state; returns the state before.
     pub(super) fn is(&mut self, number: u16, is_occupied: bool) -> Option<bool> {
         self.occupied.insert(number, is_occupied)
     }
 
-    /// A sensor may have reported that it became occupied.
+    /// Counts a report of a sensor that became occupied.
     pub(super) fn reported(&mut self, is_report: bool) {
         self.reports += usize::from(is_report);
     }
 
-    /// Their number, how many are occupied, and how often one became so.
+    /// Returns the number of sensors, of occupied ones, and of reports.
     pub(super) fn counts(&self) -> [usize; 3] {
         let occupied = self.occupied.values().filter(|occupied| **occupied).count();
         [self.occupied.len(), occupied, self.reports]

@@ -16,7 +16,7 @@ pub(super) struct CanFigures {
     scan: TimeSpan,
     /// The locomotives of the station's list.
     listed: Vec<ListedLocomotive>,
-    /// Devices that named themselves: their number, version and kind.
+    /// Devices that identified themselves: number, version and kind.
     participants: BTreeMap<u32, ((u8, u8), u16)>,
     answers: Answers,
     contacts: Sensors,

@@ -13,19 +13,19 @@ pub(super) trait StationFigures {
     /// Whether a station of this kind was heard.
     ///
     /// # Errors
-    /// What a person should check if none was.
+    /// What the user should check, if none was heard.
     fn check(&self) -> Result<(), &'static str>;
 
-    /// How soon it answers.
+    /// Times to its answers.
     fn answers(&self) -> &Answers;
 
-    /// All figures but those of answers.
+    /// All figures except those of answers.
     fn json(&self) -> serde_json::Value;
 
-    /// What it is.
+    /// Prints what the station is.
     fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()>;
 
-    /// What it reports.
+    /// Prints what the station reports.
     fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()>;
 }
 
@@ -36,11 +36,11 @@ const BINS: usize = 8;
 
 /// The figures of a line.
 pub(super) struct Figures {
-    /// From one request to the next with nothing between them, in ms, sorted.
+    /// Time between two polls with nothing between them, in ms, sorted.
     periods: Vec<f64>,
     /// The same with one command between them.
     with_command: Vec<f64>,
-    /// From the last bit of a request to the first byte of its answer.
+    /// Time from the last bit of a poll to the first byte of the reply.
     first_bytes: Vec<f64>,
     asked: usize,
     lost: usize,
@@ -73,9 +73,14 @@ impl Figures {
         match others {
             0 => self.periods.push(span.as_ms()),
             1 => self.with_command.push(span.as_ms()),
-            // What brings the line into step is no period.
+            // Bytes that synchronise the line are no period.
             _ => {}
         }
+    }
+
+    /// Whether any poll was answered.
+    pub(super) fn has_replies(&self) -> bool {
+        !self.first_bytes.is_empty() && self.lost < self.asked
     }
 
     /// The share of requests whose answer was lost.

@@ -19,7 +19,7 @@ pub(super) struct LocoNetFigures {
     /// Locomotives in slots, and whether a throttle uses each.
     slots: BTreeMap<u8, (u16, SlotUse)>,
     sensors: Sensors,
-    /// Messages of this program that did not come to the bus.
+    /// Messages of this program that the server could not put on the bus.
     refused: usize,
     unread: usize,
 }

@@ -22,7 +22,7 @@ pub(super) struct Z21Figures {
     settings: Settings,
     answers: Answers,
     sensors: Sensors,
-    /// Locomotives whose decoders report by RailCom, and what they said last.
+    /// Locomotives whose decoders report by RailCom, with the last report.
     rail_com: BTreeMap<u16, RailCom>,
     /// X-BUS messages whose XOR byte was wrong, and bytes that could not be read.
     wrong_xor: usize,
@@ -83,7 +83,7 @@ impl Z21Figures {
             Reply::SerialNumber(number) => self.serial_number = Some(number),
             Reply::Hardware { kind, firmware } => self.hardware = Some((kind, firmware)),
             Reply::LockCode(lock) => self.lock = Some(lock),
-            // What it says when the power goes off at the end is no news.
+            // The state after the power goes off at the end is not of interest.
             Reply::SystemState(state) if state.central.is_powered() || self.system.is_none() => {
                 self.system = Some(state);
             }

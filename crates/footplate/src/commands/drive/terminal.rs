@@ -111,7 +111,7 @@ impl ViewThread {
         match self.board.ask(request) {
             Ok(answer) => self.asked.push(answer),
             Err(_) => {
-                self.model.say("! too many commands are waiting: enter it again in a moment".to_owned())
+                self.model.say("! too many commands are waiting: enter it again in a moment".to_owned());
             }
         }
     }

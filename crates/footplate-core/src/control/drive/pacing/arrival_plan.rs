@@ -202,12 +202,12 @@ impl ArrivalOptions {
     }
 
     /// The shortest time (s) with a plan; `None` if there is none.
-    pub(super) fn soonest(&self, begins: impl Fn(f64) -> Option<Beginning>) -> Option<f64> {
+    pub(super) fn shortest_time(&self, begins: impl Fn(f64) -> Option<Beginning>) -> Option<f64> {
         times(1.0).find(|within| begins(*within).and_then(|begins| self.plan(begins, *within)).is_some())
     }
 
     /// The longest time (s) with a plan, from a time that has one.
-    pub(super) fn latest(&self, from: f64, begins: impl Fn(f64) -> Option<Beginning>) -> f64 {
+    pub(super) fn longest_time(&self, from: f64, begins: impl Fn(f64) -> Option<Beginning>) -> f64 {
         let fits = |within: f64| begins(within).and_then(|begins| self.plan(begins, within)).is_some();
         times(from).take_while(|within| fits(*within)).last().unwrap_or(from)
     }
@@ -310,7 +310,8 @@ mod tests {
         // From 2.5 m to 1.5 m before the target.
         let slow = SlowPart { from: 2.5, to: 1.5, speed: 0.15 };
         let (free, zoned) = (options(), ArrivalOptions { slow: alloc::vec![slow], ..options() });
-        let [before, soonest] = [&free, &zoned].map(|options| options.soonest(begins).expect("some time"));
+        let [before, soonest] =
+            [&free, &zoned].map(|options| options.shortest_time(begins).expect("some time"));
         // One metre takes 6.7 s at 150 mm/s and 2 s at 500 mm/s; two more changes of speed add to that.
         assert!(soonest > before + 3.0 && soonest < before + 8.0, "{soonest} after {before}");
         let plan = zoned.plan(begins(0.0).expect("a state"), 1.1 * soonest).expect("time enough");
@@ -323,11 +324,11 @@ mod tests {
         // A stop from 250 mm/s is not planned where the limit is 150 mm/s.
         let at_the_end =
             ArrivalOptions { slow: alloc::vec![SlowPart { from: 0.3, to: -1.0, speed: 0.15 }], ..options() };
-        assert!(at_the_end.soonest(begins).is_none());
+        assert!(at_the_end.shortest_time(begins).is_none());
         // A slower step stops less precisely, but within the limit.
         let creeping = FinalStep { speed: 0.12, stop_distance: 0.05, stop_time: 0.8, ..at_the_end.last[0] };
         let with_slower_step = ArrivalOptions { slower: alloc::vec![creeping], ..at_the_end };
-        let soonest = with_slower_step.soonest(begins).expect("some time");
+        let soonest = with_slower_step.shortest_time(begins).expect("some time");
         assert_eq!(
             with_slower_step.plan(begins(0.0).expect("a state"), soonest).map(|plan| plan.last),
             Some(creeping)
@@ -340,8 +341,8 @@ mod tests {
         let begins = Beginning { after: 3.0, left: 1.1, speed: 0.12 };
         let sluggish = ArrivalOptions { rates: [0.08, 0.08], ..options() };
         let brisk = ArrivalOptions { rates: [10.0, 10.0], ..options() };
-        let [earlier, later] =
-            [brisk, sluggish.clone()].map(|options| options.soonest(|_| Some(begins)).expect("some time"));
+        let [earlier, later] = [brisk, sluggish.clone()]
+            .map(|options| options.shortest_time(|_| Some(begins)).expect("some time"));
         assert!(later > earlier + 0.4, "{later} after {earlier}");
         let plan = sluggish.plan(begins, later).expect("a plan");
         let motion = plan.profile.motion();
@@ -355,10 +356,10 @@ mod tests {
         let begins = |_: f64| Some(Beginning { after: 0.0, left: 4.0, speed: 0.2 });
         let (options, now) = (options(), begins(0.0).expect("a state"));
         assert!(options.plan(now, 8.0).is_none(), "4 m in 8 s are 0.5 m/s from end to end");
-        let soonest = options.soonest(begins).expect("some time");
+        let soonest = options.shortest_time(begins).expect("some time");
         assert!(soonest > 9.0 && soonest < 14.0, "{soonest}");
         assert!(options.plan(now, soonest).is_some() && options.plan(now, soonest * 0.98).is_none());
-        let latest = options.latest(soonest, begins);
+        let latest = options.longest_time(soonest, begins);
         // At 0.05 m/s nearly all the distance takes 70 s.
         assert!(latest > 30.0 && latest < 75.0, "{latest}");
         assert!(options.plan(now, latest * 1.03).is_none());

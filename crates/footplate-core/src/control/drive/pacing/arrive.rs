@@ -202,22 +202,22 @@ impl DrivenTrain {
         if let Some(found) = planned(seconds, now) {
             return Ok(found);
         }
-        let soonest = options.soonest(begins);
+        let soonest = options.shortest_time(begins);
         if let Some(soonest) = soonest.filter(|soonest| *soonest < seconds) {
-            let unhurried = options.latest(soonest, begins);
-            let waits = TimeSpan::from_s(seconds - unhurried);
-            return planned(unhurried, now + waits).ok_or(Refusal::Lost { train: self.id() });
+            let longest = options.longest_time(soonest, begins);
+            let waits = TimeSpan::from_s(seconds - longest);
+            return planned(longest, now + waits).ok_or(Refusal::Lost { train: self.id() });
         }
         // One step and the stop, from a precise step or a slower one: on a short path a slow step settles where a
         // fast one does not.
         let rest_times = self.model.standing_times();
         let slowest = self.restricted_until(context, now, at).into_iter().map(|(_, step)| step).min();
         let creeps = |step: SpeedStep| self.model.steady_speed(step, Approach::Below) < CREEP_SPEED;
-        let sure = || options.last.iter().map(|last| last.step);
-        let fastest = sure().max().into_iter().chain(slowest).min();
+        let precise = || options.last.iter().map(|last| last.step);
+        let fastest = precise().max().into_iter().chain(slowest).min();
         let may_run = |step: &SpeedStep| {
-            let is_sure = sure().any(|sure| sure == *step);
-            fastest.is_none_or(|fastest| *step <= fastest) && (is_sure || !creeps(*step))
+            let is_precise = precise().any(|precise| precise == *step);
+            fastest.is_none_or(|fastest| *step <= fastest) && (is_precise || !creeps(*step))
         };
         let steps = starts.iter().copied().filter(may_run);
         let runs = steps.filter_map(|step| match self.short_run(context, now, at, step, &destination) {
@@ -254,9 +254,9 @@ impl DrivenTrain {
         destination: &Destination,
     ) -> Refusal {
         let target = name(context, destination);
-        match options.soonest(|_| Some(begins)) {
+        match options.shortest_time(|_| Some(begins)) {
             Some(soonest) if soonest < within.as_s() => {
-                let latest = TimeSpan::from_s(options.latest(soonest, |_| Some(begins)));
+                let latest = TimeSpan::from_s(options.longest_time(soonest, |_| Some(begins)));
                 Refusal::TooSlow { target, latest }
             }
             Some(soonest) => Refusal::TooSoon { target, earliest: TimeSpan::from_s(soonest) },

@@ -254,8 +254,8 @@ impl DrivenTrain {
         let rest = leader.locator.rest_if_stopped(context, &leader.model, stopped);
         let rest = rest.filter(|_| !leader.is_position_uncertain(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
-            let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
-            surely.max(Length::ZERO)
+            let short_of = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
+            short_of.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
         let between = distance_between(context, &self.model, node, from)?;

@@ -148,7 +148,7 @@ impl DrivenTrain {
     /// A step has been sent.
     pub(in crate::control::drive) fn pacing_step_sent(&mut self, sent: Timestamp) {
         if let Some(pacing) = &mut self.pacing {
-            pacing.budget.take(seconds(sent));
+            pacing.budget.record(seconds(sent));
             pacing.next_update = Some(sent + SPACING);
         }
     }

@@ -116,7 +116,7 @@ impl<'a> StepSearch<'a> {
                 let deviation = next.doubt_of_interruption(self.model, leaves);
                 command_cost = COMMAND_COST + END_WEIGHT * deviation * deviation;
                 next.command(self.model, leaves, *step);
-                left.take(time);
+                left.record(time);
             }
             let place = self.path.surveyed(next.place(self.model, time + GRID_S));
             let error = place - ideal;
@@ -161,7 +161,7 @@ impl CommandBudget {
     pub(super) const UNUSED: Self = Self { sent: [f64::NEG_INFINITY; IN_A_ROW] };
 
     /// Records a command.
-    pub(super) fn take(&mut self, sent: f64) {
+    pub(super) fn record(&mut self, sent: f64) {
         self.sent.rotate_left(1);
         if let Some(last) = self.sent.last_mut() {
             *last = sent;
@@ -200,10 +200,10 @@ mod tests {
         let mut budget = CommandBudget::UNUSED;
         assert!(budget.free() < 0.0);
         for sent in [10.0, 10.2] {
-            budget.take(sent);
+            budget.record(sent);
             assert!((budget.free() - (sent + 0.2)).abs() < 1e-9);
         }
-        budget.take(10.4);
+        budget.record(10.4);
         assert!((budget.free() - 12.0).abs() < 1e-9);
         assert!((budget.later(-10.0).free() - 2.0).abs() < 1e-9);
     }

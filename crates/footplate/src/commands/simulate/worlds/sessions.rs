@@ -157,7 +157,12 @@ impl Driven<'_, '_> {
     fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<ScriptRunner> {
         let sections = SectionIndex::of(&self.written.layout);
         learnt.1.iter_mut().for_each(|fit| fit.begin_session(&sections));
-        learnt.0 = learnt.1.iter().map(|fit| fit.model().clone()).collect();
+        // A train that a recovery measured again has a model and no fit.
+        let fitted = |model: MotionModel| {
+            let fit = learnt.1.iter().find(|fit| fit.model().train() == model.train());
+            fit.map_or_else(|| model.for_later_session(), |fit| fit.model().clone())
+        };
+        learnt.0 = learnt.0.into_iter().map(fitted).collect();
         let beginning = DriveBeginning::line_by_line(self.written, &self.turnouts, learnt);
         let text = serde_json::to_string(&beginning).context("what was learnt is kept as text")?;
         let kept: DriveBeginning = serde_json::from_str(&text).context("what was kept is read back")?;

@@ -1,4 +1,4 @@
-//! Random worlds through every odometer: tables by phase, and the worst ten with seed and mechanism.
+//! Random worlds through every odometer: tables by phase, and the worst ten with seed and notes.
 
 use std::io::{self, Write};
 
@@ -7,19 +7,18 @@ use footplate_sim::line::{LineLevel, LineWorld};
 use footplate_store::odometry::{OdometryScore, Phase, WorldOdometer, WorldScores, WorstMoment};
 use serde_json::{Map, Value, json};
 
-use super::super::score_form::seeds_sentence;
-use super::score_page::{one, rounded_down};
-use crate::commands::odometry::json::score;
-use footplate_eval::seeds::FRESH;
+use super::families_page::{one, rounded_down};
+use super::score_json;
+use crate::seeds::{FRESH, seeds_sentence};
 
-/// So many of the worst worlds are named.
+/// Number of the worst worlds that are named.
 const WORST: usize = 10;
-/// After both slipped and roll again, the interval is asked to have its normal width so soon.
+/// The interval should have its normal width so soon after both slipped.
 const NORMAL_WITHIN: TimeSpan = TimeSpan::from_ms(3000);
 const OURS: WorldOdometer = WorldOdometer::Recommended;
 
-/// One world and how good every odometer was on it.
-pub(super) struct ScoredWorld {
+/// One world with the scores of every odometer.
+pub struct ScoredWorld {
     seed: u64,
     level: LineLevel,
     notes: String,
@@ -28,8 +27,11 @@ pub(super) struct ScoredWorld {
 }
 
 impl ScoredWorld {
-    /// Runs and scores the world of a seed, as an operator of a level knows it.
-    pub(super) fn new(seed: u64, level: LineLevel) -> anyhow::Result<Self> {
+    /// Runs and scores the world of a seed, as known to an operator of this level.
+    ///
+    /// # Errors
+    /// When its vehicle is one that no railway has.
+    pub fn new(seed: u64, level: LineLevel) -> anyhow::Result<Self> {
         let world = LineWorld::draw(seed);
         let run = world.run(level);
         let scores = WorldScores::of(&run)?;
@@ -50,7 +52,7 @@ impl ScoredWorld {
 }
 
 /// All worlds of one level or several.
-pub(super) struct WorldsPage {
+pub struct WorldsPage {
     worlds: Vec<ScoredWorld>,
     /// What was asked for, as on the command line.
     asked: String,
@@ -67,21 +69,32 @@ drawn from ranges that the [simulator's page](../theory/line_simulator.md#random
 const LEGEND: &str = "\
 Shares are over all periods. *Guaranteed* and *99.99 %* are the shares whose true speed lies within the interval, rounded
 down. The *oracle* is told which wheelset slips, and when. *ETCS* is the share of periods whose speed is off by more than
-ETCS allows. A train rolls *again* for 20 s after a wheelset slipped.
+ETCS allows; *hindsight* is an odometer that knows the true speed but while both slip, and then the speed at which that began
+and the mean acceleration until one of them rolls again. A train rolls *again* for 20 s after a wheelset slipped.
 ";
 
 impl WorldsPage {
-    pub(super) fn new(worlds: Vec<ScoredWorld>, asked: String) -> Self {
+    /// Of worlds that were asked for like this on the command line.
+    #[must_use]
+    pub fn new(worlds: Vec<ScoredWorld>, asked: String) -> Self {
         Self { worlds, asked }
     }
 
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
+    /// The tables under a heading, with what the figures mean.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{HEAD}\nMade by `footplate simulate line {}`.\n", self.asked)?;
         writeln!(output, "{}\n\n{LEGEND}", seeds_sentence(self.asked.contains(FRESH)))?;
         self.write_text(output)
     }
 
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    /// The tables alone.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         let levels: Vec<LineLevel> =
             LineLevel::ALL.into_iter().filter(|level| self.of(*level, |_| true).is_some()).collect();
         writeln!(
@@ -100,8 +113,8 @@ impl WorldsPage {
         writeln!(
             output,
             "\n| level | phase | periods | rms m/s | oracle | raw mean | raw max | paper | guaranteed % | 99.99 % \
-             | ETCS % | raw mean |\n\
-             | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+             | ETCS % | raw mean | hindsight |\n\
+             | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for level in &levels {
             if let Some(scores) = self.of(*level, |_| true) {
@@ -117,8 +130,9 @@ impl WorldsPage {
         self.worst().into_iter().try_for_each(|world| write_world(output, world))
     }
 
-    /// Whether a guaranteed interval was left more often than it promises, of worlds whose claims hold.
-    pub(super) fn falls_short(&self, least_inside_pct: f64) -> bool {
+    /// Whether the truth left a guaranteed interval more often than it may, in worlds whose claims hold.
+    #[must_use]
+    pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         LineLevel::ALL.into_iter().filter_map(|level| self.of(level, |world| world.claims_hold)).any(
             |scores| {
                 let [_, left] = scores.runs_and_left();
@@ -144,7 +158,9 @@ impl WorldsPage {
         Some(all)
     }
 
-    pub(super) fn as_json(&self) -> Value {
+    /// Everything for machines.
+    #[must_use]
+    pub fn as_json(&self) -> Value {
         let levels = LineLevel::ALL.into_iter().filter_map(|level| {
             let scores = self.of(level, |_| true)?;
             Some((level.name().to_owned(), as_json(&scores)))
@@ -202,7 +218,7 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, scores: &WorldScores) 
         let etcs = |score: &OdometryScore| one(score.etcs_speed_violation_pct, 2);
         writeln!(
             output,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             level.name(),
             phase.title(),
             ours.scored,
@@ -215,6 +231,7 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, scores: &WorldScores) 
             rounded_down(ours.confidence_speed_inside_pct),
             etcs(&ours),
             etcs(&of(WorldOdometer::RawMean)),
+            etcs(&of(WorldOdometer::Hindsight)),
         )?;
     }
     Ok(())
@@ -238,7 +255,8 @@ fn write_world(output: &mut dyn Write, world: &ScoredWorld) -> io::Result<()> {
 
 fn as_json(scores: &WorldScores) -> Value {
     let each = |of: &dyn Fn(WorldOdometer) -> OdometryScore| {
-        let scored = WorldOdometer::ALL.map(|odometer| (odometer.key().to_owned(), score(&of(odometer))));
+        let scored =
+            WorldOdometer::ALL.map(|odometer| (odometer.key().to_owned(), score_json(&of(odometer))));
         scored.into_iter().collect::<Map<_, _>>()
     };
     let phases = Phase::ALL.map(|phase| {

@@ -2,23 +2,23 @@
 
 use std::io::{self, Write};
 
+use footplate_store::odometry::Preset;
 use serde_json::{Map, Value, json};
 
 use super::family::{Family, Figures, Spread};
+use super::score_json;
 use super::scored_run::{Odometer, ScoredRun};
-use crate::commands::odometry::json::score;
-use footplate_store::odometry::Preset;
 
 /// All that was scored, and how.
-pub(super) struct ScorePage<'r> {
-    /// The worlds in order, each with its runs.
-    pub(super) families: Vec<Family<'r>>,
-    /// Worlds of a kind together: normal runs, slips and slides, faults.
-    pub(super) groups: Vec<Family<'r>>,
+pub struct FamiliesPage<'r> {
+    /// In order, each with its runs.
+    families: Vec<Family<'r>>,
+    /// Those of a kind together: normal runs, slips and slides, faults.
+    groups: Vec<Family<'r>>,
     /// Everything.
-    pub(super) all: Family<'r>,
+    all: Family<'r>,
     /// What was asked for, as on the command line.
-    pub(super) asked: String,
+    asked: String,
 }
 
 const OURS: Odometer = Odometer::Ours(Preset::Recommended);
@@ -44,9 +44,33 @@ The same runs by the published algorithm (`paper`) and by what simpler software 
 of normal runs (N), slips and slides (S) and faults (F), each together.
 ";
 
-impl ScorePage<'_> {
+impl<'r> FamiliesPage<'r> {
+    /// The page of runs of families with these names. Families whose names begin with the same letter are of a kind, unless
+    /// they are `all_alike`, of one name and kind.
+    #[must_use]
+    pub fn new(names: &[String], runs: &'r [ScoredRun], all_alike: bool, asked: String) -> Self {
+        let family = |name: &str, is_in: &dyn Fn(usize) -> bool| {
+            Family::new(name, runs.iter().filter(|run| is_in(run.family)))
+        };
+        let families = names.iter().enumerate().map(|(at, name)| family(name, &|of| of == at));
+        let kind = |name: &str| if all_alike { name.to_owned() } else { name.chars().take(1).collect() };
+        let mut kinds: Vec<String> = names.iter().map(|name| kind(name)).collect();
+        kinds.dedup();
+        let of_kind =
+            |wanted: &String| family(wanted, &|of| names.get(of).is_some_and(|name| kind(name) == *wanted));
+        Self {
+            families: families.collect(),
+            groups: kinds.iter().map(of_kind).collect(),
+            all: family("all", &|_| true),
+            asked,
+        }
+    }
+
     /// The tables under a heading, with what the figures mean.
-    pub(super) fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_markdown(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(output, "{HEAD}\nMade by `footplate simulate line {}`.\n\n{LEGEND}", self.asked)?;
         self.write_families(output)?;
         writeln!(output, "\n## Beside others\n\n{OTHERS}")?;
@@ -54,7 +78,10 @@ impl ScorePage<'_> {
     }
 
     /// The tables alone.
-    pub(super) fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         self.write_families(output)?;
         writeln!(output)?;
         self.write_others(output)
@@ -117,19 +144,21 @@ impl ScorePage<'_> {
     }
 
     /// Whether the truth left an interval of ours more often than they promise.
-    pub(super) fn falls_short(&self, least_inside_pct: f64) -> bool {
+    #[must_use]
+    pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         let figures = self.all.figures(OURS);
         figures.speed_inside_pct.is_some_and(|pct| pct < least_inside_pct)
             || figures.distance_inside_runs.is_some_and(|held| held < self.all.runs())
     }
 
     /// Everything for machines: families, all together, and each run with the scores that `footplate odometry` gives it.
-    pub(super) fn as_json(&self, runs: &[ScoredRun], names: &[String]) -> Value {
+    #[must_use]
+    pub fn as_json(&self, runs: &[ScoredRun], names: &[String]) -> Value {
         let each = runs.iter().map(|run| {
             let scores = Odometer::ALL
-                .map(|odometer| (odometer.key().to_owned(), score(&odometer.score(&run.scores))));
+                .map(|odometer| (odometer.key().to_owned(), score_json(&odometer.score(&run.scores))));
             json!({
-                "scenario": names.get(run.world), "seed": run.seed, "teeth": run.teeth,
+                "scenario": names.get(run.family), "seed": run.seed, "teeth": run.teeth,
                 "scores": scores.into_iter().collect::<Map<_, _>>(), "false_flags_pct": run.flags.pct(),
             })
         });
@@ -167,7 +196,7 @@ fn figures(figures: &Figures) -> Value {
     })
 }
 
-pub(super) fn one(value: Option<f64>, decimals: usize) -> String {
+pub(crate) fn one(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
@@ -179,7 +208,7 @@ fn both(spread: Option<Spread>, decimals: usize) -> String {
 }
 
 /// To four decimals, so that 100 means all.
-pub(super) fn rounded_down(pct: Option<f64>) -> String {
+pub(crate) fn rounded_down(pct: Option<f64>) -> String {
     one(pct.map(|pct| (pct * 1e4).floor() / 1e4), 4)
 }
 

@@ -1,4 +1,4 @@
-//! One simulated run through every odometer, and how good each of them was.
+//! One simulated run through every odometer, with their scores.
 
 use footplate_core::odometry::WheelState;
 use footplate_core::{TimeSpan, Timestamp};
@@ -7,37 +7,39 @@ use footplate_store::odometry::{
     OdometryRun, OdometryScore, Preset, Rival, RunContext, RunScores, simulated_rows, simulated_vehicle,
 };
 
-/// How long a wheel has to roll in truth before a flag on it is false: a second until it is trusted again, as vehicles
-/// ask for, and a second for all that lets go of it late.
+/// How long a wheel has to roll before a flag on it is false: a second until it is trusted again, as vehicles require, and a
+/// second of tolerance.
 const ROLLS_FOR: TimeSpan = TimeSpan::from_ms(2000);
 
-/// A way to make speed and distance of counts.
+/// An odometer that is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Odometer {
+pub(crate) enum Odometer {
     Ours(Preset),
     Theirs(Rival),
 }
 
-/// One run and how good every odometer was on it.
-pub(super) struct ScoredRun {
-    /// Which of the worlds it is of.
-    pub(super) world: usize,
-    pub(super) seed: u64,
-    pub(super) teeth: u32,
-    pub(super) scores: RunScores,
-    pub(super) flags: FalseFlags,
+/// One run with the scores of every odometer.
+pub struct ScoredRun {
+    /// Which of the families it is of.
+    pub family: usize,
+    /// Its seed.
+    pub seed: u64,
+    /// Pulses per revolution of both tachometers.
+    pub teeth: u32,
+    pub(crate) scores: RunScores,
+    pub(crate) flags: FalseFlags,
 }
 
-/// In how many periods the recommended preset says that a wheel slips or slides which rolls.
+/// Periods in which the recommended preset flags a wheel that rolls.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct FalseFlags {
+pub(crate) struct FalseFlags {
     periods: u64,
     flagged: u64,
 }
 
 impl Odometer {
     /// All of them, in the order of tables.
-    pub(super) const ALL: [Self; 5] = [
+    pub(crate) const ALL: [Self; 5] = [
         Self::Ours(Preset::Recommended),
         Self::Ours(Preset::Paper),
         Self::Theirs(Rival::RawMean),
@@ -45,22 +47,22 @@ impl Odometer {
         Self::Theirs(Rival::WheelsOnly),
     ];
 
-    pub(super) const fn key(self) -> &'static str {
+    pub(crate) const fn key(self) -> &'static str {
         match self {
             Self::Ours(preset) => preset.key(),
             Self::Theirs(rival) => rival.key(),
         }
     }
 
-    pub(super) const fn title(self) -> &'static str {
+    pub(crate) const fn title(self) -> &'static str {
         match self {
             Self::Ours(preset) => preset.key(),
             Self::Theirs(rival) => rival.title(),
         }
     }
 
-    /// How good it was.
-    pub(super) fn score(self, scores: &RunScores) -> OdometryScore {
+    /// Its score.
+    pub(crate) fn score(self, scores: &RunScores) -> OdometryScore {
         match self {
             Self::Ours(preset) => scores.preset(preset),
             Self::Theirs(wanted) => scores
@@ -79,33 +81,39 @@ impl FalseFlags {
         }
     }
 
-    pub(super) fn merge(&mut self, other: Self) {
+    pub(crate) fn merge(&mut self, other: Self) {
         self.periods += other.periods;
         self.flagged += other.flagged;
     }
 
-    /// Part of all periods of wheels that roll, in per cent.
-    pub(super) fn pct(self) -> Option<f64> {
+    /// Share of all periods of wheels that roll (%).
+    pub(crate) fn pct(self) -> Option<f64> {
         (self.periods > 0).then(|| 100.0 * self.flagged as f64 / self.periods as f64)
     }
 }
 
-/// Walks a run with every odometer.
-pub(super) fn score(run: &LineRun) -> anyhow::Result<(RunScores, FalseFlags)> {
-    let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
-    let context = RunContext::new(vehicle, Preset::Recommended, true);
-    let mut odometry = OdometryRun::new(&context)?;
-    let mut flags = FalseFlags::default();
-    let mut rolls_since: [Option<Timestamp>; 2] = [None; 2];
-    for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
-        let estimate = odometry.step(&period, || known);
-        for ((since, does), flag) in rolls_since.iter_mut().zip(truth.wheels).zip(estimate.wheels) {
-            *since = since.or(Some(period.time)).filter(|_| does == WheelTruth::Rolling);
-            flags.see(flag, since.map_or(TimeSpan::ZERO, |since| period.time - since));
+impl ScoredRun {
+    /// Walks the run of a seed with every odometer.
+    ///
+    /// # Errors
+    /// When its vehicle is one that no railway has.
+    pub fn new(family: usize, seed: u64, teeth: u32, run: &LineRun) -> anyhow::Result<Self> {
+        let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
+        let context = RunContext::new(vehicle, Preset::Recommended, true);
+        let mut odometry = OdometryRun::new(&context)?;
+        let mut flags = FalseFlags::default();
+        let mut rolls_since: [Option<Timestamp>; 2] = [None; 2];
+        for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
+            let estimate = odometry.step(&period, || known);
+            for ((since, does), flag) in rolls_since.iter_mut().zip(truth.wheels).zip(estimate.wheels) {
+                *since = since.or(Some(period.time)).filter(|_| does == WheelTruth::Rolling);
+                flags.see(flag, since.map_or(TimeSpan::ZERO, |since| period.time - since));
+            }
         }
+        let scores = odometry.scores().cloned();
+        let scores = scores.ok_or_else(|| anyhow::anyhow!("a run that was to be scored has no score"))?;
+        Ok(Self { family, seed, teeth, scores, flags })
     }
-    let scores = odometry.scores().cloned();
-    Ok((scores.ok_or_else(|| anyhow::anyhow!("a run that was to be scored has no score"))?, flags))
 }
 
 #[cfg(test)]

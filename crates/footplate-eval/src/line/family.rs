@@ -1,12 +1,12 @@
-//! What many runs come to: in the middle, and in the worst of them.
+//! Figures over many runs: the median and the worst.
 
 use footplate_store::odometry::{OdometryScore, RunScores};
 
 use super::scored_run::{FalseFlags, Odometer, ScoredRun};
 
 /// Runs that are judged together.
-pub(super) struct Family<'r> {
-    pub(super) name: String,
+pub(crate) struct Family<'r> {
+    pub(crate) name: String,
     runs: Vec<&'r ScoredRun>,
     /// The periods of all runs together.
     whole: Option<RunScores>,
@@ -15,36 +15,36 @@ pub(super) struct Family<'r> {
 
 /// A figure over runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spread {
+pub(crate) struct Spread {
     /// Half of the runs are better.
-    pub(super) median: f64,
+    pub(crate) median: f64,
     /// The largest.
-    pub(super) worst: f64,
+    pub(crate) worst: f64,
 }
 
-/// How good an odometer was on a family. Shares without a word about runs are over all periods of all runs.
-pub(super) struct Figures {
-    pub(super) speed_rms_m_s: Option<Spread>,
-    pub(super) speed_max_m_s: Option<Spread>,
-    /// Amount of the error at the end of the run, in per cent of the way.
-    pub(super) distance_end_pct: Option<Spread>,
-    pub(super) speed_width_mean_m_s: Option<Spread>,
-    pub(super) speed_inside_pct: Option<f64>,
-    /// In how many runs the distance never left its interval; absent without one.
-    pub(super) distance_inside_runs: Option<usize>,
-    pub(super) etcs_speed_violation_pct: Option<f64>,
+/// Figures of an odometer on a family. Shares are over all periods of all runs, unless they name runs.
+pub(crate) struct Figures {
+    pub(crate) speed_rms_m_s: Option<Spread>,
+    pub(crate) speed_max_m_s: Option<Spread>,
+    /// Absolute error at the end of the run, in per cent of the distance.
+    pub(crate) distance_end_pct: Option<Spread>,
+    pub(crate) speed_width_mean_m_s: Option<Spread>,
+    pub(crate) speed_inside_pct: Option<f64>,
+    /// Number of runs whose distance never left its interval; absent without one.
+    pub(crate) distance_inside_runs: Option<usize>,
+    pub(crate) etcs_speed_violation_pct: Option<f64>,
     /// The same in the worst run.
-    pub(super) etcs_speed_violation_worst_pct: Option<f64>,
+    pub(crate) etcs_speed_violation_worst_pct: Option<f64>,
     /// Of the runs in which something slips or slides and is flagged.
-    pub(super) detect_delay_s: Option<Spread>,
+    pub(crate) detect_delay_s: Option<Spread>,
 }
 
 impl Spread {
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
-        // Not a number comes last, and is the worst.
+        // NaN sorts last, as the worst.
         values.sort_unstable_by(f64::total_cmp);
-        // Of two in the middle, half way between.
+        // Between two in the middle, their mean.
         let middle = |at: usize| values.get(at).copied();
         let median = 0.5 * (middle(values.len().checked_sub(1)? / 2)? + middle(values.len() / 2)?);
         Some(Self { median, worst: *values.last()? })
@@ -52,7 +52,7 @@ impl Spread {
 }
 
 impl<'r> Family<'r> {
-    pub(super) fn new(name: &str, runs: impl Iterator<Item = &'r ScoredRun>) -> Self {
+    pub(crate) fn new(name: &str, runs: impl Iterator<Item = &'r ScoredRun>) -> Self {
         let mut family =
             Self { name: name.to_owned(), runs: Vec::new(), whole: None, flags: FalseFlags::default() };
         for run in runs {
@@ -66,16 +66,16 @@ impl<'r> Family<'r> {
         family
     }
 
-    pub(super) fn runs(&self) -> usize {
+    pub(crate) fn runs(&self) -> usize {
         self.runs.len()
     }
 
-    /// In how many periods the recommended preset flags a wheel that rolls, in per cent.
-    pub(super) fn false_flags_pct(&self) -> Option<f64> {
+    /// Share of periods in which the recommended preset flags a wheel that rolls (%).
+    pub(crate) fn false_flags_pct(&self) -> Option<f64> {
         self.flags.pct()
     }
 
-    pub(super) fn figures(&self, odometer: Odometer) -> Figures {
+    pub(crate) fn figures(&self, odometer: Odometer) -> Figures {
         let scores: Vec<OdometryScore> = self.runs.iter().map(|run| odometer.score(&run.scores)).collect();
         let spread = |of: fn(&OdometryScore) -> Option<f64>| Spread::of(scores.iter().filter_map(of));
         let whole = self.whole.as_ref().map_or_else(OdometryScore::default, |whole| odometer.score(whole));
