@@ -79,6 +79,7 @@ impl Traffic {
     fn listen(&mut self) {
         while let Some(output) = self.dispatcher.poll_output() {
             match output {
+                Output::Command(Command::PowerOff | Command::PowerOn) => {}
                 Output::Command(command) => {
                     self.check_turnout(command);
                     self.world.command(command);
@@ -308,6 +309,19 @@ fn no_train_is_dispatched_while_the_position_of_another_is_unknown() {
     assert_eq!(refused, Err(Refusal::OtherNowhere { train: known, other }));
     let refused = dispatcher.go(traffic.world.now, other, journey);
     assert_eq!(refused, Err(Refusal::Lost { train: other }));
+}
+
+#[test]
+fn a_journey_goes_on_after_a_person_switched_the_power_off_and_on() {
+    let mut traffic = Traffic::watched();
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(2.5);
+    traffic.dispatcher.switch_power(traffic.world.now, false);
+    traffic.run(5.0);
+    traffic.dispatcher.switch_power(traffic.world.now, true);
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
 }
 
 /// The same two trains, where nobody has set any turnout.

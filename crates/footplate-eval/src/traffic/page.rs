@@ -11,23 +11,24 @@ use crate::written_scores::{Rate, WrittenScores};
 const HEAD: &str = "\
 # How several trains fare on one layout
 
-Random simulated trains, each calibrated from nothing while the others were lifted, then sent to one random place after the
-other: a contact and an offset past it, from whichever side. Contacts are missed, stick and close by themselves, turnouts
-fail, at the rates of a well-kept laboratory. The simulator's truth is used for these figures alone.
+Random simulated trains, each calibrated from nothing while the others were lifted. Each is sent to one random place after the
+other: a sensor and an offset past it, from whichever side. The dispatcher and its watchdog drive them, as in `drive`. Sensors
+miss trains, stick and report without a train, and turnouts fail, at the rates of a well-kept laboratory. Only these figures
+use the simulator's truth.
 ";
 
 const LEGEND: &str = "\
-*Intrusions* are times that any part of a train came onto track that the train did not hold; *runs* are what was granted, of
-which one in a thousand may end beyond its track as it was reserved.
-*Waited* is from the order until the way was set, *took* until arrival (mean). *Nowhere* is the longest time that a train
-came to no destination. *Mistaken*: of all rests past a contact those at which the train stood further than four standard
-deviations from where it was believed to. *Hands*: times that a person had to read off where a lost train stood. *No way*: destinations too
-near to the end of a track, for which another was drawn. *By blocks*: the same trains, ways and stops, but whatever lies
-between contacts is reserved as a whole, with all its turnouts, as block systems do.
+*Waited* is the mean time from the order until the route was reserved, *took* until arrival. *Nowhere* is the longest time that
+a train came to no destination. *Runs*: of these, one in a thousand may end beyond its reservation. *Intrusions*: times that any
+part of a train was on track that it had not reserved. *Mistaken*: of all rests past a sensor, those more than four standard
+deviations from the estimate. *Alarms*: times that the watchdog stopped a train to locate it again. *Person*: times that it
+needed a person to read off where the train was. *No way*: destinations too near to the end of a track, for which another was
+drawn. *By blocks*: the same trains, orders and stops, but the track between sensors is reserved as a whole, with all its
+turnouts, as block systems do.
 ";
 
 /// No train should come to no destination for longer than this (s).
-const LONGEST_NOWHERE_S: f64 = 900.0;
+pub const LONGEST_NOWHERE_S: f64 = 900.0;
 
 /// All that was scored.
 pub struct Page<'r> {
@@ -50,7 +51,7 @@ impl WrittenScores for Page<'_> {
         writeln!(
             output,
             "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
-             collisions | derailments | overruns | intrusions | mistaken | wrong legs | lost | hands | no way |\n\
+             collisions | derailments | overruns | intrusions | mistaken | wrong legs | alarms | person | no way |\n\
              | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
         )?;
@@ -79,7 +80,7 @@ impl WrittenScores for Page<'_> {
             Rate::grief(mishaps, self.tallies.len()),
             Rate::new("runs onto track of others", sum(|tally| tally.intrusions.len()), runs),
             Rate::new("sessions with a train nowhere for more than 900 s", stuck, self.tallies.len()),
-            Rate::new("trains lost that needed a person", sum(|tally| tally.hands as usize), runs),
+            Rate::new("trains that needed a person", sum(|tally| tally.hands as usize), runs),
         ]
     }
 }
@@ -91,7 +92,7 @@ fn seeds(tallies: &[Tally]) -> Value {
                 "seed": tally.seed, "hours": tally.hours, "trains": tally.trains, "arrivals": tally.arrivals,
                 "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
                 "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
-                "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost,
+                "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost, "alarms": tally.dangers,
                 "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
@@ -127,7 +128,7 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
         sum(|tally| tally.mistaken as usize),
         sum(|tally| tally.beliefs as usize),
         sum(|tally| tally.diverged as usize),
-        sum(|tally| tally.lost as usize),
+        sum(|tally| tally.dangers as usize),
         sum(|tally| tally.hands as usize),
         sum(|tally| tally.refused.values().sum::<u32>() as usize),
     )

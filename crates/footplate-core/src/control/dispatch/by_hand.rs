@@ -1,5 +1,7 @@
 //! Trains driven by plain orders: the track ahead of them is reserved as far as it is free.
 
+use alloc::vec::Vec;
+
 use crate::control::drive::Refusal;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -81,17 +83,15 @@ impl Dispatcher {
         );
         // A train that follows another may run over its track, and so on along the row: the driver keeps gaps safe. It reserves
         // none of it, or its leader would be stopped before its own follower.
-        let mut row = alloc::vec![id];
-        while let Some(leader) = row
-            .last()
-            .and_then(|last| self.watchdog.driver().leader(*last))
-            .filter(|leader| !row.contains(leader))
-        {
-            row.push(leader);
-        }
+        let row = self.row_ahead(id);
         let is_free = |end: Length, shared: &[TrainId]| {
             let taken = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
-            self.trains.values().all(|other| shared.contains(&other.id) || !other.held.meets(&taken))
+            // Close behind it, its followers' margins may overlap its own.
+            let ahead = self.reserved(path.reservation(layout, at, end + room.ahead));
+            self.trains.values().all(|other| {
+                let taken = if self.row_ahead(other.id).contains(&id) { &ahead } else { &taken };
+                shared.contains(&other.id) || !other.held.meets(taken)
+            })
         };
         let free_until = |from: Length, shared: &[TrainId]| {
             let mut end = from;
@@ -128,5 +128,15 @@ impl Dispatcher {
             train.held = held;
             self.is_stirred = true;
         }
+    }
+
+    /// A train, the one that it follows, the one that this follows, and so on.
+    fn row_ahead(&self, id: TrainId) -> Vec<TrainId> {
+        let mut row = alloc::vec![id];
+        let leader = |row: &[TrainId]| self.watchdog.driver().leader(*row.last()?);
+        while let Some(next) = leader(&row).filter(|next| !row.contains(next)) {
+            row.push(next);
+        }
+        row
     }
 }

@@ -131,14 +131,14 @@ impl Dispatcher {
         if self.trains.values().any(|train| !train.course.is_empty()) {
             return;
         }
-        let turn = self.shuffled.checked_rem(waiting.len()).and_then(|turn| waiting.get(turn));
+        let turn = self.searched.checked_rem(waiting.len()).and_then(|turn| waiting.get(turn));
         let Some(id) = turn.copied() else { return };
         let is_due = self.thought.is_none_or(|last| now - last >= SEARCHES_AGAIN);
         if is_due
             && let Some((targets, start)) = self.targets(id).zip(self.start(now, id))
             && let Some(wish) = self.wish(id, &start, &targets)
         {
-            self.shuffled += 1;
+            self.searched += 1;
             if self.resolve_deadlock(now, id, &targets, &wish, THOROUGH) {
                 return;
             }

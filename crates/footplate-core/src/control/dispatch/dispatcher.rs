@@ -48,6 +48,8 @@ pub struct Dispatcher {
     pub(super) is_stirred: bool,
     /// How often a train was moved only to change the places that a search begins from.
     pub(super) shuffled: usize,
+    /// How many thorough searches for moves there were: each waiting train has its turn.
+    pub(super) searched: usize,
     /// When the last thorough search for moves failed.
     pub(super) thought: Option<Timestamp>,
     /// How many thorough searches in a row found no move that helps.
@@ -91,6 +93,7 @@ impl Dispatcher {
             outputs: VecDeque::new(),
             is_stirred: true,
             shuffled: 0,
+            searched: 0,
             thought: None,
             searches_in_vain: 0,
             blocks: None,

@@ -11,6 +11,7 @@ use crate::units::{Length, Speed};
 
 use super::obstacles::Obstacles;
 use super::path::edge_from;
+use super::reservation::CLEARANCE;
 
 /// The shortest run. Shorter moves are hard to make and tell nothing about the place of a train: it goes round, or comes from
 /// the other side.
@@ -138,7 +139,11 @@ impl<'a> Search<'a> {
                 continue;
             };
             let first = self.pace.start_s + if is_turned { self.pace.turn_s } else { 0.0 };
-            if let Some(cost) = self.seconds(start.edge, start.offset, edge.length) {
+            // It leaves a turnout whose leg it is on: one that is frozen it has reserved itself.
+            let leaves =
+                self.layout.needs_of(start.edge).any(|need| need.facing && self.frozen.contains(&need));
+            let from = if leaves { start.offset.max(CLEARANCE).min(edge.length) } else { start.offset };
+            if let Some(cost) = self.seconds(start.edge, from, edge.length) {
                 open.push(Open { seconds: first + cost, node: edge.to, by: By::Start { turned: is_turned } });
             }
         }

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::ids::TurnoutId;
 use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
@@ -109,7 +110,11 @@ pub(super) fn granted(
         let needs = path.needs(layout, if run.turns { begin } else { start }, end);
         // It has reserved what it is on; what a grown uncertainty adds to that may be reserved for another train.
         let taken_from = if runs.is_empty() { start } else { begin };
-        let taken = path.reservation(layout, taken_from, end);
+        let mut taken = path.reservation(layout, taken_from, end);
+        let left = if runs.is_empty() { left_turnout(layout, run, begins) } else { None };
+        if let Some(turnout) = left {
+            taken.release_turnout(layout, turnout);
+        }
         let mut granted = MovementAuthority {
             turns: run.turns,
             path,
@@ -127,7 +132,9 @@ pub(super) fn granted(
             let edge = run.start.edge;
             let own = layout.needs_of(edge).find(|need| need.facing);
             if let Some(need) = own {
-                granted.taken.take_turnout(layout, need.turnout);
+                if left.is_none() {
+                    granted.taken.take_turnout(layout, need.turnout);
+                }
                 if !granted.needs.iter().any(|known| known.turnout == need.turnout) {
                     granted.needs.push(need);
                 }
@@ -152,6 +159,14 @@ pub(super) fn granted(
         runs.push(granted);
     }
     Some(runs)
+}
+
+/// The turnout on whose leg a first run begins, away from its toe. The train has reserved it, and may leave even if a train
+/// on the other leg, as near to the toe, has, too: both would wait for ever.
+fn left_turnout(layout: &Layout, run: &Run, begins: &Start) -> Option<TurnoutId> {
+    let need = layout.needs_of(run.start.edge).find(|need| need.facing && begins.frozen.contains(need))?;
+    let mut later = run.edges.iter().skip(1).flat_map(|edge| layout.needs_of(*edge));
+    (!later.any(|later| later.turnout == need.turnout)).then_some(need.turnout)
 }
 
 /// Whether a turnout is needed in both positions, or both turnouts of one place curved.

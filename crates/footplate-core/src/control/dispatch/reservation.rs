@@ -74,6 +74,11 @@ impl Reservation {
         self.turnouts.extend(layout.never_curved_with(turnout));
     }
 
+    /// Removes a turnout, and the one in the same place.
+    pub(super) fn release_turnout(&mut self, layout: &Layout, turnout: TurnoutId) {
+        self.turnouts.retain(|held| *held != turnout && Some(*held) != layout.never_curved_with(turnout));
+    }
+
     /// Adds part of an edge, counted from its start, without turnouts.
     pub(super) fn take_rails(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         if let Some(span) = Span::on(layout, id, from, to) {

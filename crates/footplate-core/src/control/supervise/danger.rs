@@ -202,6 +202,7 @@ impl Watchdog {
             self.power = Power::On;
             self.command(Command::PowerOn);
             self.say(Notice::PowerOn);
+            self.release_held();
         }
     }
 

@@ -12,7 +12,7 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::trials::{SpeedTrial, Steps, is_same};
+use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
@@ -339,9 +339,6 @@ impl Watchdog {
     /// The track ahead of a train in recovery ends, or another train is there.
     pub(super) fn recovering_blocked(&mut self, now: Timestamp, train: TrainId) {
         match self.dangers.get(&train).map(|recovery| recovery.phase) {
-            Some(Phase::Measuring { .. }) if self.has_only_lost_its_place(train) => {
-                self.end(now, train, Outcome::AsBefore);
-            }
             Some(Phase::Crawling { .. } | Phase::Measuring { .. }) => self.turn_or_decide(now, train),
             Some(Phase::Creeping { .. } | Phase::StoppingShort { .. }) => self.end_rescaled(now, train),
             Some(Phase::LearningSpeed { .. } | Phase::LearningRest) => {
@@ -349,13 +346,6 @@ impl Watchdog {
             }
             _ => {}
         }
-    }
-
-    /// Whether a train was in danger for its place alone, which is known again, and no speed measured since is another one.
-    fn has_only_lost_its_place(&self, train: TrainId) -> bool {
-        self.dangers.get(&train).is_some_and(|recovery| {
-            matches!(recovery.why, Alarm::Lost | Alarm::Elsewhere(_)) && recovery.ratios.iter().all(is_same)
-        })
     }
 
     /// Its place was lost again: it is located once more.

@@ -151,15 +151,21 @@ impl Watchdog {
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
         self.behind.remove(&train);
-        if self.dangers.is_empty() {
-            // A person is at the track: no waiting train starts by itself.
-            for (train, order) in core::mem::take(&mut self.held) {
-                if let Some((_, order)) = order {
-                    self.say(Notice::Cancelled { train, order });
-                }
+        self.release_held();
+        self.drain(now);
+    }
+
+    /// Releases held trains once no train is in danger. A person is at the track: their orders are cancelled, so that no
+    /// train starts by itself.
+    pub(super) fn release_held(&mut self) {
+        if !self.dangers.is_empty() {
+            return;
+        }
+        for (train, order) in core::mem::take(&mut self.held) {
+            if let Some((_, order)) = order {
+                self.say(Notice::Cancelled { train, order });
             }
         }
-        self.drain(now);
     }
 
     /// The place of a train was wrong: it is unknown from now on. A watched train is stopped and located again.

@@ -7,16 +7,13 @@ use clap::Args;
 use footplate_core::TimeSpan;
 use footplate_core::track::Layout;
 use footplate_eval::seeds::Seeds;
-use footplate_eval::traffic::{Asked, Page, Session, Tally};
+use footplate_eval::traffic::{Asked, LONGEST_NOWHERE_S, Page, Session, Tally};
 use footplate_store::layout_named;
 
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::score_form::ScoreForm;
 use crate::spread::each;
-
-/// A train that comes to no destination for so long starves: ten journeys of those that wait longest.
-const STARVES: TimeSpan = TimeSpan::from_ms(1_500_000);
 
 /// Send several calibrated trains to random places, one after the other, and count what comes of it by the truth.
 #[derive(Args)]
@@ -85,7 +82,7 @@ impl Arguments {
         what.extend(intrusions.map(|(at, train)| {
             format!("train {train} on track that it does not hold at {:.2} s", at.as_s())
         }));
-        if tally.starved > STARVES.as_s() {
+        if tally.starved > LONGEST_NOWHERE_S {
             what.push(format!("a train came nowhere for {:.0} s", tally.starved));
         }
         let again = self.asked().replace(&format!("--seeds {}", self.seeds.written()), "");
