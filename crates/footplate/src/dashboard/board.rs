@@ -5,13 +5,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use footplate_core::TrainId;
 use footplate_core::model::MotionModel;
+use footplate_core::{Timestamp, TrainId};
 use serde::Serialize;
 use serde_json::json;
 use tokio::sync::{oneshot, watch};
 
 use super::history::{History, Sample};
+use crate::session_journal::WrittenUntil;
 
 /// Happenings that are kept for watchers who were away: a quarter of an hour of a busy railway.
 const MOST_KEPT: usize = 4_000;
@@ -93,6 +94,8 @@ pub(crate) struct Board {
     histories: Mutex<BTreeMap<TrainId, History>>,
     models: Mutex<BTreeMap<TrainId, Arc<MotionModel>>>,
     waiting: Mutex<VecDeque<Asked>>,
+    /// How far the session is written down, if it is.
+    journal: Mutex<Option<WrittenUntil>>,
     /// Those who are sent events now.
     watchers: AtomicUsize,
 }
@@ -107,8 +110,20 @@ impl Board {
             histories: Mutex::default(),
             models: Mutex::default(),
             waiting: Mutex::default(),
+            journal: Mutex::default(),
             watchers: AtomicUsize::new(0),
         })
+    }
+
+    /// The session is written down from now on.
+    pub(crate) fn follow_journal(&self, written: WrittenUntil) {
+        *self.journal.lock().unwrap_or_else(PoisonError::into_inner) = Some(written);
+    }
+
+    /// All that happened before this is on the disk; `None` if nothing is written down.
+    pub(super) fn written_until(&self, now: Timestamp) -> Option<Timestamp> {
+        let journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
+        journal.as_ref().map(|written| written.at(now))
     }
 
     /// Shows something else from now on.

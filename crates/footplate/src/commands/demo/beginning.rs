@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibrating::Calibrated;
 use crate::commands::written_layout::WrittenLayout;
-use crate::witness::{Input, Listener};
+use crate::recorded::{Input, Listener};
 
 /// All that the driver of a train is made of that has just been calibrated.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use super::outcome::{Learnt, LearntStep, minutes};
 use super::stage::Stage;
 use crate::commands::calibrate::CalibrationBeginning;
 use crate::commands::written_layout::WrittenLayout;
-use crate::witness::Witnessed;
+use crate::recorded::Recorded;
 
 /// The decoder of the trains of the real-time courses.
 const HIGHEST_STEP: u8 = 14;
@@ -40,7 +40,7 @@ pub(super) fn calibrate(
     let beginning = CalibrationBeginning::new(on, settings, MotionFit::new(train, highest), turnouts);
     let scribe = stage.begin_machine(CalibrationBeginning::KIND, &beginning)?;
     let layout = &on.layout;
-    let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
+    let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
     let began = stage.now();
     stage.works(train, "learns", "");
     while calibrator.machine().ending().is_none() {

@@ -16,7 +16,7 @@ use super::targets::{Dice, steps_to_stop_from, target_ahead};
 use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
-use crate::witness::{Input, Witnessed};
+use crate::recorded::{Input, Recorded};
 
 /// Targets that may be refused before no more are tried.
 const TRIES: usize = 40;
@@ -30,7 +30,7 @@ pub(super) struct Tour<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     train: TrainId,
-    driver: Witnessed<Driver>,
+    driver: Recorded<Driver>,
     /// What was passed last, for the picture.
     passed: String,
     next: Option<DueContact>,
@@ -47,7 +47,7 @@ impl<'l> Tour<'l> {
         let layout = &on.layout;
         let beginning = TourBeginning::new(on, known);
         let scribe = stage.begin_machine(TourBeginning::KIND, &beginning)?;
-        let driver = Witnessed::new(beginning.driver(layout), scribe);
+        let driver = Recorded::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
         Ok(Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None })
     }

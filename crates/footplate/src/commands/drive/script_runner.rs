@@ -24,7 +24,7 @@ use super::reader::Known;
 use super::script::{Step, step};
 use super::spoken::Spoken;
 use crate::dashboard::{Painter, TrainTask};
-use crate::witness::{Input, Listener};
+use crate::recorded::{Input, Listener};
 
 /// What waits longer than this waits for nothing, unless another limit is set: a train at a crawl goes once round within it.
 pub(super) const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);

@@ -14,8 +14,8 @@ use super::script_runner::ScriptRunner;
 use super::spoken::{Ended, Spoken};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
+use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
-use crate::witness::{Input, Witnessed};
 
 /// No screen shows more often than this that a train has moved: fifty pictures a second.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(20);
@@ -75,7 +75,7 @@ struct Watched {
 }
 
 impl Watched {
-    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) {
         while let Some(asked) = self.board.next_asked() {
             let answer = match &asked.request {
                 Request::EmergencyStop => {
@@ -157,7 +157,7 @@ impl Stage {
     }
 }
 
-impl Attendant<Witnessed<ScriptRunner>> for Stage {
+impl Attendant<Recorded<ScriptRunner>> for Stage {
     fn hear(&mut self, now: Timestamp, notice: Spoken) {
         match notice {
             Spoken::Line { text, status } => {
@@ -193,7 +193,7 @@ impl Attendant<Witnessed<ScriptRunner>> for Stage {
         self.alarm(now, &Alarm::not_sent(&why));
     }
 
-    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) -> Wish {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Wish {
         for news in std::mem::take(&mut self.news) {
             script_runner.handle_word(now, &Input::Link(news));
         }
