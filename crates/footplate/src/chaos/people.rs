@@ -142,9 +142,9 @@ impl<'p, 'l> People<'p, 'l> {
             }
             // A person looks where it stands, and says so.
             if self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
-                self.troubled.remove(train);
                 let stands = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_some());
                 if stands && let Some(at) = place_by_hand(self.layout, world, *train) {
+                    self.troubled.remove(train);
                     dispatcher.place(now, *train, at, HAND);
                     self.tell(now, format!("a person says where train {train} is"));
                 }
